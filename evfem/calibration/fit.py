@@ -270,16 +270,8 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
         raise InputError(
             "scene", f"one that cannot be run at the start: {residuals.failed}", "one that can be"
         )
-    found = least_squares(
-        residuals,
-        start,
-        residuals.jacobian,
-        bounds,
-        xtol=UNKNOWNS,
-        ftol=SQUARES,
-        gtol=1e-12,
-        max_nfev=MOST_STEPS,
-    )
+    ends = {"xtol": UNKNOWNS, "ftol": SQUARES, "gtol": 1e-12, "max_nfev": MOST_STEPS}
+    found = least_squares(residuals, start, residuals.jacobian, bounds, **ends)
     known = confidence(found.jac, found.fun, parameters.names)
     warnings = [*([] if found.success else [f"not finished after {MOST_STEPS} steps"]), *known.warnings]
     warnings += residuals.roughness(found.x, found.fun, found.jac)

@@ -105,11 +105,8 @@ class Candidates:
         """Coefficients (k,) of `near` nodes by the chords of their friction law, not too steep, or None."""
         if self.cohesion is None:
             return None
-        normal, along, n = (
-            np.maximum(self.force[near, 0], 0.0),
-            self.shear_direction[near],
-            self.axes.shape[1],
-        )
+        normal, along = np.maximum(self.force[near, 0], 0.0), self.shear_direction[near]
+        n = self.axes.shape[1]
         chord = self.friction[near] + self.cohesion[near] / np.where(normal > 0.0, normal, np.inf)
         blocks = compliance.reshape(near.size, n, near.size, n)[np.arange(near.size), 0, np.arange(near.size)]
         pressed = -blocks[:, 1:] / blocks[:, :1]

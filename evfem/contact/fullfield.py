@@ -118,13 +118,11 @@ class Bounds:
 
 
 def certificate(x: Floats, levels: Floats, insulator: Layer, skin: Floats, gap_eps_r: float = 1.0) -> Bounds:
-    """Bounds for an outline without solving: points at `x` (L,), the heights `levels` (2, L) of the
-    ground and of the outline above in mm, the gap between them filled with `gap_eps_r`, an insulator
-    below; `skin` (L,) is the skin's layer, reduced (mm).
+    """Bounds for an outline without solving: points at `x` (L,), `levels` (2, L) of ground and outline in mm,
+    the gap filled with `gap_eps_r`, an insulator below; `skin` (L,) is the skin's layer, reduced (mm).
 
-    Below: the vertical flux through all layers, the column law. Above: the energy of potentials that
-    are linear along verticals, with the skin's layer a conductor (`evfem.field.bounds`).
-    C is proportional to all permittivities, and the bounds are those of a gap of air.
+    Below: the column law. Above: potentials linear along verticals, the skin's layer a conductor
+    (`evfem.field.bounds`). C is proportional to all permittivities.
     """
     eps_r, gap = float(insulator.eps_r) / gap_eps_r, levels[1] - levels[0]
     lower = columns_sum(x, gap + float(insulator.thickness) / eps_r + skin * gap_eps_r)

@@ -32,12 +32,11 @@ MARGIN = 1e-4
 
 @dataclass(frozen=True)
 class FieldSolution:
-    """The field between a grounded body and an electrode, per mm of depth.
+    """The field between a grounded body and an electrode, per mm of depth (of one period if periodic).
 
-    `capacitance` in F/mm; `force` in N/mm, the attraction towards the electrode, of one period where
-    the outline is periodic; `bounds`, lower and upper bound of the exact capacitance of the outline
-    in F/mm; capacitance * voltage^2 / 2 is the energy in J/mm (1000 N). Fields are in V/mm, the
-    electrode's upper face is at y = -`thickness` mm, the slab's at y = 0.
+    `capacitance` in F/mm with its `bounds` for the exact outline; `force` in N/mm, towards the electrode;
+    capacitance * voltage^2 / 2 is the energy in J/mm (1000 N). Fields are in V/mm, the electrode's upper face
+    is at y = -`thickness` mm, the slab's at y = 0.
     """
 
     capacitance: float

@@ -82,15 +82,13 @@ class Motions:
 class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
-    `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
-    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it
-    alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
-    surface. Only where the field is full may the finger be not `grounded`: without a charge, above electrodes
-    of different voltages. `friction_law` says what the surface's coefficient of
-    friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
-    `AgeingFriction` or one's own). A `hand` is between drive and bone: motions then say where the
-    drive goes. `depth` (mm) is how deep the plane finger is meant to be; it changes no number but
-    adds `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
+    `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the position of the
+    bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it alternate, or leak. `law`
+    None and `voltage` 0: no electrostatics. Only where the field is full may the finger be not `grounded`:
+    without a charge, above electrodes of different voltages. `friction_law` says what the surface's
+    coefficient means (`Coulomb`, ... or one's own). A `hand` is between drive and bone: motions then say
+    where the drive goes. `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. Raises InputError
+    for anything that does not fit together.
     """
 
     finger: Finger

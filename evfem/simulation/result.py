@@ -51,11 +51,10 @@ RESULT_FORMAT = "evfem-result-1"
 class Frame:
     """Fields of one step on N nodes and E cells; tractions in MPa, lengths in mm.
 
-    `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip.
-    `cauchy_stress` holds the components xx, yy, zz, xy of the cell means, in three dimensions yz and
-    xz too; `J` is the volume ratio. There `shear_traction` is the magnitude of the shear. Tractions are
-    nodal forces over the lengths, or areas, that these were made with: the current shares of the pad,
-    for `electrostatic_traction` of the full field those of its columns.
+    `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip. `cauchy_stress`
+    holds xx, yy, zz, xy of the cell means, in three dimensions yz and xz too, where `shear_traction` is a
+    magnitude; `J` is the volume ratio. Tractions are nodal forces over the current shares of the pad, of the
+    full field over those of its columns.
     """
 
     step: int

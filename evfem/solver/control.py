@@ -115,11 +115,10 @@ class Loose(Indentation):
 
 @dataclass(frozen=True)
 class VoltageProblem:
-    """What a voltage control may ask for in one iteration: the present squared voltage (kV^2), a
-    solved contact problem, and what one kV^2 more does: the state for the backward solve and the
-    condensed forces. The same of any forces on the pad nodes (P, dim), `pushed`; of a number with a
-    gradient (P, dim) by their positions, `measured`, the condensed row and what the number gains while
-    the candidates stay, by the step's residual and by forces with such a state; and what is `seen`.
+    """What a voltage control may ask for: the present squared voltage (kV^2), a solved contact problem, state
+    for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
+    `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
+    the residual and by forces with such a state; what is `seen`.
     """
 
     squared: float

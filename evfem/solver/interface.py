@@ -31,12 +31,11 @@ from evfem.surface.skin import Skin
 class Pins:
     """Nodes that a jump of friction holds back during one step; `x` (P,) is nan for free nodes.
 
-    A node slides up to a jump to higher friction and stays there, its shear force growing from the lower to
-    the higher limit, before it slides on. Taken at the node's own x the coefficient then has no consistent
-    value on either side: the iterations put the node before the jump, behind it, before it again. Such a node
-    is pinned to the jump, a hair inside the rougher side, where it sticks with the higher coefficient. It is
-    released when its shear force falls below the lower limit. A node that began the step on the rougher side
-    is not held: it leaves it and slides on, or it stays there.
+    A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
+    to the higher limit. By its own x the coefficient has no consistent value: iterations put it before the
+    jump, behind it, before it again. It is pinned a hair inside the rougher side, sticking with the higher
+    coefficient, and released below the lower limit. A node that began the step on the rougher side is not
+    held.
     """
 
     def __init__(self, jumps: Floats, size: int) -> None:
@@ -198,10 +197,9 @@ class Interface:
     def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
         """The candidates c under a law of friction other than Coulomb's.
 
-        Where the interface yields by C, a node that slips under the largest shear F(s) and is displaced
-        by dx slips by ds = dx - C dF: with K = dF/ds friction grows by K dx / (1 + K C), law and
-        interface in series. The contact problem knows the part of F that does not grow with dx; seen
-        with that, slip and yielding are (1 + K C) times as large.
+        Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
+        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem knows the part of F
+        that does not grow with dx; seen with that, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])

@@ -24,13 +24,12 @@ HALVINGS = 60
 class Returned:
     """Nodes that have slipped and stick again, or whose speed goes to and fro: `nodes` (P,) bool.
 
-    Extrapolated to zero speed, the tangent of a law that rises steeply from rest and levels off
-    overestimates static friction: the node would slip and stick by turns. At a kink the tangent of
-    either side may lead to the other one. Such a node is placed at the speed at which the law gives its
-    present force, with the tangent there; if it sticks under more than static friction, with the chord
-    from rest to there. If no speed up to the highest that the node has had gives that force, a slipping
-    node takes the steepest of the law's chord from rest, its tangent and the slope of the last
-    iteration, once near the end the tangent; a sticking one the slope of the last iteration.
+    The tangent of a law that rises steeply from rest and levels off overestimates static friction: the node
+    would slip and stick by turns, and at a kink either side may lead to the other. It is placed at the speed
+    at which the law gives its present force, with the tangent there; sticking under more than static
+    friction, with the chord from rest. If no speed so far gives that force, a slipping node takes the
+    steepest of chord, tangent and the slope of the last iteration, near the end the tangent; a sticking one
+    the last slope.
     """
 
     def __init__(self, size: int) -> None:

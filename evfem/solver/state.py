@@ -47,15 +47,12 @@ class LiftedOff(StepFailed):
 class State:
     """A configuration of a body with N nodes, P of them on the pad.
 
-    Displacements u (N, 2) in mm, contact forces on the pad nodes along the profile's normal and
-    tangent (P, 2) in N/mm and their statuses (P,), the bone's translation (2,), the voltage in V,
-    the attraction on the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in
-    mm/s, and the increment of the displacements in the step that led here (N, 2). While an
-    equilibrium of nearly incompressible tissue is sought, the pressure (E, Q) in MPa is an unknown
-    too (`evfem.solver.pressure`). With a law of friction other than Coulomb's: how long the pad
-    nodes have touched, `age` (P,) in s. With a hand: x of the drive, velocity of the bone and force
-    of the drive, `hand` (3,) in mm, mm/s and N/mm. Under a voltage resolved in time each pad node
-    has charges over eps_0 (M, P) in V/mm, two where nothing relaxes (`evfem.contact.charging`).
+    Displacements u (N, 2) in mm, contact forces along normal and tangent (P, 2) in N/mm and statuses (P,),
+    the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
+    velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
+    pressure as an unknown, that (E, Q) in MPa (`evfem.solver.pressure`). With a law of friction other than
+    Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
+    (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm.
     """
 
     u: Floats

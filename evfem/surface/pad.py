@@ -55,10 +55,8 @@ SHARES = {2: np.array([0.5, 0.5]), 3: np.array([1.0, 1.0, 4.0]) / 6.0}
 
 @dataclass(frozen=True, eq=False)
 class Pad:
-    """Pad nodes of a mesh, their edges as indices into them, and which of them may touch (those
-    not on the bone).
-
-    `nodes` (P,) mesh numbers; `edges` (K, 2|3) indices into `nodes`: start, end[, middle]; `free` (P,) bool.
+    """Pad nodes of a mesh: mesh numbers `nodes` (P,), `edges` (K, 2|3) as indices into them: start, end[,
+    middle], and which may touch (those not on the bone), `free` (P,) bool.
     """
 
     nodes: Ints
@@ -127,11 +125,10 @@ class Pad:
         return np.asarray(np.bincount(ends, lengths, x.size) / np.maximum(sides, 1.0))
 
     def contact_widths(self, position: Floats, reach: Floats) -> tuple[float, float]:
-        """Overall and real contact width (mm) of nodes at (P, 2) with this `reach` (P,): from the first
-        to the last edge of contact, and the sum of what lies between edges.
+        """Overall and real contact width (mm) of nodes at (P, 2) with this `reach` (P,).
 
-        Between a node that touches and one that does not, contact ends where the reach, linear between
-        them, is zero, less `OVERSHOT` of their distance, or of less where little touches beside the node.
+        Between a node that touches and one that does not, contact ends where the linear reach is zero, less
+        `OVERSHOT` of their distance, or of less where little touches beside the node.
         """
         x = position[:, 0]
         a, b = self.segments[x[self.segments[:, 1]] > x[self.segments[:, 0]]].T

@@ -31,11 +31,8 @@ QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Pad nodes of a mesh of hexahedra, their faces as indices into them, and which of them may
-    touch (those not on the bone).
-
-    `nodes` (P,) mesh numbers; `faces` (K, 4|9) indices into `nodes`, counter-clockwise seen from
-    outside; `free` (P,) bool.
+    """Pad nodes of a mesh of hexahedra: mesh numbers `nodes` (P,), `faces` (K, 4|9) as indices into them,
+    counter-clockwise from outside, and which may touch (those not on the bone), `free` (P,) bool.
     """
 
     nodes: Ints
@@ -112,12 +109,10 @@ class Skin:
         return found
 
     def areas(self, position: Floats, reach: Floats) -> tuple[float, float]:
-        """Gross and real contact area (mm2) of nodes at (P, 3) with this `reach` (P,): that of the
-        convex hull of what touches, and of all that touches.
+        """Gross (convex hull) and real contact area (mm2) of nodes at (P, 3) with this `reach` (P,).
 
-        Every face between four nodes consists of four triangles around its middle; contact ends on a
-        line across those in which the linear reach changes its sign, less `OVERSHOT` of the nodes' distance
-        across that line, or of less where little touches around the face.
+        Every face between four nodes is four triangles around its middle; contact ends where the linear reach
+        changes sign, less `OVERSHOT` of the distance across, or of less where little touches around.
         """
         reach = widened(reach, self._rows)
         corners = np.stack([position[:, 0], position[:, 2], reach], axis=1)[self._quarters]
