@@ -107,7 +107,7 @@ class Surface(Protocol):
 
 @runtime_checkable
 class CompleteSurface(Surface, Protocol):
-    """Everything that contact asks of a surface; `evfem.surface.own.completed` gives it to any
+    """Everything that contact asks of a surface; `evfem.surface.usersurface.completed` gives it to any
     `Surface`.
     """
 

@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices checks views pools digest storage listed tables pictures",
+        "arrays constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -42,9 +42,9 @@ ROOMS = {
     ),
     "field": (
         {"numpy", "scipy", "skfem"},
-        "outlines bounds curves fieldmesh poisson rigid columncells columns meanpull",
+        "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "friction surfaces textures own pad edge skin"),
+    "surface": ({"numpy", "scipy"}, "friction surfaces textures usersurface pad edge skin"),
     "contact": (
         {"numpy", "scipy"},
         "charging attraction fullfield drivenfield attracted signorini solve follower condensed stability",
@@ -56,11 +56,11 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics options scene keys written format schema file spatial",
+        "motion terms electrics options scene keys serialiser format schema file spatial",
     ),
     "planning": (
         {"numpy"},
-        "resolution drift partchecks parts sense fieldchoice core timescales way plan",
+        "resolution loaddrift partchecks parts plausibility fieldchoice core timescales pathdependence plan",
     ),
     "simulation": (
         {"numpy", "scipy"},

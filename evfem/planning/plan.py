@@ -20,12 +20,12 @@ from evfem.errors import InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
 from evfem.planning.core import core_of, unseen
-from evfem.planning.drift import drifting
+from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
+from evfem.planning.pathdependence import said
+from evfem.planning.plausibility import doubts, locking, touching_traction, weakens
 from evfem.planning.resolution import oscillating, too_fast, unresolved
-from evfem.planning.sense import doubts, locking, touching_traction, weakens
 from evfem.planning.timescales import left_out, time_scales
-from evfem.planning.way import said
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory

@@ -158,7 +158,7 @@ class Slide(Motion, kind="slide"):
     """Slide over the surface in equal parts.
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
-    which the load drifts (`evfem.planning.drift`). A finger that touches nothing and is not attracted has
+    which the load drifts (`evfem.planning.loaddrift`). A finger that touches nothing and is not attracted has
     no force at any height: in every motion with `hold` it stays where it is, and gives way to what
     touches it. `speed` sets how much time passes.
 

@@ -37,7 +37,7 @@ from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
 from evfem.surface.friction import Coulomb
-from evfem.surface.own import completed
+from evfem.surface.usersurface import completed
 from evfem.tissue.forms import Form
 
 DIRECTIONS = ("vertical", "normal")

@@ -11,7 +11,7 @@ import numpy as np
 
 from evfem.common.constants import VERGE, VERGE_LOST
 from evfem.errors import InputError
-from evfem.planning.sense import weakens
+from evfem.planning.plausibility import weakens
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.solver.control import Target

@@ -42,7 +42,7 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
     `parameters` is the scene as TOML, or its representation where it holds a law or form of the
     user's own.
     """
-    from evfem.scene.written import dump
+    from evfem.scene.serialiser import dump
 
     try:
         parameters = dump(scene)

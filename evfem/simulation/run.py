@@ -20,7 +20,7 @@ from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
-from evfem.planning.way import allowed_error
+from evfem.planning.pathdependence import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
 from evfem.scene.scene import Scene

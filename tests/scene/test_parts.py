@@ -13,7 +13,7 @@ import evfem as ev
 from evfem.errors import InputError
 from evfem.planning.parts import check_parts
 from evfem.planning.plan import plan, scene_mesh
-from evfem.planning.sense import doubts
+from evfem.planning.plausibility import doubts
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.38)
 PRESS, SLIDE = ev.Press(indentation=0.2, steps=2), ev.Slide(distance=1.0, steps=5)

@@ -11,8 +11,8 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
+from evfem.planning.pathdependence import remembers
 from evfem.planning.plan import plan
-from evfem.planning.way import remembers
 from evfem.simulation.model import make_model
 
 pytestmark = pytest.mark.solver

@@ -17,7 +17,7 @@ import evfem as ev
 from evfem.cli import main
 from evfem.planning.parts import check_parts
 from evfem.planning.plan import plan, scene_mesh
-from evfem.planning.sense import doubts, locking
+from evfem.planning.plausibility import doubts, locking
 from evfem.scene import file as scenefile
 from evfem.scene.scene import default_scene
 from evfem.tissue.splitlaw import split
