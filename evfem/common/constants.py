@@ -33,7 +33,7 @@ TAKEN                   and the fraction above which it makes the node a candida
 FIRST                   in 3D, at least this fraction of the pad's nodes are candidates           press
 GROWN, GROWING          where they become so many times more within a linear step, it is done     press
                         again with them, at most so often
-FAINT                   changes of tributary lengths that stiffen no node by more than this       C
+SMALLEST_STIFFENING     changes of tributary lengths that stiffen no node by more than this       C
                         fraction are left to the iterations
 WEAK                    an attraction whose feedback on its own node is below this fraction       C
                         is left to the next iteration
@@ -54,10 +54,10 @@ LEFT_OVER               least share of a contact force that the tangent leaves w
 ROUNDING                violations below this fraction of the largest force are rounding
 FIELD_ROUNDING          forces of the full field are known to this fraction of the largest nodal    full field
                         one: changes of 1e-15 mm change them by 4e-13 to 1.4e-10 of it
-UNHELD                  pivots of the bone below this fraction belong to a body without a hold
+SMALLEST_PIVOT          pivots of the bone below this fraction belong to a body without a hold
 TURNED                  a bone that moved less than this fraction of its next way has not moved   turns
                         along it
-HAIR                    how far inside the rougher side a node is pinned to a jump of friction,   jumps
+PIN_OFFSET              how far inside the rougher side a node is pinned to a jump of friction,   jumps
                         mm: far above rounding, far below any mesh
 NEAR                    a slip that has changed by less than this fraction of it in one           rates
                         iteration is near the end
@@ -88,7 +88,7 @@ DRAG_MOST               what fails although drag of such a rate holds the body i
 IMPERFECTION            a release begins so far aside, mm: far above what iterations leave, far   crests
                         below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
-VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps
+CRITICAL, SOFTENED      a step that failed where what takes stability away grows so fast,         snaps
                         relative to what holds it, has no equilibrium near; the second, where
                         the body gave way in its iterations
 STAGGERED_LIMIT         rounds of the staggered coupling
@@ -110,7 +110,7 @@ NEIGHBOURS = 4.0
 STEEP = 0.02
 HELD, TAKEN = 2.0, 10.0
 FIRST, GROWN, GROWING = 0.05, 3.0, 4
-FAINT = 0.01
+SMALLEST_STIFFENING = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
@@ -123,9 +123,9 @@ STABLE = 0.9
 LEFT_OVER = 0.01
 ROUNDING = 1e-12
 FIELD_ROUNDING = 2e-10
-UNHELD = 1e-10
+SMALLEST_PIVOT = 1e-10
 TURNED = 1e-9
-HAIR = 1e-9
+PIN_OFFSET = 1e-9
 NEAR = 0.3
 BACK = 0.5
 SHORT_RAMP = 0.5
@@ -138,6 +138,6 @@ DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_LEAST, DRAG_MOST, DRAG_STEPS = 1e-9, 1e6, 400
 IMPERFECTION = 1e-5
-VERGE, VERGE_LOST = 0.9, 0.5
+CRITICAL, SOFTENED = 0.9, 0.5
 STAGGERED_LIMIT = 60
 NAMED = 3

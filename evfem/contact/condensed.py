@@ -31,7 +31,7 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
+from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
@@ -402,7 +402,7 @@ class LinearContactStep:
         """
         dim = self.body.dim
         axis = [unknown.axis - dim for unknown in self.unknowns]
-        floor = UNHELD * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
+        floor = SMALLEST_PIVOT * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
         return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
 

@@ -17,7 +17,7 @@ a stiffness D of their own:
 - the attraction of open nodes, :math:`D = -A\,dp/dg` with their gaps.
 
 Together they grow `share` times as fast as what holds the tissue, the largest real eigenvalue of
-A D; at 1 the equilibrium is lost. The force that works most in that motion wins (`verge`).
+A D; at 1 the equilibrium is lost. The force that works most in that motion wins (`stability_ratio`).
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ ATTRACTION = "the attraction grows as the gap closes"
 
 
 @dataclass(frozen=True)
-class Verge:
+class StabilityRatio:
     """How close an equilibrium is to its loss, 1: how fast what takes it away grows relative to
     what holds the tissue; and the force that works most in it, in words.
     """
 
-    share: float
+    ratio: float
     cause: str
 
 
-def verge(step: LinearContactStep) -> Verge:
+def stability_ratio(step: LinearContactStep) -> StabilityRatio:
     """Of the equilibrium that `step` begins at."""
     known, surface = step.candidates, step.candidates.surface
     slipping = np.flatnonzero(known.status >= FORWARD)
@@ -70,7 +70,7 @@ def verge(step: LinearContactStep) -> Verge:
     share, motion = _fastest(
         _freed(step, slipping, opened), sum(grows.values(), np.zeros(none.size + far.size))
     )
-    return Verge(share, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
+    return StabilityRatio(share, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
 
 
 def _shear_ratio(step: LinearContactStep) -> Floats:

@@ -25,7 +25,7 @@ import numpy as np
 
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import way
+from evfem.planning.resolution import path_points
 from evfem.scene.scene import Scene
 
 #: a drift of the load that is worth a word
@@ -61,7 +61,7 @@ def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[
     """
     if not isinstance(scene.finger, FingerPad) or not scene.ground.is_flat:
         return
-    friction = float(np.max(scene.ground.friction_coefficient(way(scene, mesh, STEP))))
+    friction = float(np.max(scene.ground.friction_coefficient(path_points(scene, mesh, STEP))))
     load = None
     for i, course in enumerate(scene.courses):
         if course.depth is not None:

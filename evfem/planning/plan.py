@@ -22,8 +22,8 @@ from evfem.mesh.mesh import Mesh
 from evfem.planning.core import core_of, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
-from evfem.planning.pathdependence import said
-from evfem.planning.plausibility import doubts, locking, touching_traction, weakens
+from evfem.planning.pathdependence import steps_line
+from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
 from evfem.planning.resolution import oscillating, too_fast, unresolved
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
@@ -171,7 +171,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, mesh, terms),
-        warnings=(*doubts(scene, mesh, moduli), *locked, *filter(None, others)),
+        warnings=(*implausible(scene, mesh, moduli), *locked, *filter(None, others)),
     )
 
 
@@ -318,7 +318,7 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
             f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
             "so the tissue's matrix stays symmetric"
         )
-    steps = said(scene)
+    steps = steps_line(scene)
     if steps:
         lines.append(steps)
     return (

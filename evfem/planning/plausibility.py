@@ -1,6 +1,6 @@
 """What a scene says, but hardly means.
 
-`doubts` says in a sentence each what may be meant, but hardly is: units, fields that no insulator
+`implausible` says in a sentence each what may be meant, but hardly is: units, fields that no insulator
 withstands, slides that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
 """
 
@@ -18,7 +18,7 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import way
+from evfem.planning.resolution import path_points
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
 from evfem.tissue.elements import ELEMENTS
@@ -48,7 +48,7 @@ HEAVIEST = 100.0
 WAY_STEP = 0.02
 
 
-def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
+def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
     """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
     shear moduli (MPa) of the materials.
     """
@@ -210,6 +210,6 @@ def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
         return False
     surface: Any = scene.ground
     if not surface.is_flat:
-        gap -= float(np.ptp(surface.height(way(scene, mesh, WAY_STEP))))
+        gap -= float(np.ptp(surface.height(path_points(scene, mesh, WAY_STEP))))
         return gap > 0.0
     return True

@@ -52,7 +52,7 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
             f"{PER_WAVE:g} nodes of the pad each, which are {spacing:.2g} mm apart; use a finer mesh, or a "
             f"shortest wave of {PER_WAVE * spacing:.2g} mm"
         )
-    x = way(scene, mesh, spacing / PER_SPACING)
+    x = path_points(scene, mesh, spacing / PER_SPACING)
     before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
     if missed > MISSED * whole:
@@ -150,7 +150,7 @@ def _instead(signal: TimeSignal) -> str:
     return ""
 
 
-def way(scene: Scene, mesh: Mesh, step: float) -> Any:
+def path_points(scene: Scene, mesh: Mesh, step: float) -> Any:
     """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
     pad, bone = mesh.points[mesh.node_sets["pad"], 0], scene.reach
     first, last = pad.min() + bone[0], pad.max() + bone[1]

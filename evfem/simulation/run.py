@@ -48,8 +48,8 @@ from evfem.solver.control import (
     HeightControl,
     Indentation,
     KeptCharge,
-    Loose,
     Target,
+    Unsupported,
     VoltageControl,
 )
 from evfem.solver.hand import AT_REST, Grip
@@ -258,7 +258,7 @@ class Run:
             height = Force(towards("applied_force", course.force))
         elif course.hold == "force":
             loose = self._loose(course, start, voltage, time)
-            height = Loose(float(bone[1])) if loose else Force(start["applied_force"])
+            height = Unsupported(float(bone[1])) if loose else Force(start["applied_force"])
         drive: VoltageControl = GivenVoltage(voltage)
         if course.gap is not None:
             drive = GivenGap(towards("min_gap", course.gap))

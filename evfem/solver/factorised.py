@@ -43,7 +43,7 @@ from evfem.common.constants import (
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
-from evfem.contact.stability import SLOPES, Verge, verge
+from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import Seen
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Target, VoltageProblem
@@ -333,7 +333,7 @@ class FactorisedBody:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
 
-    def verge(self, state: State, target: Target) -> Verge | None:
+    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
         """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
         where the way leads to, for the curvature of a profile may jump. None in three dimensions.
         """
@@ -346,12 +346,12 @@ class FactorisedBody:
         for place in (state, ahead):
             step = self._contact_step(state, place, target, still)
             also = target.drive.unknowns(step, self._problem(none, place))
-            found.append(verge(replace(step, unknowns=(*step.unknowns, *also))))
-        return max(found, key=lambda one: one.share)
+            found.append(stability_ratio(replace(step, unknowns=(*step.unknowns, *also))))
+        return max(found, key=lambda one: one.ratio)
 
     # -- a step ends
 
-    def leaves(self, old: State, state: State, target: Target) -> Verge | None:
+    def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
         """How crests push the finger out of the equilibrium `state` faster than it is held, by the
         tangent at hand and by the one there: iterations may come to such a one from afar. Not asked of
         tissue in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue
@@ -370,15 +370,17 @@ class FactorisedBody:
             found = self._pushed_out(old, state, target)
         return found
 
-    def _pushed_out(self, old: State, state: State, target: Target) -> Verge | None:
+    def _pushed_out(self, old: State, state: State, target: Target) -> StabilityRatio | None:
         """By how much slopes win by the tangent at hand, without the attraction; None if they do not."""
         step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
         still = np.zeros(step.candidates.status.size)
         try:
-            found = verge(replace(step, candidates=replace(step.candidates, negative_stiffness=still)))
+            found = stability_ratio(
+                replace(step, candidates=replace(step.candidates, negative_stiffness=still))
+            )
         except np.linalg.LinAlgError:
             return None
-        return found if found.cause == SLOPES and found.share > 1.0 else None
+        return found if found.cause == SLOPES and found.ratio > 1.0 else None
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity and its increment."""

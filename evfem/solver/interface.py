@@ -19,8 +19,8 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     CHANGES,
-    HAIR,
     NEIGHBOURS,
+    PIN_OFFSET,
     SHORT_RAMP,
     SHORTEST_LENGTH,
     SMALLEST_FORCE,
@@ -75,7 +75,7 @@ class Pins:
         self._changes += moved
         new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
         place, before, behind = self.jumps[np.maximum(side, self._side)[new] - 1].T
-        inside = np.where(behind > before, HAIR, -HAIR)
+        inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
         from_smoother = (place - self._begin[new]) * inside > 0.0
         new = new[from_smoother]
         self.x[new] = (place + inside)[from_smoother]

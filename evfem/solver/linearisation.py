@@ -22,7 +22,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
-    FAINT,
     FAR,
     FIRST,
     HELD,
@@ -30,6 +29,7 @@ from evfem.common.constants import (
     LONGER,
     SHORTER,
     SLOW,
+    SMALLEST_STIFFENING,
     SPARE,
     STABLE,
     STALLED,
@@ -337,4 +337,4 @@ class Linearisation:
         blocks = inner.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own
         stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
-        return inner if stiffened.max() > FAINT else None
+        return inner if stiffened.max() > SMALLEST_STIFFENING else None

@@ -1,4 +1,4 @@
-r"""The error of a path: how much the steps decide where friction and time remember the way.
+r"""The error of a path: how much the steps decide where friction and time make it matter.
 
 Friction is counted from the last accepted state and time goes by backward Euler, so a step of
 length h errs by :math:`c h^2` locally: one part from a to b ends elsewhere than two halves do, and
