@@ -159,7 +159,7 @@ class _Problem:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the fit came from, in plain values ready for JSON."""
+        """Provenance of the fit, in plain values ready for JSON."""
         return {
             "fit": self.name,
             **origin(),
@@ -170,7 +170,7 @@ class _Problem:
 
 
 def _scale(one: Measured) -> Floats:
-    """What the residuals of a measurement are divided by."""
+    """Scale of the residuals of a measurement."""
     if one.sd is not None:
         return np.asarray(one.sd)
     size = float(np.sqrt(np.mean(np.square(one.values))))

@@ -1,3 +1,3 @@
-"""What every room uses: checks of input, tables, fingerprints, whole-or-nothing files, notices,
+"""Shared by all folders: checks of input, tables, fingerprints, whole-or-nothing files, notices,
 views.
 """

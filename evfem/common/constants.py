@@ -83,8 +83,8 @@ DRAG_GROWTH             where its speed grows less or more than these factors in
 DRAG_REST               drag of a rate below this is nearly none: a body that slows down may      snaps
                         be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
-DRAG_LEAST              what rests with drag of such a rate, but not without, is given up         snaps
-DRAG_MOST               what fails although drag of such a rate holds the body is no snap
+DRAG_LEAST              smallest rate of drag; a body that rests only with it ends the release    snaps
+DRAG_MOST               largest rate of drag; a step that fails with it is no snap
 IMPERFECTION            a release begins so far aside, mm: far above what iterations leave, far   crests
                         below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps

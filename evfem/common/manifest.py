@@ -85,5 +85,5 @@ class Manifest:
 
 
 def _removed(path: Path) -> Path:
-    """Where a file goes before it is removed: under a temporary name that no process writes."""
+    """Temporary name of a file that is being removed; no process writes to it."""
     return path.with_name(f".{path.name}.0.tmp")

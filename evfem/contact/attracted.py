@@ -27,7 +27,7 @@ class Roughness:
     present: Floats
 
     def of(self, nodes: Ints) -> Roughness:
-        """Of these nodes alone."""
+        """The same of these nodes alone."""
         return Roughness(self.gain[nodes], self.loss_on_opening[nodes], self.present[nodes])
 
 

@@ -345,7 +345,7 @@ class LinearContactStep:
     def _problem(
         self, near: Ints, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
     ) -> ContactProblem:
-        """That of the `near` nodes in their frames, which other forces have `moved`."""
+        """Compliance of the `near` nodes in their frames, which other forces have `moved`."""
         known, (C, W), extra = self.candidates, moved, None
         axes = known.axes[near]
         at_rest = np.column_stack([known.surface.normal_gap[near], known.slip[near]])

@@ -30,7 +30,7 @@ has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A 
 none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
 only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
 closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
-gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
+gained. For the tangent of a concave law one of the two statuses is always consistent.
 
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
@@ -70,7 +70,7 @@ class ContactNotSolved(ArithmeticError):
 
 
 class Unstable(ContactNotSolved):
-    """It has none because the body gives way the more, the more it is loaded."""
+    """No solution because the stiffness of the body is not positive definite."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class ExtraUnknowns:
 
     @property
     def followed(self) -> Floats:
-        """What the conditioned ones take from the compliance (m, m)."""
+        """Reduction of the compliance (m, m) by the conditioned components."""
         some = self.conditioned
         return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
@@ -153,7 +153,7 @@ class ContactProblem:
 
     @property
     def resists(self) -> Any:
-        """Which nodes have friction (k,) bool."""
+        """Nodes with friction, (k,) bool."""
         rough = self.friction > 0.0
         return rough if self.cohesion is None else rough | (self.cohesion > 0.0)
 
@@ -272,7 +272,7 @@ class _Unknowns:
         return cls(place, closed, attracted, (known.sheared - known.gain)[closed], turned, aside, kept, turns)
 
     def columns(self, C: Floats) -> Floats:
-        """What they do to the rows of C (q, m)."""
+        """Their effect on the rows of C, (q, m)."""
         found, n = C[:, self.place], self.felt.shape[1]
         first = found[:, : self.closed.size]
         if (self.felt[:, 0] != 1.0).any():

@@ -71,7 +71,7 @@ def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = 
 
 
 def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Projected]:
-    """What Newton's method starts from, one after the other until it ends."""
+    """Start values of Newton's method, tried one after the other until it converges."""
     held, slip = problem.resists, FORWARD if problem.dim == 2 else SLIP
     pressing, shear = np.split(force.reshape(problem.size, -1), [1], axis=1)
     none, touched = np.zeros(problem.size), status != OPEN
@@ -126,10 +126,10 @@ def solve_with_attraction(
 
     If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
     linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
-    `STABLE` of the critical value, which goes the right way in small steps: of the body as its
-    closed nodes hold it, then as those hold it that do not keep changing, at last of the much softer
-    one without them. The law of friction is taken by its tangents first, then by its chords: the
-    tangent of one that levels off soon grows so fast that there may be no solution.
+    `STABLE` of the critical value, which gives small steps in the right direction: the critical value
+    with the closed nodes fixed, then with those fixed that no longer change, at last with all nodes
+    free. Friction is linearised by tangents first, then by chords: the tangent of a law that levels
+    off soon may be so steep that there is no solution.
     """
     laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:

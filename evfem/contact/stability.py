@@ -16,8 +16,8 @@ a stiffness D of their own:
 - friction that falls with the speed, :math:`D = -(db/dv)/\Delta t`,
 - the attraction of open nodes, :math:`D = -A\,dp/dg` with their gaps.
 
-Together they grow `share` times as fast as what holds the tissue, the largest real eigenvalue of
-A D; at 1 the equilibrium is lost. The force that works most in that motion wins (`stability_ratio`).
+`stability_ratio` is the ratio of destabilising to stabilising stiffness: the largest real eigenvalue
+of A D. At 1 stability is lost; the cause named is the force that works most in the eigenvector.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ ATTRACTION = "the attraction grows as the gap closes"
 
 @dataclass(frozen=True)
 class StabilityRatio:
-    """How close an equilibrium is to its loss, 1: how fast what takes it away grows relative to
-    what holds the tissue; and the force that works most in it, in words.
+    """The ratio of destabilising to stabilising stiffness, 1 at the loss of stability, and the force that
+    works most in the unstable motion, in words.
     """
 
     ratio: float
@@ -49,7 +49,7 @@ class StabilityRatio:
 
 
 def stability_ratio(step: LinearContactStep) -> StabilityRatio:
-    """Of the equilibrium that `step` begins at."""
+    """Stability of the equilibrium that `step` begins at."""
     known, surface = step.candidates, step.candidates.surface
     slipping = np.flatnonzero(known.status >= FORWARD)
     opened = np.flatnonzero((known.status == OPEN) & (known.negative_stiffness > 0.0))

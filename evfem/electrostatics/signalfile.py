@@ -189,13 +189,13 @@ def _hjif(profile: VoltageProfile, playback: Playback) -> str:
 
 
 def _positions(number: int, start: float, spacing: float) -> Floats:
-    """Where the samples are, the same to the last bit when written and when read."""
+    """Positions of the samples, bitwise the same when written and when read."""
     with np.errstate(over="ignore"):  # infinite positions in a damaged file are refused by the profile
         return np.asarray(start + spacing * np.arange(number), dtype=np.float64)
 
 
 def _number(profile: VoltageProfile, spacing: float, most: int, what: str) -> int:
-    """How many spacings cover the profile."""
+    """Number of spacings that cover the profile."""
     number = float(np.ptp(profile.position)) / spacing
     if number > most:
         raise InputError("path", f"a file of {number:.3g} {what}", f"at most {most} of them")

@@ -98,7 +98,7 @@ class Columns:
         return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, cells.heights())
 
     def nearby(self, x: Floats, levels: Floats) -> Nearby:
-        """What outlines close to this one start from, under one electrode and a grounded finger."""
+        """Start values for close outlines, under one electrode and a grounded finger."""
         cells, _ = self.cells(x, levels, None)
         return Nearby(cells.potential(None, False), cells.factor())
 

@@ -1,4 +1,4 @@
-"""What a mesh must fulfil before anything is computed on it.
+"""Checks of a mesh before anything is computed on it.
 
 `check` asks one question after the other, in the order of the file, and every fault becomes one
 sentence; what it asks of hexahedra alone is in `evfem.mesh.solids`. The shape of cells is their

@@ -56,7 +56,7 @@ class Core:
 
     @property
     def told(self) -> dict[str, float]:
-        """What a result's provenance says of it."""
+        """Its entry in the provenance of a result."""
         return {"length": self.length, "slope": self.ratio * RESOLVED, "edge": EDGE * self.distance}
 
     def __str__(self) -> str:
@@ -75,7 +75,7 @@ class Core:
 
 
 def electrics_of(scene: Scene, mesh: Mesh) -> Electrics:
-    """What acts between the nodes of the pad and the electrode."""
+    """The attraction between the nodes of the pad and the electrode."""
     nodes = np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
     return scene.electrics.above(scene.finger.electrical, mesh, nodes)
 

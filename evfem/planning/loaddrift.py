@@ -1,4 +1,4 @@
-r"""How far the load of a slide drifts whose indentation is held, from friction and geometry.
+r"""Load drift of a slide at held indentation, from friction and geometry.
 
 A bone that keeps its height does not keep its load. Friction turns the pad about the bone, by
 

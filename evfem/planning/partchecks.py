@@ -1,4 +1,4 @@
-"""How a user's functions are tried before a run, and what contact asks of a user's parts.
+"""Tests of a user's functions before a run, and the requirements of contact on a user's parts.
 
 `evaluated` and its like say in a sentence what is wrong with a function; `check_surface`,
 `check_friction_law` and `check_roughness` try a surface at a dozen places of the way, and laws at

@@ -223,7 +223,7 @@ def _electricity(scene: Scene, mesh: Mesh) -> Term:
 
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
-    """What bounds say of the full field, where a scene asks for it or leaves the choice."""
+    """Bounds of the full field, if a scene requests it or leaves the choice."""
     if scene.field == "local" or not scene.electrics.acts:
         return ()
     from evfem.planning.fieldchoice import chosen_field
@@ -233,7 +233,7 @@ def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
 
 
 def _roughness(scene: Scene) -> str:
-    """What rough faces add to the gap, in words; nothing without them."""
+    """Additional gap of rough faces, in words; empty without them."""
     rough = roughness_of(scene.roughness_gap)
     if rough is None:
         return ""
@@ -284,7 +284,7 @@ def _forms(scene: Scene, mesh: Mesh) -> Term:
 
 
 def _caveat(trial: Trial) -> str:
-    """What to expect of a form whose tangent is not symmetric."""
+    """Consequences of a form with an unsymmetric tangent."""
     return "" if trial.has_potential else " (no potential: only the symmetric part of its tangent is used)"
 
 

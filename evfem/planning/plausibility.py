@@ -1,7 +1,7 @@
-"""What a scene says, but hardly means.
+"""Warnings about valid but implausible input.
 
-`implausible` says in a sentence each what may be meant, but hardly is: units, fields that no insulator
-withstands, slides that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
+`implausible` gives one sentence each: other units, fields beyond the breakdown of insulators, slides
+that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ WAY_STEP = 0.02
 
 
 def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
-    shear moduli (MPa) of the materials.
+    """One sentence per valid but implausible input of a scene; `moduli` are the shear moduli (MPa) of
+    the materials.
     """
     lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
     return (

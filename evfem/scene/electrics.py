@@ -73,8 +73,8 @@ class Electrics:
 
     @cached_property
     def voltage(self) -> Any:
-        """The voltage as the run follows it: the scene's own, or where its drive is resolved that of
-        the moment, or of a signal that repeats the effective one for its mean over the cycle.
+        """The scene's voltage in the run: constant, instantaneous (resolved drive) or rms (mean over the
+        cycle of a periodic signal).
         """
         drive = self.drive
         if drive is not None and not drive.resolved and (found := powers(self.given)) is not None:

@@ -58,7 +58,7 @@ class Course:
 
     @property
     def direction(self) -> tuple[float, float]:
-        """Where its angle points, x and z of a unit vector; quarter turns are exact."""
+        """Direction of its angle, x and z of a unit vector; quarter turns are exact."""
         quarters, rest = divmod(self.angle, 90.0)
         x, z = math.cos(math.radians(rest)), math.sin(math.radians(rest))
         for _ in range(int(quarters) % 4):
@@ -67,7 +67,7 @@ class Course:
 
     @property
     def travel(self) -> tuple[float, float]:
-        """How far it goes along x and along z, in mm."""
+        """Displacement along x and along z, in mm."""
         x, z = self.direction
         return self.distance * x + 0.0, self.distance * z + 0.0
 

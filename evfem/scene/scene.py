@@ -175,7 +175,7 @@ class Scene:
 
     @property
     def courses(self) -> tuple[Course, ...]:
-        """What each of the motions does."""
+        """The course of each motion."""
         return tuple(motion.course for motion in self.motion)
 
     @property

@@ -69,7 +69,7 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
 
 
 def _place(model: Model, state: State) -> str:
-    """Where the bone stood, its load and the voltage."""
+    """Position of the bone, its load and the voltage."""
     position, indentation = state.bone[0] + 0.0, model.indentation(state.bone) + 0.0
     load, voltage = -state.reaction[1] + 0.0, state.voltage + 0.0
     return (
@@ -89,7 +89,7 @@ def _may_have_an_energy(scene: Scene) -> bool:
 
 
 def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
-    """What may help a scene of its kind; of what it has not nothing is said."""
+    """Advice for a scene of its kind."""
     pulled = scene.electrics.acts
     finer = "less friction or a finer mesh" if scene.has_friction else "a finer mesh"
     if isinstance(failed, LiftedOff):

@@ -116,7 +116,7 @@ def make_model(scene: Scene) -> Model:
 
 
 def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:
-    """What joins pad and surface: exact contact or penalties."""
+    """The contact interface: exact or penalty."""
     solver = scene.solver
     if solver.contact == "exact":
         return Interface(pad, mesh.points, surface, solver.tolerance)

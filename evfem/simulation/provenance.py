@@ -1,4 +1,4 @@
-"""How numbers came about: versions, date, the scene, its mesh and the solver's own record."""
+"""Provenance of a result: versions, date, scene, mesh and the solver's record."""
 
 from __future__ import annotations
 

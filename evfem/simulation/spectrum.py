@@ -93,7 +93,7 @@ def amplitudes(values: Floats, window: str) -> Floats:
 
 
 def _rows(result: Result, start: float | None, stop: float | None) -> tuple[Any, float]:
-    """Which rows are used, and the time of the row before them."""
+    """Rows in use, and the time of the row before them."""
     if not len(result.step):
         raise InputError("result", "no steps", "a result with steps in time")
     slack = ROUNDING * float(result.time[-1])

@@ -386,7 +386,7 @@ class Target:
         return np.array([x, self.height.known(float(present[1])), *along])
 
     def way(self, present: Floats) -> Floats:
-        """How far the bone is likely to go from its `present` translation (dim,)."""
+        """Expected displacement of the bone from its `present` translation (dim,)."""
         way = self.bone(present) - present
         if self.hand is not None:
             way[0] = self.hand.way

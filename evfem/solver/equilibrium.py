@@ -153,11 +153,11 @@ class Equilibrium:
         return held
 
     def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
-        """Which force takes the equilibrium `state` its stability."""
+        """Stability ratio of the equilibrium `state`."""
         return self.body.stability_ratio(state, target)
 
     def reusable(self) -> Reusable:
-        """What the solver takes with it to the next step."""
+        """Data of the solver that the next step reuses."""
         return self.body.reusable()
 
     def resume(self, state: State, carried: Reusable) -> None:

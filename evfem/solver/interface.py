@@ -63,7 +63,7 @@ class Pins:
 
     @property
     def held(self) -> Any:
-        """Which nodes are pinned (P,) bool."""
+        """Pinned nodes, (P,) bool."""
         return np.isfinite(self.x)
 
     def watch(self, x: Floats, touching: Any) -> None:
@@ -113,7 +113,7 @@ Restored = Callable[[float], tuple[Floats, Floats] | None]
 
 
 def nothing_restored(voltage: float) -> None:
-    """Of an attraction without a core."""
+    """From an attraction without a core."""
 
 
 class Interface:
@@ -284,7 +284,7 @@ class Interface:
         return 0.5 * (self.shares(old) + self.shares(new))
 
     def age(self, old: State) -> Floats:
-        """How long every pad node has touched at the end of the step from `old` (P,) in s."""
+        """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
         return np.where(old.touching, old.age + self.duration, 0.0)
 
     def aged(self, old: State, state: State) -> State:

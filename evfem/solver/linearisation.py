@@ -260,14 +260,14 @@ class Linearisation:
     # -- the attraction's part
 
     def negative_stiffness(self, state: State) -> Floats:
-        """How fast the attraction of every pad node weakens with its gap (P,) in N/mm per mm."""
+        """Negative stiffness of the attraction of every pad node, (P,) in N/mm per mm."""
         if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
 
     def gain_on_closing(self, state: State) -> Floats:
-        """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
+        """Increase of the attraction of every pad node when its gap closes, (P,) in N/mm."""
         if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))

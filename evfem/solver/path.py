@@ -23,7 +23,7 @@ from evfem.solver.state import State
 
 
 def apart(once: State, twice: State) -> float:
-    """How far the ends of one part and of two halves are apart, as a share."""
+    """Relative difference between the ends of one substep and of two halves."""
     forces = np.abs(once.reaction - twice.reaction).max()
     places = np.abs(once.bone - twice.bone).max()
     moved = np.abs(twice.bone).max()

@@ -74,7 +74,7 @@ class State:
 
     @property
     def touching(self) -> Any:
-        """Which pad nodes touch (P,) bool."""
+        """Pad nodes in contact, (P,) bool."""
         return self.status != OPEN
 
 

@@ -58,10 +58,10 @@ class Accounts(Protocol):
         """A part was accepted, from `old` to `new`; says whether stability was lost in it."""
 
     def mark(self) -> Any:
-        """Where the accounts stand."""
+        """Present state of the accounts."""
 
     def back(self, mark: Any) -> None:
-        """What was accepted since `mark` led nowhere."""
+        """Discards the substeps accepted since `mark`."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ class Stepper:
             self.body.dynamics.begin(old.u, old.velocity, target.duration)
 
     def _relaxation(self, body: Body) -> Relaxation:
-        """How `body` is released."""
+        """The release of `body`."""
         attraction = self.equilibrium.attraction
         return Relaxation(body, self.solve, attraction is not None and attraction.charging is not None)
 

@@ -142,7 +142,7 @@ class SweepFolder:
                 _write_parquet(temporary, columns, rows)
 
     def write_provenance(self, provenance: Mapping[str, Any]) -> None:
-        """How the table came about."""
+        """Provenance of the table."""
         with self._manifest.writing(self.path / PROVENANCE):
             write_text(self.path / PROVENANCE, json.dumps(provenance, indent=1, allow_nan=False) + "\n")
 

@@ -68,7 +68,7 @@ class SweepResult:
         write_text(path, sweep_csv(self.columns, self.rows))
 
     def __repr__(self) -> str:
-        """How many points, and what became of them."""
+        """Numbers of points by status."""
         return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
 
 
@@ -183,7 +183,7 @@ class _Run:
         return digest((scene.digest(), self.plan.outputs, evfem.__version__))
 
     def waiting(self) -> dict[str, Job]:
-        """What is still to be computed; equal points are computed once."""
+        """Points to compute; equal points are computed once."""
         folder, outputs = str(self.plan.folder), tuple(self.plan.outputs)
         jobs = zip(self.keys, self.points, strict=True)
         return {key: (point.text, folder, outputs) for key, point in jobs if key not in self.answers}

@@ -54,6 +54,6 @@ class Drag:
         self._terms.add_tangent(u, pattern, data)
 
     def dissipation(self, u: Floats) -> float:
-        """What the drag dissipates in the step that ends at u: N mm, in the plane per mm of depth."""
+        """Dissipation by drag in the step that ends at u: N mm, in the plane per mm of depth."""
         moving = self._terms.kinetic_energy(self._terms.velocity(u))
         return self._terms.dissipation(u) + 2.0 * moving

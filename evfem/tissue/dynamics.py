@@ -119,7 +119,7 @@ class Dynamics:
         return self.slope * (u - self._u0) / self.step + (1.0 - self.slope) * self._v0
 
     def dissipation(self, u: Floats) -> float:
-        """What the viscous stress dissipates in the step: N mm, in the plane per mm of depth."""
+        """Viscous dissipation in the step: N mm, in the plane per mm of depth."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
         if self.loops is not None:
@@ -159,7 +159,7 @@ DYNAMICS["viscous"] = Dynamics
 
 
 class Inertial(Dynamics, name="inertial"):
-    """Of tissue with mass."""
+    """Dynamics with mass."""
 
     inertia = True
 
