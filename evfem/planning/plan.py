@@ -104,9 +104,25 @@ def _wrapped(begin: str, text: str) -> list[str]:
 
 
 def plan(scene: Scene | str | PathLike[str]) -> Plan:
-    """Which terms, unknowns and solver a scene needs (`Scene`, or the path of a scene file), and why;
-    builds the mesh, solves nothing.
+    """Terms, unknowns and solver of a scene, with reasons; builds the mesh, solves nothing.
 
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file.
+
+    Returns
+    -------
+    Plan
+        It prints as a page; `terms`, `solver` and `warnings` are its parts.
+
+    Raises
+    ------
+    InputError
+        The scene cannot be run.
+
+    Examples
+    --------
     >>> from evfem import Flat, FingerPad, Press, Scene
     >>> smooth = FingerPad(ridges=False, resolution="coarse")
     >>> needed = plan(Scene(smooth, Flat(friction=0.0), motion=[Press(indentation=0.5)]))

@@ -83,18 +83,34 @@ def simulate(
     observers: Sequence[Observer] = (),
     resume: Saved | None = None,
 ) -> Result:
-    """Press, slide and attract as the scene says (`Scene`, or the path of a scene file); returns the
-    history, the fields of every n-th step and how they came about.
+    """Run all motions of a scene.
 
-    `observers` are objects with any of `started(mesh, scene, total_steps)`,
-    `step(row, frame, checkpoint)` after every converged step (`frame` is None on steps without
-    fields, `checkpoint()` gives the arrays to resume from) and `finished(result)`, see
-    `evfem.protocols`. One that raises `StopRun` in `step` ends the run after that step: the result
-    so far, with the fields of its last step, is returned, and has the reason in its provenance
-    under `stopped`. `resume` continues from such arrays and rows, to the same numbers as without
-    the interruption; the result then has all rows, but fields only of the steps since. Raises
-    `NotConverged`, with the result so far, and leaves everything up to the last good step with the
-    observers.
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file.
+    progress
+        Show a progress bar.
+    observers
+        Objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)` after
+        every converged step and `finished(result)`, see `evfem.protocols`. `frame` is None on steps
+        without fields; `checkpoint()` gives the arrays to resume from. If `step` raises `StopRun`, the
+        run ends after that step with the reason in the provenance under `stopped`.
+    resume
+        Arrays and rows to continue from, to the same numbers as without the interruption. The result
+        has all rows, but fields only of the steps since.
+
+    Returns
+    -------
+    Result
+        The history, the fields of every n-th step and the provenance.
+
+    Raises
+    ------
+    NotConverged
+        A step has no solution. The error has the result so far; observers keep all good steps.
+    InputError
+        The scene cannot be run.
     """
     if not isinstance(scene, Scene):
         from evfem.scene.file import scene_at

@@ -68,11 +68,27 @@ class Checked:
 
 
 def check(scene: Scene | str | Path) -> Checked:
-    """Run a scene, or the scene file at a path, by several ways and compare the ends; takes some five times
-    as long as the scene.
+    """Run a scene in several ways and compare the ends; takes some five times as long as the scene.
 
-    Raises InputError for what is no scene, NotConverged where the scene itself does not come to its end.
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file.
 
+    Returns
+    -------
+    Checked
+        A row per run; `agrees` is true if all ends agree.
+
+    Raises
+    ------
+    InputError
+        The input is no scene.
+    NotConverged
+        The scene itself has no end.
+
+    Examples
+    --------
     >>> import evfem as ev
     >>> pad, press = ev.FingerPad(resolution="coarse"), ev.Press(indentation=0.1, steps=1)
     >>> scene = ev.Scene(pad, ev.Display(), motion=[press])
