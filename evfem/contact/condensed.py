@@ -245,18 +245,19 @@ class LinearContactStep:
         gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
         status, solves = self.candidates.status.copy(), 0
         own = np.diagonal(self.body.compliance)[1 :: self.body.dim]
+        # in contact, in the surface, or attracted with a feedback on the node itself
         near = np.flatnonzero(
             (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
         )
-        if not near.size:
+        if not near.size:  # the dense problem has at least one node: the one with the smallest gap
             near = np.array([np.argmin(gap)])
-        while True:
+        while True:  # solve on the near nodes, join those that sink in, until none does
             found, pushed = self._solve_near(near, free, status[near])
             solves += found.solves
             status[near] = found.status
             moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
             gap = normal_gap + self._along_normal(moved)
-            gap[near] = 0.0
+            gap[near] = 0.0  # the dense problem has settled theirs
             hit = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
             if not hit.size:
                 break
@@ -264,6 +265,7 @@ class LinearContactStep:
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
         own = np.diagonal(self.body.compliance)[0 :: self.body.dim]
+        # the shear of closed nodes also follows x within the step, by the slope of their friction
         grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim, None]
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
@@ -321,7 +323,7 @@ class LinearContactStep:
         among, own, held = self.body.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
-        W[:, 0] -= C @ held
+        W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
         problem = self._problem(near, (C, W), self._bone_balance(rows, free, (C, W), follower))
         attraction = AttractionStiffness(
             known.negative_stiffness[near],

@@ -220,11 +220,13 @@ class Projected:
         """Of these forces."""
         state, (normal_own, shear_own) = problem.state(forces), problem.own
         force, v, drop = (each.reshape(problem.size, -1) for each in (forces.contact, state, forces.drop))
+        # trial forces: those that would close gap and slip if each node had its own compliance alone
         p = force[:, 0] - v[:, 0] / normal_own
         z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
         limit, size = np.where(p > 0.0, problem.limit(p), 0.0), sizes(z)
         slip = np.where(z[:, 0] < 0.0, FORWARD, BACKWARD) if problem.dim == 2 else SLIP
         status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.resists, STICK, slip))
+        # radial return onto the disc of friction: sticking keeps z, slipping scales it to the limit
         part = np.where(status == STICK, 1.0, limit / np.maximum(size, np.maximum(limit, 1e-300)))
         wanted = np.column_stack([np.maximum(p, 0.0), z * np.where(status == OPEN, 0.0, part)[:, None]])
         held = 1e-3 * v[:, 0] / normal_own  # what would close the gap, where no node presses

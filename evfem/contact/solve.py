@@ -106,8 +106,8 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
             return forces, found, solves, softest
         if changed.any():
             key, softest = found.status.tobytes(), np.where(changed, OPEN, found.status)
-            late = late or key in met
-            if key in alone:
+            late = late or key in met  # a cycle: from here on change the node that is furthest off alone
+            if key in alone:  # and that has led back too
                 break
             if late:
                 worst = np.where(changed, after.miss, -1.0).argmax()

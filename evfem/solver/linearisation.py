@@ -144,6 +144,7 @@ class Linearisation:
             needed[np.argmin(gap)] = True
         if needed[self.candidates].sum() == needed.sum():
             return
+        # gap below which `SPARE` times as many nodes lie: a new choice costs an analysis of the matrix
         enough = np.sort(gap)[min(int(SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
         wider = (gap <= max(enough, self.interface.neighbourhood)) | (SPARE * weakening > steep)
         wider = self.pad.free & (wider | self._deep) | needed
@@ -197,6 +198,7 @@ class Linearisation:
         self._outdated, self._drag_rate = False, self.body.drag_rate
         if self.factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
+            # static condensation keeps candidates and bone
             kept = np.concatenate([unknowns, self.body.bone])
             self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
             self.record.backend = type(self.factor).__name__
@@ -252,6 +254,7 @@ class Linearisation:
         before, now = history[-2:]
         if now > STALLED or now > SLOW * before:
             return True
+        # iterations left at the last rate of convergence, against the strategy's patience
         tolerance = self.limits.tolerance
         if now <= tolerance:
             return False
@@ -271,6 +274,7 @@ class Linearisation:
         if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
+        # gaps now, and with every node in contact
         places = [self.interface.resting(s) for s in (state, everywhere)]
         at = (state.voltage, self.touching, state.contact_force[:, 0])
         now, closed = (self.attraction.column_forces(place, *at)[:, 1] for place in places)
@@ -334,6 +338,7 @@ class Linearisation:
         normal = np.zeros((c.size, dim))
         normal[:, :2] = normals(surface_state(self.interface.surface, position[c]))
         own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        # weakening with a node's own gap belongs to the contact problem: not twice
         blocks = inner.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own
         stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
