@@ -334,8 +334,8 @@ class FactorisedBody:
         return fraction
 
     def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
-        """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
-        where the way leads to, for the curvature of a profile may jump. None in three dimensions.
+        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as
+        the curvature of a profile may jump. None in three dimensions.
         """
         if state.bone.size == 3:
             return None
@@ -371,13 +371,11 @@ class FactorisedBody:
         return found
 
     def _pushed_out(self, old: State, state: State, target: Target) -> StabilityRatio | None:
-        """By how much slopes win by the tangent at hand, without the attraction; None if they do not."""
+        """Stability ratio by the present tangent without attraction, if slopes exceed 1; else None."""
         step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
-        still = np.zeros(step.candidates.status.size)
+        unattracted = replace(step.candidates, negative_stiffness=np.zeros(step.candidates.status.size))
         try:
-            found = stability_ratio(
-                replace(step, candidates=replace(step.candidates, negative_stiffness=still))
-            )
+            found = stability_ratio(replace(step, candidates=unattracted))
         except np.linalg.LinAlgError:
             return None
         return found if found.cause == SLOPES and found.ratio > 1.0 else None

@@ -74,9 +74,7 @@ def steadied(gain: Floats) -> Floats:
 
 
 class Linearisation:
-    """Candidates, factorisation and condensed tangent of a body, and the attraction's part in
-    them.
-    """
+    """Candidates, factorisation and condensed tangent of a body under an attraction."""
 
     def __init__(
         self,
@@ -115,9 +113,7 @@ class Linearisation:
             self.fringes, self._made_at = False, None
 
     def start_clock(self, old: State, duration: float) -> None:
-        """Start the clock of a step; a factorisation made for a much longer or shorter one is of
-        no use.
-        """
+        """Start the clock of a step; a factorisation for a much different duration is outdated."""
         dynamics = self.body.dynamics
         self._outdated |= self.body.drag_rate != self._drag_rate
         if dynamics is None:
@@ -185,7 +181,7 @@ class Linearisation:
 
     @property
     def refused(self) -> bool:
-        """Whether there is no factorisation, or one of other candidates, another drag or time step."""
+        """No factorisation, or one of other candidates, another drag or time step."""
         return self.factor is None or self._outdated
 
     def _has_fringes(self, state: State) -> bool:
@@ -236,9 +232,7 @@ class Linearisation:
 
     @property
     def reusable(self) -> TangentPoint | None:
-        """Where the factorisation was made that the next step may use, if there is one: that of the
-        field's own stiffness serves one step alone.
-        """
+        """Point of the factorisation that the next step may use; none with the field's own stiffness."""
         return None if self.factor is None or self.fringes else self._made_at
 
     def restore(self, state: State, at: TangentPoint) -> None:

@@ -98,8 +98,8 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What a solver takes with it from step to step: the contact candidates (numbers of pad
-    nodes), where its factorisation was made if it has one, and the seconds of the last time step.
+    """Data that the next step reuses: contact candidates (numbers of pad nodes), the point of the
+    factorisation if there is one, and the last time step (s).
     """
 
     candidates: Ints
@@ -119,9 +119,7 @@ class Limits:
 
 @dataclass
 class Record:
-    """Work done: iterations, factorisations and dense contact solves, counted since the start; and
-    the residuals of the last step.
-    """
+    """Numbers of iterations, factorisations and dense contact solves, and the residuals of the last step."""
 
     iterations: int = 0
     factorisations: int = 0
@@ -144,9 +142,8 @@ class MixedBalance:
 
 @dataclass(frozen=True)
 class Balance:
-    """How far an iterate is from equilibrium: its out-of-balance forces (n,) of the reduced
-    unknowns in N/mm, the largest of them relative to the reaction, and the attraction (P, 2) at
-    its positions; and what the iterations have left to do where the pressure is an unknown.
+    """Residual of an iterate: out-of-balance forces (n,) of the reduced unknowns in N/mm, the largest
+    relative to the reaction, the attraction (P, 2), and the mixed problem's residual if it is solved.
     """
 
     forces: Floats
