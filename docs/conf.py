@@ -12,6 +12,7 @@ language = "en"
 extensions = [
     "myst_parser",  # pages in Markdown
     "sphinx.ext.autodoc",  # reference from docstrings
+    "sphinx.ext.napoleon",  # sections Parameters, Returns, Raises, Examples
     "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",  # equations without a network
 ]

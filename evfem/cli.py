@@ -93,7 +93,7 @@ def _of(file: Path | None, message: object) -> str:
 
 
 def _warner(file: Path | None) -> Callable[..., None]:
-    """What shows a warning: one line for a person, without the place in the code."""
+    """Shows a warning in one line, without its place in the code."""
     return lambda message, *place, **more: notices.tell(f"warning: {_of(file, message)}")
 
 
@@ -147,7 +147,7 @@ def _kind(path: Path) -> str:
 
 
 def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
-    """What a command of `evfem.arguments.parser` does."""
+    """Runs a command of `evfem.arguments.parser`."""
     return {
         None: _help,
         "run": _run,
@@ -324,7 +324,7 @@ def _study(given: argparse.Namespace) -> int:
 
 
 def _sample(given: argparse.Namespace) -> Any:
-    """Which scenes are drawn; None where nothing is said."""
+    """Scenes that are drawn; None if not given."""
     said = {name: getattr(given, name) for name in ("scenes", "seed", "workers", "limit")}
     said = {name: value for name, value in said.items() if value is not None}
     return studies().Sample(**said) if said else None

@@ -206,7 +206,7 @@ class ParaViewSeries:
         self._rows = [row for row in earlier if self.frame_path(int(row["step"])).exists()]
 
     def frame_path(self, step: int) -> Path:
-        """Where the fields of a step go."""
+        """File of the fields of a step."""
         return self.path.with_name(f"{self.path.stem}_{step:05d}.vtu")
 
     def started(self, mesh: Mesh, scene: object, total_steps: int) -> None:

@@ -98,7 +98,9 @@ class Surface(Protocol):
 
 @runtime_checkable
 class CompleteSurface(Surface, Protocol):
-    """Everything that contact asks of a surface; `evfem.surface.own.completed` gives it to any `Surface`."""
+    """Everything that contact asks of a surface; `evfem.surface.usersurface.completed` gives it to any
+    `Surface`.
+    """
 
     @property
     def y(self) -> float | None:

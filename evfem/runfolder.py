@@ -3,7 +3,7 @@
 Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint to
 go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only files
 that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names
-(`evfem.common.listed`). `kept` and `saved` say what of an earlier run is there to go on from.
+(`evfem.common.manifest`). `kept` and `saved` say what of an earlier run is there to go on from.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from evfem.common.listed import Listed
+from evfem.common.manifest import Manifest
 from evfem.common.notices import LOG
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
@@ -103,8 +103,8 @@ class RunFolder:
         return Checkpoint(self.path / STATE)
 
     @cached_property
-    def _listed(self) -> Listed:
-        return Listed(self.path / MANIFEST, OURS)
+    def _manifest(self) -> Manifest:
+        return Manifest(self.path / MANIFEST, OURS)
 
     @property
     def begun(self) -> bool:
@@ -120,7 +120,7 @@ class RunFolder:
         if frame is not None and self._wants(row):
             self._add(row, frame)
         if not self.rows or self.rows[-1]["step"] != row["step"]:
-            with self._listed.writing(self.path / STATE):
+            with self._manifest.writing(self.path / STATE):
                 self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
             self.rows.append(row)
         self._write_history()
@@ -130,12 +130,12 @@ class RunFolder:
     def _add(self, row: Row, frame: Frame) -> None:
         assert self.mesh is not None
         for series in self._series:
-            with self._listed.writing(series.frame_path(row["step"])):
+            with self._manifest.writing(series.frame_path(row["step"])):
                 series.add(row, frame, self.mesh)
 
     def _write_index(self, several: Sequence[ParaViewSeries]) -> None:
         for series in several:
-            with self._listed.writing(series.path):
+            with self._manifest.writing(series.path):
                 series.write_index()
 
     def _wants(self, row: Row) -> bool:
@@ -144,7 +144,7 @@ class RunFolder:
     def _write_history(self) -> None:
         self._lines += [csv_line(row) for row in self.rows[len(self._lines) :]]
         header = csv_header(columns_of(self.rows[0])) if self.rows else csv_header()
-        with self._listed.writing(self.path / HISTORY):
+        with self._manifest.writing(self.path / HISTORY):
             write_text(self.path / HISTORY, header + "".join(self._lines))
 
     def close(self, result: Result | None) -> dict[str, Any]:
@@ -172,12 +172,12 @@ class RunFolder:
 
     def _write_summary(self, result: Result) -> dict[str, Any]:
         summary = result.summary()
-        with self._listed.writing(self.path / SUMMARY):
+        with self._manifest.writing(self.path / SUMMARY):
             write_text(self.path / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
         return summary
 
     def _draw(self, result: Result) -> None:
-        with self._listed.writing(self.path / PICTURE):
+        with self._manifest.writing(self.path / PICTURE):
             _picture(result if result.depth is None else result.total, self.path / PICTURE)
 
     def completed(self) -> str:
@@ -225,10 +225,10 @@ class RunFolder:
         """Make the folder, remove an earlier run's files (or go on from them), start the history."""
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
-            self._listed = Listed(self.path / MANIFEST, OURS)  # anew, where a first try was interrupted
+            self._manifest = Manifest(self.path / MANIFEST, OURS)  # anew, where a first try was interrupted
             if not self.resume:
-                self._listed.remove()
-            self._listed.begin()
+                self._manifest.remove()
+            self._manifest.begin()
             _remove_left(self.path)
         self._series = self._paraview()
         self._write_history()
@@ -343,7 +343,7 @@ def _without_a_row(history: Path) -> bool:
 
 def _refuse_others(path: Path) -> None:
     """InputError where a file has a name that a run writes, and evfem did not write it."""
-    manifest = Listed(path / MANIFEST, OURS).manifest  # what a kill left open in it is decided
+    manifest = Manifest(path / MANIFEST, OURS).path  # what a kill left open in it is decided
     refuse_others(manifest, _present(path), "evfem")
 
 

@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices checks views pools digest storage listed tables pictures",
+        "arrays constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -41,9 +41,9 @@ ROOMS = {
     ),
     "field": (
         {"numpy", "scipy", "skfem"},
-        "outlines bounds curves fieldmesh poisson rigid columncells columns",
+        "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "friction surfaces textures own pad skin"),
+    "surface": ({"numpy", "scipy"}, "friction surfaces textures usersurface pad skin"),
     "contact": (
         {"numpy", "scipy"},
         "charging attraction fullfield drivenfield signorini solve follower condensed stability",
@@ -55,11 +55,11 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics options scene keys written format schema file spatial",
+        "motion terms electrics options scene keys serialiser format schema file spatial",
     ),
     "planning": (
         {"numpy"},
-        "resolution drift partchecks parts sense fieldchoice core timescales plan",
+        "resolution loaddrift partchecks parts plausibility fieldchoice core timescales pathdependence plan",
     ),
     "simulation": (
         {"numpy", "scipy"},

@@ -31,7 +31,7 @@ UNDETERMINED, NAMED, CORRELATED, NOTHING = 1e-3, 0.1, 0.95, 1e-6
 
 @dataclass(frozen=True)
 class Confidence:
-    """What the Jacobian (N, P) and the residuals (N,) say about P unknowns."""
+    """Confidence intervals of P unknowns from the Jacobian (N, P) and the residuals (N,)."""
 
     errors: Floats
     correlation: Floats

@@ -60,17 +60,37 @@ def fit(
     workers: int | None = None,
     progress: bool = False,
 ) -> FitResult:
-    """Choose parameters of a scene so that its runs agree best with what was measured.
+    """Fit parameters of a scene to measurements by least squares.
 
-    `scene` is a `Scene` that a file can hold, or the path of a scene file; `data` a `MeasuredCurve`,
-    `MeasuredValues`, or several of them; `parameters` {dotted key of a scene file: (low, high)}, or
-    `Parameter(low, high, start, apply)` in place of the pair.
+    Parameters
+    ----------
+    scene
+        A `Scene` that a file can hold, or the path of a scene file.
+    data
+        A `MeasuredCurve`, `MeasuredValues`, or several of them.
+    parameters
+        {dotted key of a scene file: (low, high)}, or `Parameter(low, high, start, apply)` in place of
+        the pair.
+    out
+        Folder that keeps every run: the same fit, called again, continues an interrupted one.
+    workers
+        Number of processes; None: one per core, 1: this process only.
+    progress
+        Print a line per step of the fit.
 
-    `workers` processes (None: one for each core; 1: none but this one) run the scenes. The folder
-    `out` keeps every run: the same fit, called again, goes on where it was interrupted. `progress`
-    prints a line for each step of the fit. Raises InputError for what cannot be used, before
-    anything is computed as far as it can be known, and for a start at which the scene is not solved.
+    Returns
+    -------
+    FitResult
+        Values with 95 % intervals, residuals, and the parameters that the data do not determine.
 
+    Raises
+    ------
+    InputError
+        Input that cannot be used, mostly before anything is computed, or a start at which the scene
+        has no solution.
+
+    Examples
+    --------
     >>> from evfem.surface.surfaces import Display
     >>> from evfem.electrostatics.laws import Kaczmarek
     >>> from evfem.finger.fingerpad import FingerPad
@@ -159,7 +179,7 @@ class _Problem:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the fit came from, in plain values ready for JSON."""
+        """Provenance of the fit, in plain values ready for JSON."""
         return {
             "fit": self.name,
             **origin(),
@@ -170,7 +190,7 @@ class _Problem:
 
 
 def _scale(one: Measured) -> Floats:
-    """What the residuals of a measurement are divided by."""
+    """Scale of the residuals of a measurement."""
     if one.sd is not None:
         return np.asarray(one.sd)
     size = float(np.sqrt(np.mean(np.square(one.values))))

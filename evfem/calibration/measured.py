@@ -1,4 +1,4 @@
-"""What was measured, and what a run says at the same places.
+"""Measurements, and the values of a run at the same places.
 
 A `MeasuredCurve` belongs to one run: a column of its history over another one, as force over
 indentation or friction over position. `MeasuredValues` belong to a run each: one output of it, and

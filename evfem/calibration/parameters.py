@@ -1,4 +1,4 @@
-"""What is free in a fit: keys of a scene with bounds, and the unknowns that the fit works on.
+"""Free parameters of a fit: keys of a scene with bounds, and the unknowns of the optimiser.
 
 The unknown of a parameter that is positive between its bounds is z = ln(v / start): a fit takes steps by
 factors, and the value cannot become negative. Any other parameter has z = (v - start) / (high - low).
@@ -84,7 +84,7 @@ class Parameters:
 
     @classmethod
     def of(cls, given: Any) -> Parameters:
-        """Of {key: Parameter, or (low, high)}."""
+        """Parameters from {key: Parameter, or (low, high)}."""
         allowed = "{key: (low, high)} or {key: Parameter(low, high)} for one key of the scene or more"
         if not isinstance(given, Mapping) or not given:
             raise InputError("parameters", shown(given), allowed)

@@ -47,7 +47,7 @@ FIRST = 0.05
 #: [press]
 GROWN, GROWING = 3.0, 4
 #: changes of tributary lengths that stiffen no node by more than this fraction are left to the iterations [C]
-FAINT = 0.01
+SMALLEST_STIFFENING = 0.01
 #: an attraction whose feedback on its own node is below this fraction is left to the next iteration [C]
 WEAK = 1e-4
 #: a residual above the first, or above the second times the last one, asks for a new factorisation [A, B]
@@ -77,12 +77,12 @@ ROUNDING = 1e-12
 #: them by 4e-13 to 1.4e-10 of it [full field]
 FIELD_ROUNDING = 2e-10
 #: pivots of the bone below this fraction belong to a body without a hold
-UNHELD = 1e-10
+SMALLEST_PIVOT = 1e-10
 #: a bone that moved less than this fraction of its next way has not moved along it [turns]
 TURNED = 1e-9
 #: how far inside the rougher side a node is pinned to a jump of friction, mm: far above rounding, far below
 #: any mesh [jumps]
-HAIR = 1e-9
+PIN_OFFSET = 1e-9
 #: a slip that has changed by less than this fraction of it in one iteration is near the end [rates]
 NEAR = 0.3
 #: a node's speed goes to and fro if it changes back by at least this fraction of its last change [rates]
@@ -113,9 +113,9 @@ DRAG_GROWTH = (1.25, 2.0)
 DRAG_REST = 0.01
 #: what was not at rest is asked again at so much less drag
 DRAG_CALMER = 0.1
-#: what rests with drag of such a rate, but not without, is given up [snaps]
+#: smallest rate of drag; a body that rests only with it ends the release [snaps]
 DRAG_LEAST = 1e-9
-#: what fails although drag of such a rate holds the body is no snap
+#: largest rate of drag; a step that fails with it is no snap
 DRAG_MOST = 1e6
 #: a release begins so far aside, mm: far above what iterations leave, far below what is seen [crests]
 IMPERFECTION = 1e-5
@@ -123,7 +123,7 @@ IMPERFECTION = 1e-5
 DRAG_STEPS = 400
 #: a step that failed where what takes stability away grows so fast, relative to what holds it, has no
 #: equilibrium near; the second, where the body gave way in its iterations [snaps]
-VERGE, VERGE_LOST = 0.9, 0.5
+CRITICAL, SOFTENED = 0.9, 0.5
 #: rounds of the staggered coupling
 STAGGERED_LIMIT = 60
 #: so many of the largest out-of-balance forces are named in a failure

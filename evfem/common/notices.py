@@ -80,7 +80,7 @@ def shown(wanted: bool = True) -> Iterator[None]:
 
 
 class _NoBar:
-    """What is done with a bar, and nothing to see."""
+    """A progress bar that shows nothing."""
 
     leave = False
 

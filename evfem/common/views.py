@@ -104,7 +104,7 @@ def describe(cls: Any) -> None:
     lines = []
     for key in keys:
         words = key.meaning if key.annotation is bool or key.allowed.startswith("a table [") else key.told
-        lines += [fill(f"- `{key.field}`: {words}", COLUMNS, subsequent_indent="  ")]
-    cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "", *lines])
+        lines += [key.field, fill(words, COLUMNS, initial_indent="    ", subsequent_indent="    ")]
+    cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "", "Parameters", "----------", *lines])
     plain = {key.field: key.annotation for key in fields_of(cls) if key.rule}
     cls.__init__.__annotations__ = {**cls.__init__.__annotations__, **plain}

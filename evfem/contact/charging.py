@@ -128,7 +128,7 @@ class Charging:
         return float(np.sum(at.length * self.energy_density(at)))
 
     def flow(self, new: Charged) -> Flow:
-        """What the source gave and what leaked in the step that ended at `new`."""
+        """Charge supplied and charge leaked in the step that ended at `new`."""
         old, stack, seconds = self.old, self.stack, self.seconds
         start = self.carried(new.length)
         before, moved = (

@@ -26,7 +26,7 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
+from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
     BACKWARD,
@@ -220,18 +220,19 @@ class LinearContactStep:
         gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
         status, solves = self.candidates.status.copy(), 0
         own = np.diagonal(self.body.compliance)[1 :: self.body.dim]
+        # in contact, in the surface, or attracted with a feedback on the node itself
         near = np.flatnonzero(
             (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
         )
-        if not near.size:
+        if not near.size:  # the dense problem has at least one node: the one with the smallest gap
             near = np.array([np.argmin(gap)])
-        while True:
+        while True:  # solve on the near nodes, join those that sink in, until none does
             found, pushed = self._solve_near(near, free, status[near])
             solves += found.solves
             status[near] = found.status
             moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
             gap = normal_gap + self._along_normal(moved)
-            gap[near] = 0.0
+            gap[near] = 0.0  # the dense problem has settled theirs
             hit = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
             if not hit.size:
                 break
@@ -239,6 +240,7 @@ class LinearContactStep:
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
         own = np.diagonal(self.body.compliance)[0 :: self.body.dim]
+        # the shear of closed nodes also follows x within the step, by the slope of their friction
         grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim, None]
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
@@ -290,7 +292,7 @@ class LinearContactStep:
         among, own, held = self.body.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
-        W[:, 0] -= C @ held
+        W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
         problem = self._problem(near, (C, W), self._bone_balance(rows, free, (C, W), follower))
         attraction = AttractionStiffness(
             known.negative_stiffness[near],
@@ -314,7 +316,7 @@ class LinearContactStep:
     def _problem(
         self, near: Ints, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
     ) -> ContactProblem:
-        """That of the `near` nodes in their frames, which other forces have `moved`."""
+        """Compliance of the `near` nodes in their frames, which other forces have `moved`."""
         known, (C, W), extra = self.candidates, moved, None
         axes = known.axes[near]
         at_rest = np.column_stack([known.surface.normal_gap[near], known.slip[near]])
@@ -367,7 +369,7 @@ class LinearContactStep:
         """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
         dim = self.body.dim
         axis = [unknown.axis - dim for unknown in self.unknowns]
-        floor = UNHELD * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
+        floor = SMALLEST_PIVOT * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
         return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
 

@@ -307,7 +307,7 @@ class FieldAttraction(Attraction):
         return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(share @ outer)
 
     def _nearby(self, x: Floats, levels: Floats) -> Nearby | None:
-        """What fields of outlines close to this one start from; None where each is solved anew."""
+        """Start values of the fields of close outlines; None if each is solved anew."""
         return None if self.floating or self._electrodes is not None else self._columns.nearby(x, levels)
 
     def _solved(

@@ -25,10 +25,12 @@ for any positive r; taken is the inverse of the node's own compliance. Where the
 areas that follow the nodes, that may vanish or be negative: r is then bounded by what is usual among the
 nodes, and g = 0 to rounding stays a small p.
 
-The attraction of an open node weakens with its gap, a negative stiffness k_e; its drop f = k_e (g - g_ref) is
-one more unknown of the node. A closed node needs none. Between rough faces attraction also grows with what
-presses the node (`Roughness`): a closed node moves the body with (1 - kappa) lam_n, an opening one loses what
-that gained.
+The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
+has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
+none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
+only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
+closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
+gained. For the tangent of a concave law one of the two statuses is always consistent.
 
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
@@ -61,7 +63,7 @@ class Roughness:
     present: Floats
 
     def of(self, nodes: Ints) -> Roughness:
-        """Of these nodes alone."""
+        """The same of these nodes alone."""
         return Roughness(self.gain[nodes], self.loss_on_opening[nodes], self.present[nodes])
 
 
@@ -110,7 +112,7 @@ class ContactNotSolved(ArithmeticError):
 
 
 class Unstable(ContactNotSolved):
-    """It has none because the body gives way the more, the more it is loaded."""
+    """No solution because the stiffness of the body is not positive definite."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ class ExtraUnknowns:
 
     @property
     def followed(self) -> Floats:
-        """What the conditioned ones take from the compliance (m, m)."""
+        """Reduction of the compliance (m, m) by the conditioned components."""
         some = self.conditioned
         return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
@@ -191,7 +193,7 @@ class ContactProblem:
 
     @property
     def resists(self) -> Any:
-        """Which nodes have friction (k,) bool."""
+        """Nodes with friction, (k,) bool."""
         rough = self.friction > 0.0
         return rough if self.cohesion is None else rough | (self.cohesion > 0.0)
 
@@ -255,11 +257,13 @@ class Projected:
         """Of these forces."""
         state, (normal_own, shear_own) = problem.state(forces), problem.own
         force, v, drop = (each.reshape(problem.size, -1) for each in (forces.contact, state, forces.drop))
+        # trial forces: those that would close gap and slip if each node had its own compliance alone
         p = force[:, 0] - v[:, 0] / normal_own
         z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
         limit, size = np.where(p > 0.0, problem.limit(p), 0.0), sizes(z)
         slip = np.where(z[:, 0] < 0.0, FORWARD, BACKWARD) if problem.dim == 2 else SLIP
         status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.resists, STICK, slip))
+        # radial return onto the disc of friction: sticking keeps z, slipping scales it to the limit
         part = np.where(status == STICK, 1.0, limit / np.maximum(size, np.maximum(limit, 1e-300)))
         wanted = np.column_stack([np.maximum(p, 0.0), z * np.where(status == OPEN, 0.0, part)[:, None]])
         held = 1e-3 * v[:, 0] / normal_own  # what would close the gap, where no node presses
@@ -307,7 +311,7 @@ class _Unknowns:
         return cls(place, closed, attracted, (known.sheared - known.gain)[closed], turned, aside, kept, turns)
 
     def columns(self, C: Floats) -> Floats:
-        """What they do to the rows of C (q, m)."""
+        """Their effect on the rows of C, (q, m)."""
         found, n = C[:, self.place], self.felt.shape[1]
         first = found[:, : self.closed.size]
         if (self.felt[:, 0] != 1.0).any():

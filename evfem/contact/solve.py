@@ -67,7 +67,7 @@ def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = 
 
 
 def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Projected]:
-    """What Newton's method starts from, one after the other until it ends."""
+    """Start values of Newton's method, tried one after the other until it converges."""
     held, slip = problem.resists, FORWARD if problem.dim == 2 else SLIP
     pressing, shear = np.split(force.reshape(problem.size, -1), [1], axis=1)
     none, touched = np.zeros(problem.size), status != OPEN
@@ -100,8 +100,8 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
             return forces, found, solves, softest
         if changed.any():
             key, softest = found.status.tobytes(), np.where(changed, OPEN, found.status)
-            late = late or key in met
-            if key in alone:
+            late = late or key in met  # a cycle: from here on change the node that is furthest off alone
+            if key in alone:  # and that has led back too
                 break
             if late:
                 worst = np.where(changed, after.miss, -1.0).argmax()

@@ -51,14 +51,14 @@ LEAST = 1e-300
 
 @runtime_checkable
 class Permittivity(Protocol):
-    """What a layer needs of a dielectric: its permittivity at a frequency."""
+    """A dielectric as a layer uses it: permittivity at a frequency."""
 
     def permittivity(self, frequency: Any) -> Any:
         """Complex relative permittivity at frequencies in Hz, of their shape."""
 
 
 class _Fitted:
-    """What every dielectric here can do with its permittivity."""
+    """Common methods of the dielectrics here."""
 
     def permittivity(self, frequency: Values) -> Values:
         raise NotImplementedError

@@ -1,4 +1,4 @@
-r"""How a scene's voltage alternates, what conducts, and what a force law sees of it.
+r"""The alternating voltage of a scene: waveform, conduction, and its effective value in a force law.
 
 A voltage is the effective one (root mean square). Under a sine the mean attraction over the cycle is a law of
 the complex length z (`evfem.electrostatics.laws`). A square wave of the same effective voltage U is the sum

@@ -254,7 +254,7 @@ class Sandwich:
         return value
 
     def _kept(self, charges: Any, time: Any) -> Any:
-        """What is left of a state (M, ...) after the `time` without fields."""
+        """Decay of a state (M, ...) over the `time` without fields."""
         tau = np.concatenate([one.poles(time)[1] for one in (self.skin, self.insulator)])
         polarised = charges[2:] * np.exp(-time / tau)
         return np.concatenate([np.broadcast_to(charges[:2], (2, *polarised.shape[1:])), polarised])
@@ -282,7 +282,7 @@ class Sandwich:
         return 2.0 * np.real(np.concatenate([np.stack([first, second]), *parts]))
 
     def _polarisations(self, charges: Any) -> tuple[Any, Any]:
-        """Those of skin and insulator (K, ...) in a state."""
+        """Polarisations of skin and insulator (K, ...) in a state."""
         end = 2 + self.skin.tau.size
         return charges[2:end], charges[end:]
 

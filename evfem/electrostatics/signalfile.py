@@ -100,9 +100,25 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
       stands in the text chunk Comment (JSON), the size of a pixel in pHYs.
     - `.hjif`: MPEG haptics, see `haptics`.
 
-    Raises InputError for another ending, a profile without length, more volts than full scale, or
-    something missing in `playback`; StorageError when the disk refuses.
+    Parameters
+    ----------
+    path
+        The file; its ending decides the format.
+    profile
+        The voltage (V) over the position (mm).
+    playback
+        Full scale, speed and rate of the device.
 
+    Raises
+    ------
+    InputError
+        Another ending, a profile without length, a voltage above full scale, or a value missing in
+        `playback`.
+    StorageError
+        The file cannot be written.
+
+    Examples
+    --------
     >>> slope = VoltageProfile([0.0, 5.0, 10.0], [0.0, 1500.0, 1500.0])
     >>> write_signal("slope.wav", slope, Playback(full_scale=2000.0, speed=20.0, rate=8000))
     >>> back = read_signal("slope.wav")
@@ -132,12 +148,24 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
 
 
 def read_signal(path: str | Path) -> VoltageProfile:
-    """The voltage over the position in a `.wav` that `write_signal` wrote, or in a csv file, for `Scene`.
+    """Read a voltage over the position.
 
-    A WAV gives a row per sample: the voltage within half a step (full_scale / 32767) at the samples, linear
-    in between, so that a jump takes speed / rate mm. A file with another ending is taken for csv. Raises
-    InputError for `.png` and `.hjif`, a missing, cut off or foreign file, more than 1,000,000 rows, and a WAV
-    with a carrier, whose samples are not the effective voltage.
+    Parameters
+    ----------
+    path
+        A `.wav` of `write_signal`, or a csv file (any other ending).
+
+    Returns
+    -------
+    VoltageProfile
+        From a WAV a row per sample: the voltage within half a step (full_scale / 32767) at the
+        samples, linear in between, so that a jump takes speed / rate mm.
+
+    Raises
+    ------
+    InputError
+        A `.png`, `.hjif`, missing, cut off or foreign file, more than 1,000,000 rows, or a WAV with a
+        carrier, whose samples are not the effective voltage.
     """
     ending = Path(path).suffix.lower()
     if ending == ".wav":
@@ -181,13 +209,13 @@ def _hjif(profile: VoltageProfile, playback: Playback) -> str:
 
 
 def _positions(number: int, start: float, spacing: float) -> Floats:
-    """Where the samples are, the same to the last bit when written and when read."""
+    """Positions of the samples, bitwise the same when written and when read."""
     with np.errstate(over="ignore"):  # infinite positions in a damaged file are refused by the profile
         return np.asarray(start + spacing * np.arange(number), dtype=np.float64)
 
 
 def _number(profile: VoltageProfile, spacing: float, most: int, what: str) -> int:
-    """How many spacings cover the profile."""
+    """Number of spacings that cover the profile."""
     number = float(np.ptp(profile.position)) / spacing
     if number > most:
         raise InputError("path", f"a file of {number:.3g} {what}", f"at most {most} of them")

@@ -209,7 +209,7 @@ class Amplifier:
 
 
 def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
-    """What follows the profile from its first row on with a slope of at most `steepest` (V/mm)."""
+    """The profile from its first row on, with its slope limited to `steepest` (V/mm)."""
     now = float(profile.voltage[0])
     rows = [(float(profile.position[0]), now)]
     for i in np.flatnonzero(np.diff(profile.position) > 0):
@@ -246,7 +246,7 @@ class Seen:
 
     @classmethod
     def of(cls, attraction: Any, interface: Any, state: Any, touching: Any) -> Seen:
-        """Of a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
+        """From a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
         at = interface.resting(state), interface.surface_at(state)
         return cls(attraction, *at, state.voltage, state.contact_force[:, 0], touching)
 

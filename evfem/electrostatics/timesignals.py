@@ -213,7 +213,7 @@ class ChargeControl:
 
     @property
     def highest_frequency(self) -> float:
-        """That of the charge (Hz)."""
+        """Frequency of the charge (Hz)."""
         return self.charge.highest_frequency if isinstance(self.charge, TimeSignal) else 0.0
 
     def charge_at(self, time: float) -> float:
@@ -264,7 +264,7 @@ class Carrier:
 
     @property
     def highest_frequency(self) -> float:
-        """That of the envelope, plus the carrier's where it is resolved (Hz)."""
+        """Frequency of the envelope, plus the carrier's if it is resolved (Hz)."""
         slow = self.envelope.highest_frequency if isinstance(self.envelope, TimeSignal) else 0.0
         return float(slow + self.frequency * self.resolved)
 

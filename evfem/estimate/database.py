@@ -7,8 +7,8 @@ steepest: sliding snaps from crest to crest there, and takes fifty times longer.
 curve stand that of the pad that yields linearly (`sliding`), and how wrong the estimator is there when it
 does not know the point: the root mean square of what is left of the friction, over the slope.
 
-The reference textures are slid over too, by both fingers at the usual touch: what an estimate of
-them is off by, none of which is a point of the database, stands in a table of its own.
+Errors of the estimate for the reference textures, which are not in the database, are in a separate
+table: both fingers, at the default touch.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ class Estimator:
         )
 
     def left_out(self) -> Floats:
-        """What the other points say of each point's response, (N, M)."""
+        """Leave-one-out prediction of each point's response, (N, M)."""
         return np.array([self.without(i)(place) for i, place in enumerate(self.points)])
 
     def without(self, i: int) -> Estimator:

@@ -270,7 +270,7 @@ class Comparison:
     voltage_difference: float
 
     def __repr__(self) -> str:
-        """How good it is."""
+        """Quality of the rendering."""
         good = f"pearson {self.pearson:.4g}, relative L2 error {self.relative_l2:.4g}"
         most = f"at most {self.largest_error:.4g} N/mm and {self.voltage_difference:.4g} V apart"
         return f"Comparison({len(self.position)} positions: {good}, {most})"
@@ -281,7 +281,7 @@ class Comparison:
         return float(np.max(np.abs(self.error)))
 
     def unmet(self, tolerance: float) -> Array:
-        """Where the wish was missed by more than `tolerance` (N/mm), (n,) bool."""
+        """Places that miss the target by more than `tolerance` (N/mm), (n,) bool."""
         return np.abs(self.error) > tolerance
 
 

@@ -44,7 +44,7 @@ _PLACES = [(i, j) for i in range(2) for j in range(3)]
 
 
 def _products() -> Floats:
-    """What the reference cell says: (36, 8), for h at two points, Y at two and h and Y at four."""
+    """Integrals of the reference cell, (36, 8): for h at two points, Y at two and h and Y at four."""
     along = np.einsum("pq,apq,bpq->abp", _WEIGHT, _BY_XI, _BY_XI)
     mixed = np.einsum("pq,apq,bpq->abq", _WEIGHT, _BY_XI, _BY_ETA)
     across = np.einsum("pq,apq,bpq->abpq", _WEIGHT, _BY_ETA, _BY_ETA)

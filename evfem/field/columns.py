@@ -16,18 +16,6 @@ needs neither ordering nor symbolic analysis, whatever the outline does.
 The derivatives of the discrete C = eps_0 times the minimal integral of ``eps |grad phi|^2`` by all
 x_k and y_lk are exact: C is stationary in the potential, so they are virtual works
 :math:`-2 \int T : \nabla V` of the velocities V with which a curve's point takes the cells along.
-
-**The mean pull of an alternating field** in layers that conduct, by the complex permittivities
-(`evfem.electrostatics.dielectrics`), has no energy: what a cycle loses depends on the way. It is the mean
-stress in the gap's medium (J. R. Melcher, Continuum Electromechanics, MIT Press 1981, chapters 2 and 3),
-
-.. math:: \bar T = \varepsilon_0 \varepsilon'\,\mathrm{Re}\,
-          \big(E \otimes \bar E - \tfrac12 |E|^2 I\big), \qquad F = -\int_\text{gap} \bar T : \nabla V
-
-for V from 1 on the pad to 0 on the insulator: it has no sources there, so every surface around the pad gives
-one force, and a node's is that of its shape function. In the skin's layer V does not change with the height,
-and forces inside the pad, which cancel in the sum, are shared out. Without conduction this is the derivative
-of the energy. Only the two end lines are taken whole: what is beyond them is not known.
 """
 
 from __future__ import annotations
@@ -39,39 +27,6 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import eps_0
 from evfem.field.columncells import AT, WEIGHTS, Cells
-
-
-@dataclass(frozen=True, eq=False)
-class MeanPull:
-    """Mean forces (L, 2) on the pad at the lines, N per mm at 1 V; potential `phi` (L, rows) at `y`."""
-
-    forces: Floats
-    phi: Floats
-    y: Floats
-
-
-def mean_pull(
-    columns: Columns, x: Floats, levels: Floats, electrodes: Floats | None = None, floating: bool = False
-) -> MeanPull:
-    """Solve as `Columns.solve` does, for layers insulator, gap and, if there is one, skin, with
-    complex permittivities.
-
-    >>> plate = Columns((3.0, 1.0 - 2.0j), (np.array([0.0, 1.0]), np.array([0.0, 0.5, 1.0])))
-    >>> found = mean_pull(plate, np.linspace(0.0, 1.0, 5), np.repeat([[-0.3], [0.0], [0.1]], 5, axis=1))
-    >>> z = (1.0 - 2.0j) * 0.3 / 3.0
-    >>> bool(np.isclose(found.forces[:, 1].sum(), -eps_0 / 2.0 / abs(0.1 + z) ** 2, rtol=1e-12))
-    True
-    """
-    cells, strips = columns.cells(x, levels, electrodes)
-    phi = cells.potential(strips, floating)
-    found = cells.squares(phi)
-    gap, skin = cells.layer == 1, cells.layer > 1
-    share = np.where(gap, cells.share, np.where(skin, 1.0, 0.0))
-    along = cells.by_x(found, share, np.where(gap, cells.rise, 0.0))
-    along[[0, -1]] = cells.by_x(found, np.ones_like(share), np.zeros_like(cells.rise))[[0, -1]]
-    up = cells.by_level(found)[2:].sum(axis=0)
-    return MeanPull(0.5 * eps_0 * np.stack([along, up], axis=1), phi, cells.heights())
-
 
 #: share of the lowest layer that is taken to the second order on electrodes that end
 THIN = 0.2
@@ -139,7 +94,7 @@ class Columns:
         return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, cells.heights())
 
     def nearby(self, x: Floats, levels: Floats) -> Nearby:
-        """What outlines close to this one start from, under one electrode and a grounded finger."""
+        """Start values for close outlines, under one electrode and a grounded finger."""
         cells, _ = self.cells(x, levels, None)
         return Nearby(cells.potential(None, False), cells.factor())
 

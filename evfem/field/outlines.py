@@ -195,14 +195,14 @@ def _upright(x: Floats, height: Floats) -> Floats:
 
 
 def _straight(x: Floats, height: Floats) -> Any:
-    """Which inner points are on the line between their neighbours."""
+    """Inner points on the line between their neighbours."""
     way = np.diff(x) + 1j * np.diff(height)
     turned = np.abs((way[1:] * way[:-1].conj()).imag) <= STRAIGHT * np.abs(way[1:] * way[:-1])
     return turned & ((way[1:] * way[:-1].conj()).real > 0.0)
 
 
 def _without_repetitions(x: Floats, height: Floats) -> Floats:
-    """Which points to keep: two of each x at most, and not the same one twice."""
+    """Points to keep: at most two of each x, none twice."""
     same = np.diff(x) == 0.0
     rises = np.sign(np.diff(height)) * same
     inner = same[:-1] & same[1:]

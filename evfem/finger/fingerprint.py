@@ -105,7 +105,7 @@ class HeightMap:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """What it is made of, as a scene file can hold it."""
+        """Its data as a scene file holds them."""
         return {"x": self.x.tolist(), "z": self.z.tolist(), "height": self.height.tolist()}
 
     def depth(self, x: Floats, z: Floats) -> Floats:

@@ -19,7 +19,7 @@ class Moduli(NamedTuple):
 
 
 class Thickness(NamedTuple):
-    """What a layer's thickness (mm) is by default, and what it may be."""
+    """Default and range of a layer's thickness (mm)."""
 
     default: float
     lowest: float

@@ -32,7 +32,7 @@ class Ellipse:
         return n / np.hypot(n[:, 0], n[:, 1])[:, None]
 
     def towards(self, points: Floats) -> Floats:
-        """Where the lines from the centre to `points` (N, 2) cross the ellipse, (N, 2)."""
+        """Intersections of the ellipse with the lines from its centre to `points` (N, 2), (N, 2)."""
         centre = np.array([0.0, self.centre])
         away = points - centre
         return centre + away / np.hypot(away[:, 0] / self.a, away[:, 1] / self.b)[:, None]

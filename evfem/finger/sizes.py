@@ -1,4 +1,4 @@
-"""What a cross-section and a whole pad share: sizes with ranges and meanings, and what fits together."""
+"""Common to a cross-section and a whole pad: sizes with ranges and meanings, and their consistency."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class LayeredFinger:
         return sizes
 
     def __repr__(self) -> str:
-        """What differs from Table 2."""
+        """Differences from Table 2."""
         return called(type(self).__name__, self._own())
 
     def _repr_html_(self) -> str:

@@ -1,4 +1,4 @@
-"""How a user's functions are tried before a run, and what contact asks of a user's parts.
+"""Tests of a user's functions before a run, and the requirements of contact on a user's parts.
 
 `evaluated` and its like say in a sentence what is wrong with a function; `check_surface`,
 `check_friction_law` and `check_roughness` try a surface at a dozen places of the way, and laws at
@@ -36,7 +36,9 @@ STEPS, LEVEL, SLOPE = (1e-4, 1e-2), 1e-4, 0.3
 
 
 def evaluated(key: str, what: str, function: Callable[[Array], Any], at: Array) -> Array:
-    """The values of a user's function; InputError where it raises, or they are not finite."""
+    """The values of a user's function; InputError where it raises anything, or they are not finite
+    numbers.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

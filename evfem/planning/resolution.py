@@ -1,5 +1,5 @@
-"""Steps and nodes: what of a scene remembers the way, so that steps count (where nothing does, few will
-do); whether they follow a voltage over time, a hand and the tissue; whether the nodes feel a profile.
+"""Whether the pad's nodes are close enough together to feel a profile, and the profile smooth
+enough; and whether the steps are short enough to follow a voltage over time, a hand and the tissue.
 
 Between n nodes per wave a sine is up to 1 - cos(pi / n) of its amplitude higher than the line from
 node to node: five nodes miss a fifth.
@@ -20,47 +20,6 @@ from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 from evfem.surface.textures import SelfAffine
 from evfem.tissue.laws import split
-
-AUTO = "auto"
-
-
-def remembers(scene: Scene) -> tuple[str, ...]:
-    """What makes forces depend on the way, in words; empty where nothing does.
-
-    >>> import evfem as ev
-    >>> pad, press = ev.FingerPad(resolution="coarse"), [ev.Press(indentation=0.5, steps=2)]
-    >>> [remembers(ev.Scene(pad, ev.Flat(friction=mu), motion=press)) for mu in (0.0, 0.3)]
-    [(), ('friction',)]
-    """
-    drive = scene.drive is not None and scene.drive.resolved
-    found = {
-        "friction": scene.has_friction,
-        "time": scene.solver.timed,
-        "charges": drive,
-        "the hand": scene.hand is not None and scene.hand.timed,
-        "who touches": scene.law is not None and not scene.air_layer,
-    }
-    return tuple(name for name, there in found.items() if there)
-
-
-def allowed_error(scene: Scene) -> float | None:
-    """The error of a part's path that its strategy allows; None where the steps are as given."""
-    strategy = scene.solver.strategy
-    return strategy.path_error if strategy.steps == AUTO and remembers(scene) else None
-
-
-def said(scene: Scene) -> str:
-    """What a plan says of the steps of a scene that leaves them to the solver; nothing otherwise."""
-    if scene.solver.strategy.steps != AUTO:
-        return ""
-    names = remembers(scene)
-    if not names:
-        what = "nothing but a snap" if scene.electrics.acts or not scene.ground.is_flat else "nothing"
-        return f"steps auto: {what} remembers the way, each step is one part"
-    limit = f"{100.0 * scene.solver.strategy.path_error:g} %"
-    verb = "remembers" if len(names) == 1 else "remember"
-    return f"steps auto: {', '.join(names)} {verb} the way, a part errs by at most {limit} of the force"
-
 
 #: share of a profile's height that may lie between two neighbouring nodes and be missed by both
 MISSED = 0.2
@@ -91,7 +50,7 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
             f"{PER_WAVE:g} nodes of the pad each, which are {spacing:.2g} mm apart; use a finer mesh, or a "
             f"shortest wave of {PER_WAVE * spacing:.2g} mm"
         )
-    x = way(scene, mesh, spacing / PER_SPACING)
+    x = path_points(scene, mesh, spacing / PER_SPACING)
     before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
     if missed > MISSED * whole:
@@ -121,7 +80,9 @@ def _pad_edges(mesh: Mesh) -> Ints:
 
 
 def too_fast(scene: Scene) -> str | None:
-    """A sentence if a motion's steps are too long for twice a voltage's highest frequency, else None."""
+    """A sentence if a motion's steps are too long for a voltage over time, else None: the attraction has up
+    to twice its frequency, and what is above half the rate of the steps appears below it (aliasing).
+    """
     signal = scene.electrics.voltage
     if not isinstance(signal, TimeSignal) or not signal.highest_frequency > 0.0:
         return None
@@ -138,7 +99,9 @@ def too_fast(scene: Scene) -> str | None:
 
 
 def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
-    """A sentence for hand and tissue if steps are longer than their period, 4 h sqrt(rho / G) of tissue."""
+    """A sentence for hand and tissue if a motion's steps are longer than their period: of its mass on its
+    spring; of the softest layer in shear, about 4 h sqrt(rho / G). Overdamped, neither has one.
+    """
     longest, step = _longest(scene)
     for what, period in _periods(scene, mesh):
         if step > period:
@@ -177,7 +140,7 @@ def _instead(signal: TimeSignal) -> str:
     return ""
 
 
-def way(scene: Scene, mesh: Mesh, step: float) -> Any:
+def path_points(scene: Scene, mesh: Mesh, step: float) -> Any:
     """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
     pad, bone = mesh.points[mesh.node_sets["pad"], 0], scene.reach
     first, last = pad.min() + bone[0], pad.max() + bone[1]

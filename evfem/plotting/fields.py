@@ -219,7 +219,7 @@ def shown_values(mesh: Mesh, frame: Frame, field: str, window: Window) -> Floats
 
 
 def within(place: Floats, window: Window) -> Any:
-    """Which of the points (N, 2) are in the window (N,)."""
+    """Points (N, 2) in the window, (N,) bool."""
     left, right, bottom, top = window
     x, y = place.T
     return (x >= left) & (x <= right) & (y >= bottom) & (y <= top)

@@ -71,7 +71,9 @@ class Electrics:
 
     @cached_property
     def voltage(self) -> Any:
-        """The voltage as the run follows it: of the moment where it is resolved, else the effective one."""
+        """The scene's voltage in the run: constant, instantaneous (resolved drive) or rms (mean over the
+        cycle of a periodic signal).
+        """
         drive = self.drive
         if drive is not None and not drive.resolved and (found := powers(self.given)) is not None:
             return found[0]

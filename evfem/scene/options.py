@@ -1,4 +1,4 @@
-"""How a scene is solved, and which fields are kept."""
+"""Options of the solver and of the output."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
 from evfem.surface.friction import Coulomb
-from evfem.surface.own import completed
+from evfem.surface.usersurface import completed
 from evfem.tissue.forms import Form
 
 DIRECTIONS = ("vertical", "normal")
@@ -164,7 +164,7 @@ class Scene:
 
     @property
     def courses(self) -> tuple[Course, ...]:
-        """What each of the motions does."""
+        """The course of each motion."""
         return tuple(motion.course for motion in self.motion)
 
     @property

@@ -54,7 +54,7 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
 
 
 def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
-    """What the solver had taken with it, from the arrays of a checkpoint."""
+    """The reusable data of the solver, from the arrays of a checkpoint."""
     at = None
     if arrays["factorised"]:
         parts: dict[str, Any] = {spec.name: arrays[f"factor_{spec.name}"] for spec in fields(TangentPoint)}

@@ -37,7 +37,7 @@ class Ledger:
         return works["snap_dissipation"] > 0.0
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
-        """Where sums and books stand."""
+        """Present sums and energy balance."""
         return self.sums.copy(), self.end
 
     def back(self, mark: tuple[dict[str, float], Books | None]) -> None:

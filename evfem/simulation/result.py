@@ -71,7 +71,7 @@ class Frame:
     J: Floats = field(metadata={"shape": ("E",)})
 
     def __repr__(self) -> str:
-        """Which step it is, where, and its size."""
+        """Number of the step, position and size."""
         size = f"{len(self.displacement)} nodes, {len(self.J)} cells"
         return f"Frame of step {self.step} at {plus(self.position):.4g} mm, {plus(self.time):.4g} s: {size}"
 
@@ -192,7 +192,7 @@ class Result(History):
 
     @property
     def warnings(self) -> list[str]:
-        """What a run found that may make its numbers mean something else, a sentence each."""
+        """Warnings of the run about its numbers, one sentence each."""
         return list(self.provenance.get("warnings", []))
 
     def summary(self) -> dict[str, Any]:
@@ -235,7 +235,7 @@ class Result(History):
         return found
 
     def __repr__(self) -> str:
-        """How far the run came, where it ended and with what forces."""
+        """Number of steps, end position and end forces of the run."""
         last = self._last
         parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
         lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]

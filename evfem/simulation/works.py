@@ -23,7 +23,8 @@ The history has
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
 - ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
 
-What separates them is found term by term, without the work of the bone:
+Their difference is computed term by term without the work of the bone, so the balance is a check
+that the forces of the accepted states are in equilibrium:
 
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
           + (W_e - \bar f_e\cdot\Delta u) .
@@ -159,7 +160,7 @@ class Part:
     new: State
 
     def end(self) -> Books:
-        """What is held of the part's end."""
+        """Energies at the end of the part, its loads held."""
         body, new = self.model.body, self.new
         given = body.given_forces(new.u)
         kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
@@ -169,7 +170,7 @@ class Part:
         return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
-        """What the part adds to each of `SUMS`, N mm per mm of depth."""
+        """Contributions of the part to `SUMS`, N mm per mm of depth."""
         old, new, body = self.old, self.new, self.model.body
         moved = new.u - old.u
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
@@ -341,7 +342,7 @@ class Part:
 
     @cached_property
     def slip_length(self) -> Floats:
-        """How far the pad nodes (P,) slip, in mm."""
+        """Slip of the pad nodes (P,), in mm."""
         interface = self.model.equilibrium.interface
         if interface.dim == 3:
             return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))

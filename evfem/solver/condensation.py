@@ -64,7 +64,7 @@ def pardiso_library() -> Any:
 
 
 def mkl_library() -> str | None:
-    """Where the package `mkl` has put its runtime library, or None."""
+    """Path of the runtime library of the package `mkl`, or None."""
     try:
         files = metadata.files("mkl") or []
     except metadata.PackageNotFoundError:

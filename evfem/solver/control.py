@@ -9,7 +9,7 @@ control             known                        unknown                       e
 ==================  ===========================  ============================  ====================
 `Indentation`       height of the bone                                         none
 `Force`                                          travel of the bone            F_y = -force
-`Loose`             height of the bone           travel of the bone            F_y = 0, if touched
+`Unsupported`             height of the bone           travel of the bone            F_y = 0, if touched
 `GivenVoltage`      voltage                                                    none
 `KeptCharge`        charge of the electrode      voltage                       Q = charge
 `GivenGap`          smallest gap of the pad      squared voltage               g = gap
@@ -95,17 +95,17 @@ class Force(HeightControl):
         return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
 
     def towards(self, end: HeightControl, fraction: float) -> Force:
-        if isinstance(end, Loose):
+        if isinstance(end, Unsupported):
             return self
         assert isinstance(end, Force)
         return Force(self.force + fraction * (end.force - self.force))
 
 
-class Loose(Indentation):
+class Unsupported(Indentation):
     """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
     begins; touched on the way, by a crest or by tissue that recovers, it gives way (`Equilibrium.step`).
 
-    >>> Loose(0.3).towards(Force(0.0), 0.5)
+    >>> Unsupported(0.3).towards(Force(0.0), 0.5)
     Force(force=0.0)
     """
 
@@ -366,7 +366,7 @@ class Target:
         return np.array([x, self.height.known(float(present[1])), *along])
 
     def way(self, present: Floats) -> Floats:
-        """How far the bone is likely to go from its `present` translation (dim,)."""
+        """Expected displacement of the bone from its `present` translation (dim,)."""
         way = self.bone(present) - present
         if self.hand is not None:
             way[0] = self.hand.way

@@ -28,9 +28,9 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.contact.stability import Verge
+from evfem.contact.stability import StabilityRatio
 from evfem.electrostatics.signals import Seen
-from evfem.solver.control import Force, GivenVoltage, Indentation, Loose, Target, sticks
+from evfem.solver.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface
 from evfem.solver.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
@@ -99,7 +99,7 @@ class Equilibrium:
         of the current one if given; iterations begin at `start` (default `old`). A loose finger that
         is touched gives way. Raises `StepFailed`.
         """
-        if not isinstance(target.height, Loose):
+        if not isinstance(target.height, Unsupported):
             return self._followed(old, target, frozen, start)
         held = replace(target, height=Indentation(float(old.bone[1])))
         found = self._followed(old, held, frozen, start)
@@ -135,12 +135,12 @@ class Equilibrium:
             raise StepFailed("the wished friction force was not found", self.record.residuals)
         return held
 
-    def verge(self, state: State, target: Target) -> Verge | None:
-        """Which force takes the equilibrium `state` its stability."""
-        return self.body.verge(state, target)
+    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
+        """Stability ratio of the equilibrium `state`."""
+        return self.body.stability_ratio(state, target)
 
     def reusable(self) -> Reusable:
-        """What the solver takes with it to the next step."""
+        """Data of the solver that the next step reuses."""
         return self.body.reusable()
 
     def resume(self, state: State, carried: Reusable) -> None:
@@ -192,8 +192,8 @@ class Equilibrium:
         place = self.interface.fold(state)
         if place is not None:
             raise Folded(FOLDED.format(place), self.record.residuals)
-        if (verge := self.body.leaves(old, state, target)) is not None:
-            raise Unstable(NOT_STABLE.format(verge.cause, verge.share))
+        if (margin := self.body.leaves(old, state, target)) is not None:
+            raise Unstable(NOT_STABLE.format(margin.cause, margin.ratio))
         state = self.interface.aged(old, self.body.accepted(old, state))
         return state if target.hand is None else target.hand.settled(state)
 

@@ -36,7 +36,7 @@ from evfem.common.constants import (
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
-from evfem.contact.stability import SLOPES, Verge, verge
+from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import Seen
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Target, VoltageProblem
@@ -308,8 +308,10 @@ class FactorisedBody:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
 
-    def verge(self, state: State, target: Target) -> Verge | None:
-        """Which force takes `state` its stability on the way to `target`; None in three dimensions."""
+    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
+        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as
+        the curvature of a profile may jump. None in three dimensions.
+        """
         if state.bone.size == 3:
             return None
         ahead = self.begin(state, target, frozen=False, start=state)
@@ -319,12 +321,12 @@ class FactorisedBody:
         for place in (state, ahead):
             step = self._contact_step(state, place, target, still)
             also = target.drive.unknowns(step, self._problem(none, place))
-            found.append(verge(replace(step, unknowns=(*step.unknowns, *also))))
-        return max(found, key=lambda one: one.share)
+            found.append(stability_ratio(replace(step, unknowns=(*step.unknowns, *also))))
+        return max(found, key=lambda one: one.ratio)
 
     # -- a step ends
 
-    def leaves(self, old: State, state: State, target: Target) -> Verge | None:
+    def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
         """How crests push the finger out of the equilibrium `state` faster than it is held, by the
         tangent at hand and by the one there: iterations may come to such a one from afar. Not asked of
         tissue in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue
@@ -343,15 +345,15 @@ class FactorisedBody:
             found = self._pushed_out(old, state, target)
         return found
 
-    def _pushed_out(self, old: State, state: State, target: Target) -> Verge | None:
-        """By how much slopes win by the tangent at hand, without the attraction; None if they do not."""
+    def _pushed_out(self, old: State, state: State, target: Target) -> StabilityRatio | None:
+        """Stability ratio by the present tangent without attraction, if slopes exceed 1; else None."""
         step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
-        still = np.zeros(step.candidates.status.size)
+        unattracted = replace(step.candidates, negative_stiffness=np.zeros(step.candidates.status.size))
         try:
-            found = verge(replace(step, candidates=replace(step.candidates, negative_stiffness=still)))
+            found = stability_ratio(replace(step, candidates=unattracted))
         except np.linalg.LinAlgError:
             return None
-        return found if found.cause == SLOPES and found.share > 1.0 else None
+        return found if found.cause == SLOPES and found.ratio > 1.0 else None
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity and its increment."""

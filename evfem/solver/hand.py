@@ -52,8 +52,8 @@ class Hand:
 
     @classmethod
     def of_finger(cls, speed: float, depth: float = 10.0) -> Hand:
-        """That of a finger that slides with `speed` (mm/s) and is `depth` mm deep: what grows with the
-        speed, times the speed, as what is left at none is not in the source's summary.
+        """The hand of a finger that slides with `speed` (mm/s) and is `depth` mm deep. Spring and mass are
+        proportional to the speed; the source gives no offset.
 
         The damper is our reading: a spring k and a damper c are a first-order system whose cut-off
         frequency is k / (2 pi c), so it is the same at every speed. InputError for a speed or a depth
@@ -82,12 +82,12 @@ class Hand:
         return 0.5 * self.mass * float(state.hand[1]) ** 2
 
     def given(self, old: State, new: State) -> float:
-        """What the drive does beyond the work on the bone, between two states, in N mm."""
+        """Work of the actuator beyond that on the bone, between two states, in N mm."""
         drive = 0.5 * (old.hand[2] + new.hand[2]) * (new.hand[0] - old.hand[0])
         return float(drive - 0.5 * (old.reaction[0] + new.reaction[0]) * (new.bone[0] - old.bone[0]))
 
     def dissipation(self, old: State, new: State, duration: float) -> float:
-        """What the damper dissipates in so many seconds, in N mm."""
+        """Dissipation of the damper in so many seconds, in N mm."""
         if duration == 0.0:
             return 0.0
         stretched = (new.hand[0] - old.hand[0]) - (new.bone[0] - old.bone[0])
@@ -114,7 +114,7 @@ class Grip:
 
     @property
     def stiffness(self) -> float:
-        """How fast the force on the bone falls with its travel, N/mm per mm."""
+        """Stiffness of the hand at the bone, N/mm per mm."""
         if self.duration == 0.0:
             return self.hand.stiffness
         rate = 1.0 / self.duration
@@ -122,11 +122,11 @@ class Grip:
 
     @property
     def way(self) -> float:
-        """How far the bone goes if nothing changes (mm)."""
+        """Displacement of the bone if nothing changes (mm)."""
         return self.before[2] * self.duration
 
     def velocity(self, x: float) -> float:
-        """Of the bone at the end of the step, in mm/s."""
+        """Velocity of the bone at the end of the step, in mm/s."""
         return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0
 
     def driving(self, x: float) -> float:

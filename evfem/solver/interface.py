@@ -17,7 +17,14 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import CHANGES, HAIR, NEIGHBOURS, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
+from evfem.common.constants import (
+    CHANGES,
+    NEIGHBOURS,
+    PIN_OFFSET,
+    SHORT_RAMP,
+    SHORTEST_LENGTH,
+    SMALLEST_FORCE,
+)
 from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.protocols import FrictionLaw
@@ -54,7 +61,7 @@ class Pins:
 
     @property
     def held(self) -> Any:
-        """Which nodes are pinned (P,) bool."""
+        """Pinned nodes, (P,) bool."""
         return np.isfinite(self.x)
 
     def watch(self, x: Floats, touching: Any) -> None:
@@ -66,7 +73,7 @@ class Pins:
         self._changes += moved
         new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
         place, before, behind = self.jumps[np.maximum(side, self._side)[new] - 1].T
-        inside = np.where(behind > before, HAIR, -HAIR)
+        inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
         from_smoother = (place - self._begin[new]) * inside > 0.0
         new = new[from_smoother]
         self.x[new] = (place + inside)[from_smoother]
@@ -102,7 +109,7 @@ Restored = Callable[[float], tuple[Floats, Floats] | None]
 
 
 def nothing_restored(voltage: float) -> None:
-    """Of an attraction without a core."""
+    """From an attraction without a core."""
 
 
 class Interface:
@@ -260,7 +267,7 @@ class Interface:
         return 0.5 * (self.shares(old) + self.shares(new))
 
     def age(self, old: State) -> Floats:
-        """How long every pad node has touched at the end of the step from `old` (P,) in s."""
+        """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
         return np.where(old.touching, old.age + self.duration, 0.0)
 
     def aged(self, old: State, state: State) -> State:

@@ -1,4 +1,4 @@
-r"""The error of a path: how much the steps decide where friction and time remember the way.
+r"""The error of a path: how much the steps decide where friction and time make it matter.
 
 Friction is counted from the last accepted state and time goes by backward Euler, so a step of length h errs
 by :math:`c h^2` locally: one part from a to b ends elsewhere than two halves do, and their difference
@@ -22,7 +22,7 @@ from evfem.solver.state import State
 
 
 def apart(once: State, twice: State) -> float:
-    """How far the ends of one part and of two halves are apart, as a share."""
+    """Relative difference between the ends of one substep and of two halves."""
     forces = np.abs(once.reaction - twice.reaction).max()
     places = np.abs(once.bone - twice.bone).max()
     moved = np.abs(twice.bone).max()

@@ -48,7 +48,7 @@ class Pressure:
         return self.tissue.pressure(u) if self.active else NO_PRESSURE
 
     def misfit(self, state: State) -> Floats:
-        """How far the pressure of the laws is from that of the iterate, q(u) - q."""
+        """Residual of the pressure, q(u) - q."""
         return self.tissue.pressure(state.u) - state.pressure if self.active else NO_PRESSURE
 
     def further_forces(self, state: State, misfit: Floats) -> Floats | None:

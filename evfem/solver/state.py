@@ -71,7 +71,7 @@ class State:
 
     @property
     def touching(self) -> Any:
-        """Which pad nodes touch (P,) bool."""
+        """Pad nodes in contact, (P,) bool."""
         return self.status != OPEN
 
 
@@ -94,7 +94,9 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What a solver takes from step to step: candidates, where it factorised, the last step's seconds."""
+    """Data that the next step reuses: contact candidates (numbers of pad nodes), the point of the
+    factorisation if there is one, and the last time step (s).
+    """
 
     candidates: Ints
     tangent_point: TangentPoint | None
@@ -113,7 +115,7 @@ class Limits:
 
 @dataclass
 class Record:
-    """Work done since the start: iterations, factorisations, dense solves; residuals of the last step."""
+    """Numbers of iterations, factorisations and dense contact solves, and the residuals of the last step."""
 
     iterations: int = 0
     factorisations: int = 0
@@ -136,9 +138,8 @@ class MixedBalance:
 
 @dataclass(frozen=True)
 class Balance:
-    """How far an iterate is from equilibrium: its out-of-balance forces (n,) of the reduced
-    unknowns in N/mm, the largest of them relative to the reaction, and the attraction (P, 2) at
-    its positions; and what the iterations have left to do where the pressure is an unknown.
+    """Residual of an iterate: out-of-balance forces (n,) of the reduced unknowns in N/mm, the largest
+    relative to the reaction, the attraction (P, 2), and the mixed problem's residual if it is solved.
     """
 
     forces: Floats

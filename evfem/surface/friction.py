@@ -203,7 +203,7 @@ class Slipping:
         return np.asarray(law.bound(self.pressure, self.mu, self.speed, self.age) * self.length)
 
     def linearised(self, law: FrictionLaw) -> Linearised:
-        """How they depend on contact force, speed and coefficient."""
+        """Derivatives by contact force, speed and coefficient."""
         normal = np.maximum(self.normal, 0.0)
         force = self.bound(law)
         slope = self._derivative(law, "pressure") * self._growth

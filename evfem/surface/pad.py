@@ -80,7 +80,7 @@ class Pad:
         return float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
 
     def facing(self, position: Floats) -> Any:
-        """Which segments (S,) look down."""
+        """Segments that face down, (S,) bool."""
         return np.diff(position[self.segments, 0], axis=1)[:, 0] > 0.0
 
     def fold(self, position: Floats, touching: Any, down: Any) -> float | None:

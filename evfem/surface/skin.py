@@ -141,7 +141,7 @@ class Skin:
         return float(np.median(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)))
 
     def facing(self, position: Floats) -> Any:
-        """Which faces (K,) look down at their centre."""
+        """Faces that face down at their centre, (K,) bool."""
         _, slope = shape_functions(self.faces.shape[1], np.zeros((1, 2)))
         flat = position[self.faces][..., [0, 2]]
         first, second = (np.einsum("kma,m->ka", flat, slope[0, :, i]) for i in (0, 1))

@@ -169,7 +169,7 @@ class SelfAffine(RigidSurface):
 
     @property
     def _waves(self) -> range:
-        """How many times each wave fits into the period."""
+        """Number of periods of each wave in the period of the surface."""
         assert self.longest is not None
         tiny = 1e-9  # a period of 10 mm has 50 waves of 0.2 mm, whatever the rounding
         first = int(np.ceil(self.period / self.longest * (1.0 - tiny)))

@@ -27,7 +27,7 @@ from evfem.scene.format import SceneTable, names
 from evfem.scene.keys import VERSION, at, read, shown
 from evfem.scene.scene import Scene
 from evfem.scene.schema import DRAFT, Schema, Section, section
-from evfem.scene.written import dump
+from evfem.scene.serialiser import dump
 from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import Distribution, Normal, Samples, Uniform

@@ -4,7 +4,7 @@ A point's file is named by the fingerprint of its scene, outputs and version: a 
 changed in other points, finds it again. Every file is written whole or not at all. The table is `sweep.csv`
 (and `sweep.parquet` where pyarrow is installed), a row per point; `sweep.json` has the provenance, from the
 start, so that the folder can tell which sweep was its last. Only files that a sweep wrote are ever replaced
-or removed: `.evfem-sweep` lists their names (`Listed`), a point's file says so itself.
+or removed: `.evfem-sweep` lists their names (`Manifest`), a point's file says so itself.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from evfem.common.listed import Listed
+from evfem.common.manifest import Manifest
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.common.tables import csv_text
 from evfem.errors import InputError
@@ -71,7 +71,7 @@ class SweepFolder:
         """
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
-            listed, points = self._listed, self._points()
+            listed, points = self._manifest, self._points()
             present = [name for name in (TABLE, PARQUET, PROVENANCE, POINTS) if (self.path / name).exists()]
             refuse_others(self.path / MANIFEST, present, "a sweep")
             _refuse_no_points(points)
@@ -88,8 +88,8 @@ class SweepFolder:
                     file.unlink()
 
     @cached_property
-    def _listed(self) -> Listed:
-        return Listed(self.path / MANIFEST, OURS)
+    def _manifest(self) -> Manifest:
+        return Manifest(self.path / MANIFEST, OURS)
 
     def _points(self) -> list[Path]:
         """The files in the folder of the points that have the name of one."""
@@ -126,16 +126,16 @@ class SweepFolder:
 
     def write_table(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
         """The table of all points so far."""
-        with self._listed.writing(self.path / TABLE):
+        with self._manifest.writing(self.path / TABLE):
             write_text(self.path / TABLE, sweep_csv(columns, rows))
         if find_spec("pyarrow") is not None:
             file = self.path / PARQUET
-            with self._listed.writing(file), replacing(file) as temporary:
+            with self._manifest.writing(file), replacing(file) as temporary:
                 _write_parquet(temporary, columns, rows)
 
     def write_provenance(self, provenance: Mapping[str, Any]) -> None:
-        """How the table came about."""
-        with self._listed.writing(self.path / PROVENANCE):
+        """Provenance of the table."""
+        with self._manifest.writing(self.path / PROVENANCE):
             write_text(self.path / PROVENANCE, json.dumps(provenance, indent=1, allow_nan=False) + "\n")
 
 

@@ -113,7 +113,7 @@ class SweepResult:
         write_text(path, sweep_csv(self.columns, self.rows))
 
     def __repr__(self) -> str:
-        """How many points, and what became of them."""
+        """Numbers of points by status."""
         return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
 
 
@@ -127,17 +127,40 @@ def sweep(
     scheduler: str | None = None,
     progress: bool = False,
 ) -> SweepResult:
-    """Run every point of a sweep (`Sweep`, or the path of a sweep file) and return the table of all.
+    """Run every point of a sweep.
 
-    The folder `out` gets `sweep.csv`, `sweep.parquet` where pyarrow is installed, `sweep.json` and a file per
-    point; what is finished there is not computed again. A folder with points of another sweep is refused,
-    unless `resume` says to keep them or `overwrite` to remove all points. `workers` processes (None: one per
-    core; 1: none but this one) or the Dask cluster at the address `scheduler` ("local" starts one) do the
-    work; the numbers are the same. A point that the scene reader refuses, that does not converge or that
-    fails otherwise is a row with its status and message; the message of one that is done is what its result
-    warns of. Raises InputError if no point at all is a valid scene, StorageError when the disk refuses or
-    another sweep is at work in the folder.
+    Parameters
+    ----------
+    plan
+        A `Sweep`, or the path of a sweep file.
+    out
+        Folder for `sweep.csv`, `sweep.parquet` (with pyarrow), `sweep.json` and a file per point.
+        Points that are finished there are not computed again.
+    resume, overwrite
+        Keep or remove the points of another sweep in the folder, which is refused otherwise.
+    workers
+        Number of processes; None: one per core, 1: this process only.
+    scheduler
+        Address of a Dask cluster in place of the processes; "local" starts one. The numbers are the
+        same.
+    progress
+        Show a progress bar.
 
+    Returns
+    -------
+    SweepResult
+        A row per point. One that is refused, does not converge or fails has its status and message;
+        the message of one that is done has the warnings of its result.
+
+    Raises
+    ------
+    InputError
+        No point is a valid scene.
+    StorageError
+        The folder cannot be written, or another sweep is running in it.
+
+    Examples
+    --------
     >>> from evfem.sweeps.file import loads as read
     >>> text = '''
     ... version = 1
@@ -226,7 +249,7 @@ class _Run:
         return digest((scene.digest(), self.plan.outputs, evfem.__version__))
 
     def waiting(self) -> dict[str, Job]:
-        """What is still to be computed; equal points are computed once."""
+        """Points to compute; equal points are computed once."""
         folder, outputs = str(self.plan.folder), tuple(self.plan.outputs)
         jobs = zip(self.keys, self.points, strict=True)
         return {key: (point.text, folder, outputs) for key, point in jobs if key not in self.answers}

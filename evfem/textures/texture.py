@@ -1,8 +1,8 @@
 """A texture, and its files: a `.json` beside its `.csv`, or a folder with both.
 
 What is known over x is either the height of a surface or its friction coefficient. A recording of
-vibrations gives neither: it is kept as what it is, the spectrum of the friction over the spatial
-frequency, and turned into a friction profile with phases that are drawn and a size that is said.
+vibrations gives neither: it is stored as the spectrum of the friction over the spatial frequency,
+and converted to a friction profile with random phases and a given rms.
 The `.json` has exactly the keys of `KEYS`; the licence is one of them.
 """
 
@@ -157,7 +157,7 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
     """Write a `.json` and its `.csv`, or both into a folder (a path without ending).
 
     The `.json` is written last: without it there is no texture. Returns both paths. Raises InputError
-    where the `.csv` is somebody's and not that of a texture, as of a measurement called the same.
+    if the `.csv` was not written by evfem, such as a measurement of the same name.
 
     >>> wave = Texture("wave", "drawn", [0.0, 1.0], [0.0, 0.01], "CC0-1.0", period=2.0)
     >>> [path.name for path in write(wave, "wave.json")], read("wave.json").period

@@ -183,7 +183,7 @@ class Integral:
         return values.transpose(2, 3, 0, 1).reshape(-1, C, Q)
 
     def state(self, u: Floats) -> State:
-        """What the form sees of the displacements u (N, dim)."""
+        """Fields of the form at the displacements u (N, dim)."""
         ue, parts = u[self.points.nodes], self.parts
         C, Q, m, _ = self._rows.shape
         x = np.empty((parts.size, C, Q))

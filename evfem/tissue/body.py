@@ -50,7 +50,7 @@ class Drag:
         self._terms.add_tangent(u, pattern, data)
 
     def dissipation(self, u: Floats) -> float:
-        """What the drag dissipates in the step that ends at u: N mm, in the plane per mm of depth."""
+        """Dissipation by drag in the step that ends at u: N mm, in the plane per mm of depth."""
         moving = self._terms.kinetic_energy(self._terms.velocity(u))
         return self._terms.dissipation(u) + 2.0 * moving
 
@@ -83,13 +83,13 @@ class Body:
 
     @cached_property
     def pattern(self) -> Pattern:
-        """Where the entries of the reduced tangent are."""
+        """Pattern of the reduced tangent."""
         dim = self.space.mesh.dim
         return Pattern(self.unknowns[self.space.nodes, 0] // dim, dim)
 
     @cached_property
     def drag(self) -> Drag:
-        """What holds the body back while it is released."""
+        """Drag of the body during a release."""
         return Drag(self.space, self.tissue.groups)
 
     def release(self, u: Floats, rate: float) -> None:
@@ -99,7 +99,7 @@ class Body:
             self.drag.begin(u, rate)
 
     def drag_dissipation(self, u: Floats) -> float:
-        """What drag dissipates in the step that ends at u: N mm, in the plane per mm of depth."""
+        """Dissipation by drag in the step that ends at u: N mm, in the plane per mm of depth."""
         return self.drag.dissipation(u) if self.drag_rate > 0.0 else 0.0
 
     def reduce(self, nodal: Floats) -> Floats:

@@ -59,7 +59,7 @@ def _known(part: Array | None, name: str) -> Array:
 
 @dataclass(frozen=True)
 class Parts:
-    """Which parts of a displacement in `dim` dimensions a form uses."""
+    """Parts of a displacement in `dim` dimensions that a form uses."""
 
     dim: int
     value: bool = False

@@ -62,11 +62,9 @@ def _first_invariant(F: Array) -> Array:
 
 
 class _InvariantLaw:
-    """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln
-    J.
+    """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln J.
 
-    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and
-    `_slopes`.
+    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and `_slopes`.
     """
 
     volume_measure: Literal["log", "trace"] = "log"

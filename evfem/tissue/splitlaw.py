@@ -44,7 +44,7 @@ Turn = Callable[[float], tuple[Array, Array]]
 
 @runtime_checkable
 class SplitLaw(Protocol):
-    """What elements ask of a law; `split` gives it to every other law."""
+    """A law in split form, as elements use it; `split` gives it to every other law."""
 
     volume_measure: Literal["log", "trace"]
 

@@ -1,4 +1,4 @@
-"""What contact needs of a surface, for surfaces of the user's own that only have a height."""
+"""Completes a user's surface that only has a height: slope, curvature, friction for contact."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What a scene says, but hardly means.
+"""Warnings about valid but implausible input.
 
-`doubts` says in a sentence each what may be meant, but hardly is: units, fields that no insulator
-withstands, slides that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
+`implausible` gives one sentence each: other units, fields beyond the breakdown of insulators, slides
+that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import way
+from evfem.planning.resolution import path_points
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
 from evfem.tissue.laws import NeoHookean
@@ -48,8 +48,10 @@ HEAVIEST = 100.0
 WAY_STEP = 0.02
 
 
-def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for what may be meant, but hardly is; `moduli` are the materials' shear moduli (MPa)."""
+def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
+    """One sentence per valid but implausible input of a scene; `moduli` are the shear moduli (MPa) of
+    the materials.
+    """
     lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
     return (
         *_hard(scene, mesh, moduli),
@@ -200,6 +202,6 @@ def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
         return False
     surface: Any = scene.ground
     if not surface.is_flat:
-        gap -= float(np.ptp(surface.height(way(scene, mesh, WAY_STEP))))
+        gap -= float(np.ptp(surface.height(path_points(scene, mesh, WAY_STEP))))
         return gap > 0.0
     return True
