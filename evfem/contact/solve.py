@@ -118,9 +118,12 @@ def solve_with_attraction(
 ) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted, started from statuses (k,) and forces (m,).
 
-    If the attraction weakens faster than the tissue stiffens, its negative stiffness is scaled to `STABLE` of
-    the critical value, right in small steps: of the body held by its closed nodes, then by those that do not
-    keep changing, at last by none. Friction is taken by its tangents first, then by its chords.
+    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
+    linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
+    `STABLE` of the critical value, which gives small steps in the right direction: the critical value
+    with the closed nodes fixed, then with those fixed that no longer change, at last with all nodes
+    free. Friction is linearised by tangents first, then by chords: the tangent of a law that levels
+    off soon may be so steep that there is no solution.
     """
     laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:
