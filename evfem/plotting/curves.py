@@ -96,9 +96,26 @@ def _changes(values: Floats) -> bool:
 def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
 
-    `over` is step, position, time, indentation, voltage or applied_force; None takes what all motions change:
-    the indentation for presses alone, the position for slides, the voltage for ramps; the time if the finger
-    waits, else the step, with the motions marked. A force that is 0 throughout is left out.
+    Parameters
+    ----------
+    result
+        A result; a force that is 0 throughout is left out.
+    over
+        step, position, time, indentation, voltage or applied_force. None: the quantity that all
+        motions change (presses: indentation, slides: position, ramps: voltage), the time if the
+        finger waits, else the step, with the motions marked.
+    ax
+        Axes to draw in; None: new ones.
+
+    Returns
+    -------
+    Axes
+        The axes of the curves.
+
+    Raises
+    ------
+    InputError
+        Another `over`.
     """
     return _of_one_kind(ax, result, FORCES, "applied_force", over)
 

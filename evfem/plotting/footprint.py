@@ -46,13 +46,34 @@ def footprint(
     vmin: float | None = None,
     vmax: float | None = None,
 ) -> Axes:
-    """The skin of a finger in three dimensions seen from below, coloured by a field: `gap`,
-    `contact_pressure`, `shear_traction` (its magnitude), `electrostatic_traction` or
-    `contact_status`, in true proportions.
+    """The skin of a finger in three dimensions from below, coloured by a field, in true proportions.
 
-    `near="contact"` is a close-up of what touches, or of the smallest gap; a window (left, right,
-    lower, upper) of x and z in mm shows that. Colours go from `vmin` to `vmax`, by default over what
-    is shown. Returns the axes; raises InputError for another field or frame, and for a plane finger.
+    Parameters
+    ----------
+    result
+        A result of a finger in three dimensions.
+    field
+        `gap`, `contact_pressure`, `shear_traction` (its magnitude), `electrostatic_traction` or
+        `contact_status`.
+    frame
+        Index in `result.frames`.
+    ax
+        Axes to draw in; None: new ones.
+    near
+        "contact": a close-up of the contact, or of the smallest gap. A window (left, right, lower,
+        upper) of x and z in mm. None: the whole skin.
+    vmin, vmax
+        Range of the colours; None: that of the values shown.
+
+    Returns
+    -------
+    Axes
+        The axes of the picture.
+
+    Raises
+    ------
+    InputError
+        Another field or frame, or a plane finger.
     """
     if field not in POINT_FIELDS:
         raise InputError("field", quoted(field), " | ".join(POINT_FIELDS))

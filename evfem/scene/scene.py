@@ -260,7 +260,7 @@ def _check_hand(scene: Scene) -> None:
     if not isinstance(hand, Hand):
         raise InputError("hand", quoted(hand), "a Hand, or None")
     if isinstance(scene.voltage, FollowForce):
-        raise InputError("hand", "a hand beside a wished friction force", "one of the two")
+        raise InputError("hand", "a hand together with a target friction force", "one of the two")
     if hand.timed:
         _check_speeds(scene, "a hand that has a damping or a mass")
 

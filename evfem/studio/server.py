@@ -92,7 +92,7 @@ class Handler(BaseHTTPRequestHandler):
         self._answered(self._get)
 
     def do_POST(self) -> None:
-        """What the page asks."""
+        """Requests of the page."""
         self._answered(self._post)
 
     def _answered(self, what: Callable[[], None]) -> None:

@@ -100,7 +100,7 @@ class Texture:
 
     @property
     def length(self) -> float:
-        """What the rows cover (mm), one period of a texture that repeats; 0 for a spectrum."""
+        """Length of the rows (mm), one period of a texture that repeats; 0 for a spectrum."""
         if self.quantity == "friction_spectrum":
             return 0.0
         return float(self.x[-1] - self.x[0]) if self.period is None else self.period
@@ -132,7 +132,7 @@ class Texture:
         return x, values, 2.0 * float(self.x[-1] - self.x[0])
 
     def document(self, data: str) -> dict[str, Any]:
-        """What stands in its `.json`, whose rows are in the file `data`."""
+        """Content of its `.json`, whose rows are in the file `data`."""
         header, units = QUANTITIES[self.quantity]
         return {
             "format": FORMAT,
@@ -148,7 +148,7 @@ class Texture:
         }
 
     def rows(self) -> str:
-        """What stands in its `.csv`."""
+        """Content of its `.csv`."""
         header = QUANTITIES[self.quantity][0]
         return csv_text([header, *zip(self.x.tolist(), self.values.tolist(), strict=True)])
 
