@@ -1,5 +1,7 @@
 """How the site is built: `sphinx-build -W docs build/docs`, then open `build/docs/index.html`."""
 
+from sphinx.ext.napoleon import Config, NumpyDocstring
+
 import evfem
 
 for name in evfem.__all__:
@@ -32,3 +34,15 @@ html_static_path = ["_static"]
 html_css_files = ["site.css", "gallery.css"]
 html_show_copyright = False
 html_copy_source = False
+
+
+def sections(app, what, name, obj, options, lines):
+    """Sections Parameters, Returns, Raises, Examples of functions and classes; as an extension
+    napoleon would take the first words of an attribute's docstring for its type.
+    """
+    if what in ("class", "exception", "function", "method"):
+        lines[:] = NumpyDocstring(lines, Config(), app, what, name, obj, options).lines()
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", sections)

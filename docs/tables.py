@@ -11,7 +11,7 @@ from evfem.scene import schema as scenes
 from evfem.scene.schema import Entry, Section
 from evfem.simulation.history import MEANINGS
 from evfem.simulation.result import COLUMNS, UNITS
-from evfem.sweeps import schema as sweeps
+from evfem.sweeps import file as sweeps
 from evfem.textures.importers import IMPORTERS
 
 DOCS = Path(__file__).parent

@@ -9,6 +9,7 @@ Names are loaded when they are first used, so that the laws cost neither scikit-
 '4.703e-05 MPa'
 """
 
+import sys as _sys
 from importlib import import_module as _import_module
 from typing import Any
 
@@ -30,15 +31,7 @@ _NAMES = {
     "surface.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
     "surface.textures": ("Grating", "SelfAffine"),
     "electrostatics.dielectrics": ("Dielectric", "DielectricTable"),
-    "electrostatics.laws": (
-        "FILM",
-        "Kaczmarek",
-        "Layer",
-        "Layers",
-        "StrongTroxel",
-        "TOUCHSCREEN",
-        "eps_0",
-    ),
+    "electrostatics.laws": ("FILM", "Kaczmarek", "Layer", "Layers", "StrongTroxel", "TOUCHSCREEN", "eps_0"),
     "electrostatics.roughness": ("ConstantRoughness", "ExponentialRoughness", "PowerRoughness"),
     "electrostatics.signalfile": ("Playback", "read_signal", "write_signal"),
     "electrostatics.signals": ("Amplifier", "FollowForce", "VoltageProfile"),
@@ -100,6 +93,21 @@ _GONE = dict.fromkeys(
 )
 
 __all__ = sorted([*_HOME, *_MODULES])
+
+
+class _Moved:
+    """Asked last, for a module that is nowhere: one that moved since 0.2 says its new place."""
+
+    @staticmethod
+    def find_spec(name: str, path: Any = None, target: Any = None) -> None:
+        """Raises `ModuleNotFoundError` for a name of `data/moved.csv`."""
+        if name.startswith(f"{__name__}."):
+            with open(f"{__path__[0]}/data/moved.csv", encoding="utf-8") as file:
+                if place := dict(line.strip().split(",") for line in file).get(name):
+                    raise ModuleNotFoundError(f"{name} has moved in 0.3; its new place: {place}")
+
+
+_sys.meta_path.append(_Moved)
 
 
 def __getattr__(name: str) -> Any:

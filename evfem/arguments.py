@@ -1,6 +1,4 @@
-"""The arguments of the command `evfem`: all commands and options, and mistakes in them as one
-sentence.
-"""
+"""The arguments of the command `evfem`: all commands and options, and mistakes in them as one sentence."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import evfem
 from evfem.common import notices
@@ -38,16 +36,18 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _meant(message: str) -> str:
-    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run',
-    ...)".
-    """
+    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run', ...)"."""
     found = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
     close = get_close_matches(found[1], re.findall(r"\w+", found[2]), 1) if found else []
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def _complete(argument: argparse.Action, how: dict[str, str]) -> None:
-    argument.complete = how  # type: ignore[attr-defined]
+def _path(
+    command: argparse.ArgumentParser, name: str, metavar: str, how: dict[str, str] = FILES, **more: Any
+) -> None:
+    """An argument that a shell completes."""
+    given = command.add_argument(name, metavar=metavar, **{"type": Path, **more})
+    given.complete = how  # type: ignore[attr-defined]
 
 
 def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
@@ -79,10 +79,7 @@ def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
 
 
 def _scene_argument(command: argparse.ArgumentParser) -> None:
-    file = command.add_argument(
-        "scene", nargs="?", type=Path, metavar="SCENE.toml", help="default: the built-in scene"
-    )
-    _complete(file, FILES)
+    _path(command, "scene", "SCENE.toml", nargs="?", help="default: the built-in scene")
 
 
 def _run_options(run: argparse.ArgumentParser) -> None:
@@ -95,8 +92,7 @@ def _run_options(run: argparse.ArgumentParser) -> None:
 
 def _study_options(study: argparse.ArgumentParser) -> None:
     study.add_argument("names", nargs="+", metavar="NAME", help=_study_names())
-    out = study.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder; default: here")
-    _complete(out, FOLDERS)
+    _path(study, "--out", "DIR", FOLDERS, default=Path(), help="folder; default: here")
     study.add_argument("--quick", action="store_true", help="coarser and shorter")
     drawn = study.add_argument_group("campaign alone", "scenes drawn at random")
     drawn.add_argument("--scenes", type=int, metavar="N", help="how many; default: 300, 6 with --quick")
@@ -107,17 +103,11 @@ def _study_options(study: argparse.ArgumentParser) -> None:
 
 def _mesh_options(mesh: argparse.ArgumentParser) -> None:
     _scene_argument(mesh)
-    target = mesh.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh"
-    )
-    _complete(target, FILES)
+    _path(mesh, "--out", "FILE", required=True, help="file to write, .vtu or .msh")
 
 
 def _results(command: argparse.ArgumentParser) -> None:
-    out = command.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder for the results; default: ./NAME-out"
-    )
-    _complete(out, FOLDERS)
+    _path(command, "--out", "DIR", FOLDERS, help="folder for the results; default: ./NAME-out")
 
 
 def _pool(command: argparse.ArgumentParser) -> None:
@@ -143,31 +133,19 @@ def _study_names() -> str:
 
 
 def _sweep_options(sweep: argparse.ArgumentParser) -> None:
-    file = sweep.add_argument(
-        "sweep", type=Path, metavar="SWEEP.toml", help="what is varied, and in which scene"
-    )
-    _complete(file, FILES)
+    _path(sweep, "sweep", "SWEEP.toml", help="what is varied, and in which scene")
     _results(sweep)
     _again(sweep, "keep the points of another sweep in the folder", "remove all points that are there")
     _pool(sweep)
 
 
 def _signal_options(voltage: argparse.ArgumentParser) -> None:
-    file = voltage.add_argument("file", type=Path, metavar="VOLTAGE", help="signal to read, .csv or .wav")
-    out = voltage.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="file to write; its ending says as what"
-    )
-    for path in (file, out):
-        _complete(path, FILES)
+    _path(voltage, "file", "VOLTAGE", help="signal to read, .csv or .wav")
+    _path(voltage, "--out", "FILE", required=True, help="file to write; its ending says as what")
     voltage.add_argument("--full-scale", type=float, metavar="V", help="largest voltage the file can hold")
     voltage.add_argument("--speed", type=float, metavar="MM/S", help="sliding speed, for .wav and .hjif")
-    voltage.add_argument(
-        "--friction",
-        type=float,
-        nargs=2,
-        metavar=("MU0", "MU1"),
-        help="coefficients at 0 V and at full scale, for .hjif",
-    )
+    said = "coefficients at 0 V and at full scale, for .hjif"
+    voltage.add_argument("--friction", type=float, nargs=2, metavar=("MU0", "MU1"), help=said)
     voltage.add_argument("--rate", type=int, default=48_000, metavar="HZ", help="of the .wav; default: 48000")
     voltage.add_argument("--carrier", type=float, metavar="HZ", help="sine that the .wav modulates")
     voltage.add_argument("--pixel", type=float, default=0.1, metavar="MM", help="of the .png; default: 0.1")
@@ -188,19 +166,11 @@ def _texture_options(texture: argparse.ArgumentParser) -> None:
 
 
 def _texture_argument(command: argparse.ArgumentParser) -> None:
-    name = command.add_argument("name", metavar="NAME", help="a reference texture, a .json or a folder")
-    _complete(name, FILES)
+    _path(command, "name", "NAME", type=str, help="a reference texture, a .json or a folder")
 
 
 def _about_texture(command: argparse.ArgumentParser) -> None:
-    out = command.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="a .json, whose .csv lies beside it, or a folder",
-    )
-    _complete(out, FILES)
+    _path(command, "--out", "FILE", required=True, help="a .json, whose .csv lies beside it, or a folder")
 
 
 def _make_options(make: argparse.ArgumentParser) -> None:
@@ -216,8 +186,7 @@ def _make_options(make: argparse.ArgumentParser) -> None:
 def _import_options(command: argparse.ArgumentParser) -> None:
     from evfem.textures.importers import IMPORTERS
 
-    file = command.add_argument("file", type=Path, metavar="FILE", help=".csv, .wav, an image or a scan")
-    _complete(file, FILES)
+    _path(command, "file", "FILE", help=".csv, .wav, an image or a scan")
     _about_texture(command)
     _fields(command, *IMPORTERS.values())
 
@@ -244,12 +213,8 @@ def _touch_options(command: argparse.ArgumentParser) -> None:
 
     _texture_argument(command)
     _fields(command, Touch)
-    out = command.add_argument("--out", type=Path, metavar="FILE", help="csv file for the friction curve")
-    signal = command.add_argument(
-        "--signal", type=Path, metavar="FILE", help="file for the display's voltage; its ending says as what"
-    )
-    for path in (out, signal):
-        _complete(path, FILES)
+    _path(command, "--out", "FILE", help="csv file for the friction curve")
+    _path(command, "--signal", "FILE", help="file for the display's voltage; its ending says as what")
     _fields(command, Device, friction="display")
 
 
@@ -259,8 +224,7 @@ def _simulate_options(command: argparse.ArgumentParser) -> None:
 
 
 def _database_options(command: argparse.ArgumentParser) -> None:
-    out = command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for its points")
-    _complete(out, FOLDERS)
+    _path(command, "--out", "DIR", FOLDERS, required=True, help="folder for its points")
     _pool(command)
 
 
@@ -272,14 +236,12 @@ def _studio_options(studio: argparse.ArgumentParser) -> None:
 def _init_options(init: argparse.ArgumentParser) -> None:
     told = f"{' | '.join(TEMPLATES)}; default: display"
     init.add_argument("--template", metavar="NAME", choices=TEMPLATES, default="display", help=told)
-    file = init.add_argument("file", nargs="?", type=Path, metavar="FILE", help="default: NAME.toml")
-    _complete(file, FILES)
+    _path(init, "file", "FILE", nargs="?", help="default: NAME.toml")
 
 
 def _schema_options(schema: argparse.ArgumentParser) -> None:
     schema.add_argument("of", nargs="?", choices=("scene", "sweep"), default="scene", help="default: scene")
-    out = schema.add_argument("--out", type=Path, metavar="FILE", help="file to write instead of printing")
-    _complete(out, FILES)
+    _path(schema, "--out", "FILE", help="file to write instead of printing")
 
 
 def studies() -> ModuleType:

@@ -1,5 +1,4 @@
-"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command
-that needs it.
+"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command that needs it.
 
 Exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk or folder
 failed, 130 interrupted.
@@ -94,14 +93,12 @@ def _of(file: Path | None, message: object) -> str:
 
 
 def _warner(file: Path | None) -> Callable[..., None]:
-    """What shows a warning: one line for a person, without the place in the code."""
+    """Shows a warning in one line, without its place in the code."""
     return lambda message, *place, **more: notices.tell(f"warning: {_of(file, message)}")
 
 
 def _silence() -> None:
-    """Throw away what is left to print, so that the interpreter does not try once more when it
-    ends.
-    """
+    """Throw away what is left to print, so that the interpreter does not try once more when it ends."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -150,7 +147,7 @@ def _kind(path: Path) -> str:
 
 
 def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
-    """What a command of `evfem.arguments.parser` does."""
+    """Runs a command of `evfem.arguments.parser`."""
     return {
         None: _help,
         "run": _run,
@@ -183,7 +180,7 @@ def _init(given: argparse.Namespace) -> int:
 
 def _schema(given: argparse.Namespace) -> int:
     from evfem.scene import schema as scenes
-    from evfem.sweeps import schema as sweeps
+    from evfem.sweeps import file as sweeps
 
     found = scenes.schema() if given.of == "scene" else sweeps.schema()
     text = json.dumps(found, indent=2)
@@ -259,9 +256,7 @@ def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
 
 
 class _Interruption:
-    """Ctrl-C or a request to end: ends the run at once, or at the end of the step where Python
-    drops what is raised, as it does in a `__del__`.
-    """
+    """Ctrl-C ends the run at once, or with the step where Python drops what is raised (in a `__del__`)."""
 
     def __init__(self) -> None:
         self.met = False
@@ -329,7 +324,7 @@ def _study(given: argparse.Namespace) -> int:
 
 
 def _sample(given: argparse.Namespace) -> Any:
-    """Which scenes are drawn; None where nothing is said."""
+    """Scenes that are drawn; None if not given."""
     said = {name: getattr(given, name) for name in ("scenes", "seed", "workers", "limit")}
     said = {name: value for name, value in said.items() if value is not None}
     return studies().Sample(**said) if said else None

@@ -179,8 +179,7 @@ class Mistakes:
 class NotConverged(EvfemError, RuntimeError):
     """A step was not solved; everything up to the last good step is kept in `result`.
 
-    `step` counts from 1; `residuals` is the history of the last attempt (relative to the largest
-    reaction).
+    `step` counts from 1; `residuals` is the history of the last attempt (relative to the largest reaction).
     """
 
     def __init__(self, step: int, residuals: list[float], advice: str, result: object = None) -> None:

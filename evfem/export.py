@@ -184,10 +184,9 @@ def frame_in(path: str | Path, row: Row, mesh: Mesh) -> Frame:
 class ParaViewSeries:
     """Writes a series while a run goes on: an observer of `evfem.simulation.run`, or fed by `add`.
 
-    Files are named after the index: fields.pvd, fields_00001.vtu, ... The value of an entry is the
-    time if time passes, else the position; see `instants`. `earlier` rows belong to a run that is
-    continued: their .vtu files, where present, stay in the index. `single` and `compressed` as in
-    `write_frame`; with `skin` the files hold the pad's surface alone.
+    Files are named after the index: fields.pvd, fields_00001.vtu, ... An entry's value is the time if time
+    passes, else the position (`instants`). Files of `earlier` rows, of a run that is continued, stay in the
+    index. `single` and `compressed` as in `write_frame`; with `skin` the pad's surface alone.
     """
 
     def __init__(
@@ -207,7 +206,7 @@ class ParaViewSeries:
         self._rows = [row for row in earlier if self.frame_path(int(row["step"])).exists()]
 
     def frame_path(self, step: int) -> Path:
-        """Where the fields of a step go."""
+        """File of the fields of a step."""
         return self.path.with_name(f"{self.path.stem}_{step:05d}.vtu")
 
     def started(self, mesh: Mesh, scene: object, total_steps: int) -> None:

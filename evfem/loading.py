@@ -19,13 +19,35 @@ FAST_MODEL = "evfem-reduced-1"
 
 
 def load(path: str | Path) -> Found:
-    """What is in a file or folder: the `Result` that `evfem run` left in its folder, a `Result`
-    (as its `save` wrote it, under any name), a `FitResult` (.json), a `VoltageProfile` (.csv, .wav)
-    or `Sampled` (.csv over time), a `Scene` or a `Sweep` (.toml), a `Mesh` (.vtu, .msh), a `Texture`
-    (.json with its .csv, or their folder).
+    """Read any file or folder of evfem.
 
-    Raises InputError for any other or a damaged file, StorageError when the disk refuses.
+    Parameters
+    ----------
+    path
+        A file or folder; its content decides what is returned.
 
+    Returns
+    -------
+    Result
+        From the folder of `evfem run`, or a file of `Result.save` under any name.
+    FitResult, Texture
+        From .json; a texture with its .csv, or from their folder.
+    VoltageProfile, Sampled
+        From .csv or .wav; `Sampled` from a .csv over time.
+    Scene, Sweep
+        From .toml.
+    Mesh
+        From .vtu or .msh.
+
+    Raises
+    ------
+    InputError
+        Another kind of file, or a damaged one.
+    StorageError
+        The file cannot be read.
+
+    Examples
+    --------
     >>> import evfem as ev
     >>> ev.VoltageProfile([0.0, 5.0], [100.0, 400.0]).to_csv("ramp.csv")
     >>> load("ramp.csv")(2.5)

@@ -1,5 +1,4 @@
-"""Parts of your own: any object with the right method is a law, a material, a surface, a form or
-an observer.
+"""Parts of your own: any object with the right method is a law, a material, a surface, a form or an observer.
 
 Nothing is inherited and nothing registered; the object goes where the package's own goes. What is
 called optional may be there or not. Arrays have any trailing shape; a method that takes complex
@@ -34,8 +33,7 @@ class ForceLaw(Protocol):
     """
 
     def traction(self, gap: Any, voltage: Any, layers: Any) -> Any:
-        """Attraction in MPa, positive when it attracts, at gaps in mm (positive when open) and
-        voltages in V.
+        """Attraction in MPa, positive when it attracts, at gaps in mm (positive when open) and voltages in V.
 
         `layers.reduced` is the sum of thickness / permittivity of the solid layers,
         `layers.thickness` that of their thicknesses, in mm. Complex-safe, or it is differenced.
@@ -60,31 +58,24 @@ class StressLaw(Protocol):
     """A material by its stress. Optional: `psi` too, `viscosity` in s, `density` in t/mm3."""
 
     def P(self, F: Any) -> Any:
-        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at the deformation gradient F (3, 3,
-        ...).
-        """
+        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at the deformation gradient F (3, 3, ...)."""
 
 
 @runtime_checkable
 class EnergyLaw(Protocol):
-    """A material by its energy alone; stress and tangent are derived, so `psi` must be
-    complex-safe.
-    """
+    """A material by its energy alone; stress and tangent are derived, so `psi` must be complex-safe."""
 
     def psi(self, F: Any) -> Any:
         """Energy per reference volume (...) in MPa at the deformation gradient F (3, 3, ...)."""
 
 
 class WeakForm(Protocol):
-    """What `evfem.form` marks as a weak form: a function, or any object that can be called like
-    one.
-    """
+    """What `evfem.form` marks as a weak form: a function, or any object that can be called like one."""
 
     def __call__(self, u: Any, v: Any, w: Any) -> Any:
-        """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with
-        gradients (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on
-        a boundary. Over a region also `u.theta` and `v.theta`, the element's volume change, and
-        `w.law`, its material.
+        """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with gradients
+        (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary. Over a
+        region also `u.theta` and `v.theta`, the element's volume change, and `w.law`, its material.
         """
 
 
@@ -107,7 +98,7 @@ class Surface(Protocol):
 
 @runtime_checkable
 class CompleteSurface(Surface, Protocol):
-    """Everything that contact asks of a surface; `evfem.surface.own.completed` gives it to any
+    """Everything that contact asks of a surface; `evfem.surface.usersurface.completed` gives it to any
     `Surface`.
     """
 
@@ -129,9 +120,7 @@ class CompleteSurface(Surface, Protocol):
 
     @property
     def friction_jumps(self) -> Any:
-        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from
-        there on.
-        """
+        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on."""
 
     def slope(self, x: Any) -> Any:
         """Derivative of the height."""
@@ -173,9 +162,7 @@ class TimeSignal(Protocol):
 
     @property
     def highest_frequency(self) -> float:
-        """Frequency (Hz) up to which the voltage has content, 0 for a constant; the steps must
-        resolve it.
-        """
+        """Frequency (Hz) up to which the voltage has content, 0 for a constant; the steps must resolve it."""
 
     def __call__(self, time: Any) -> Any:
         """Voltage (V) at times in s (any shape), 0 being the start of the run."""
@@ -189,14 +176,10 @@ class Starting(Protocol):
 
 
 class Stepping(Protocol):
-    """An observer that is told of every converged step, and may end the run by raising
-    `evfem.StopRun`.
-    """
+    """An observer that is told of every converged step, and may end the run by raising `evfem.StopRun`."""
 
     def step(self, row: Mapping[str, Any], frame: Any, checkpoint: Callable[[], dict[str, Any]], /) -> None:
-        """`row` is the step's row of the history, `frame` its fields (None on steps without),
-        `checkpoint()` gives the arrays to resume from.
-        """
+        """`row` of the history, `frame` its fields or None, `checkpoint()` gives arrays to resume from."""
 
 
 class Finishing(Protocol):

@@ -1,10 +1,8 @@
-"""Closed-form solutions with their sources: to check a simulation by, or to answer a question
-without one.
+"""Closed-form solutions with their sources: to check a simulation by, or to answer a question without one.
 
-Units: mm, N, MPa, V; forces of plane problems per mm of depth (N/mm). E* = E / (1 - nu^2) is the
-plane-strain modulus of an elastic body against a rigid one; for two elastic bodies 1/E* is the sum
-of (1 - nu^2)/E. "Johnson" is K. L. Johnson, Contact Mechanics, Cambridge University Press 1985,
-doi:10.1017/CBO9781139171731.
+Units: mm, N, MPa, V; forces of plane problems per mm of depth (N/mm). E* = E / (1 - nu^2) is the plane-strain
+modulus of an elastic body against a rigid one; for two elastic bodies 1/E* is the sum of (1 - nu^2)/E.
+"Johnson" is K. L. Johnson, Contact Mechanics, Cambridge University Press 1985, doi:10.1017/CBO9781139171731.
 """
 
 from __future__ import annotations
@@ -39,9 +37,8 @@ def plane_modulus(E: float, nu: float) -> float:
 class HertzLine:
     """A long cylinder of `radius` (mm) pressed on a half-space by `load` (N/mm), without friction.
 
-    a = sqrt(4 P' R / (pi E*)), p0 = 2 P' / (pi a), p(x) = p0 sqrt(1 - (x/a)^2). `modulus` is E*
-    (MPa). Source: H. Hertz, J. reine angew. Math. 92 (1882) 156-171; Johnson, equations (4.43) to
-    (4.45).
+    a = sqrt(4 P' R / (pi E*)), p0 = 2 P' / (pi a), p(x) = p0 sqrt(1 - (x/a)^2). `modulus` is E* (MPa).
+    Source: H. Hertz, J. reine angew. Math. 92 (1882) 156-171; Johnson, equations (4.43) to (4.45).
 
     >>> contact = HertzLine(load=math.pi, radius=1.0, modulus=4.0)
     >>> contact.half_width, contact.peak_pressure
@@ -77,8 +74,7 @@ class HertzLine:
 
 @dataclass(frozen=True)
 class CattaneoMindlin:
-    """The Hertz contact `normal` under a load Q (`tangential`, N/mm) that grew while the normal
-    one was held.
+    """The Hertz contact `normal` under a load Q (`tangential`, N/mm) that grew while the normal one was held.
 
     With friction coefficient mu and Q < mu P' the middle strip abs(x) < c sticks, c/a = sqrt(1 -
     Q/(mu P')), and q(x) = mu p0 (sqrt(1 - (x/a)^2) - (c/a) sqrt(1 - (x/c)^2)), the second root
@@ -116,8 +112,7 @@ class CattaneoMindlin:
 
 @dataclass(frozen=True)
 class BondedLayer:
-    """A rigid cylinder of `radius` on an elastic layer of `thickness` (mm), bonded to a rigid base
-    below.
+    """A rigid cylinder of `radius` on an elastic layer of `thickness` (mm), bonded to a rigid base below.
 
     No friction between cylinder and layer, small strain. The contact is 2 `half_width` (mm) wide;
     E (MPa) and nu are the layer's. A pressure of wave number k on the layer moves its surface by 2
@@ -125,8 +120,7 @@ class BondedLayer:
 
         M(s) = (2 kappa sinh 2s - 4 s) / (2 kappa cosh 2s + 1 + kappa^2 + 4 s^2).
 
-    With p(x) = sqrt(1 - xi^2) sum of c_n U_2n(xi), xi = x/a, the slope -x/R of the punch gives at
-    abs(xi) < 1
+    With p(x) = sqrt(1 - xi^2) sum of c_n U_2n(xi), xi = x/a, the slope -x/R of the punch gives at abs(xi) < 1
 
         (2/E*) sum of c_n [T_(2n+1)(xi) - (-1)^n (2n+1) integral over s > 0 of (1 - M(s h/a)) J_(2n+1)(s)
         sin(s xi)/s ds] = a xi / R,
@@ -223,13 +217,11 @@ class BondedLayer:
 
 
 def tube_pressure(inner_radius: Array, inner: float, outer: float, mu: float) -> Array:
-    """Pressure (MPa) that widens an incompressible neo-Hookean tube to `inner_radius`, in plane
-    strain.
+    """Pressure (MPa) that widens an incompressible neo-Hookean tube to `inner_radius`, in plane strain.
 
-    p/mu = ln(B a / (A b)) + (a^2 - A^2)/2 (1/a^2 - 1/b^2), b^2 = B^2 + a^2 - A^2, for radii A
-    (`inner`), B (`outer`) at rest and a, b under pressure in mm; mu in MPa. It is the integral of
-    mu (l^2 - l^-2)/r over the wall, l = r/R the hoop stretch. Source: R. S. Rivlin, Phil. Trans.
-    R. Soc. A 242 (1949) 173-195.
+    p/mu = ln(B a / (A b)) + (a^2 - A^2)/2 (1/a^2 - 1/b^2), b^2 = B^2 + a^2 - A^2, for radii A (`inner`), B
+    (`outer`) at rest and a, b under pressure in mm; mu in MPa. It is the integral of mu (l^2 - l^-2)/r over
+    the wall, l = r/R the hoop stretch. Source: R. S. Rivlin, Phil. Trans. R. Soc. A 242 (1949) 173-195.
 
     >>> round(float(tube_pressure(1.5, inner=1.0, outer=2.0, mu=1.0)), 10)
     0.4282284091
@@ -243,8 +235,7 @@ def tube_pressure(inner_radius: Array, inner: float, outer: float, mu: float) ->
 
 
 def tube_inner_radius(pressure: float, inner: float, outer: float, mu: float) -> float:
-    """Inner radius (mm) of the tube of `tube_pressure` under `pressure` (MPa), 0 to below mu
-    ln(outer/inner).
+    """Inner radius (mm) of the tube of `tube_pressure` under `pressure` (MPa), 0 to below mu ln(outer/inner).
 
     >>> round(tube_inner_radius(0.4282284091, inner=1.0, outer=2.0, mu=1.0), 8)
     1.5
@@ -264,8 +255,7 @@ def tube_inner_radius(pressure: float, inner: float, outer: float, mu: float) ->
 
 
 def cylinder_force(distance: Array, radius: float, voltage: Array) -> Array:
-    """Attraction (N/mm) of a conducting cylinder and a conducting plane at `distance` (mm) in
-    vacuum.
+    """Attraction (N/mm) of a conducting cylinder and a conducting plane at `distance` (mm) in vacuum.
 
     F' = pi eps_0 U^2 / (sqrt(h^2 - R^2) arcosh(h/R)^2), h = R + d: minus the derivative by d of
     the energy, with the capacitance per length 2 pi eps_0 / arcosh(h/R). Source: W. R. Smythe,
@@ -284,9 +274,7 @@ def cylinder_force(distance: Array, radius: float, voltage: Array) -> Array:
 
 @dataclass(frozen=True)
 class PullIn:
-    """Where a plate on a spring snaps shut: `travel` (mm) from its place without voltage,
-    `voltage` (V).
-    """
+    """Where a plate on a spring snaps shut: `travel` (mm) from its place without voltage, `voltage` (V)."""
 
     travel: float
     voltage: float
@@ -296,10 +284,9 @@ def pull_in_strong_troxel(stiffness: float, gap: float, area: float, layers: Lay
     """Snap of a plate of `area` (mm^2) on a spring (N/mm), `gap` (mm) above solid `layers`, law
     `StrongTroxel`.
 
-    The force of the spring k x meets A p(g0 - x) for the last time at x = (g0 + s)/3, U = sqrt(8 k
-    (g0 + s)^3 / (27 eps_0 A)). It snaps only if x <= g0. Source: S. D. Senturia, Microsystem
-    Design, 2001, doi:10.1007/b117574, section 6.4, with the layers' reduced thickness s added to
-    the gap.
+    The force of the spring k x meets A p(g0 - x) for the last time at x = (g0 + s)/3, U = sqrt(8 k (g0 + s)^3
+    / (27 eps_0 A)). It snaps only if x <= g0. Source: S. D. Senturia, Microsystem Design, 2001,
+    doi:10.1007/b117574, section 6.4, with the layers' reduced thickness s added to the gap.
 
     >>> from evfem.electrostatics.laws import Layer
     >>> table_2 = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
@@ -338,10 +325,9 @@ def _pull_in(travel: float, gap: float, voltage: float) -> PullIn:
 def sliding_force_ratio(slope: Array, friction_coefficient: Array, direction: int = 1) -> Array:
     """F_t/F_n of a point that slides over a profile of the given `slope` y'(x), without inertia.
 
-    (mu + y') / (1 - mu y') towards +x, (-mu + y') / (1 + mu y') towards -x (`direction` -1); F_t
-    is the force along x and F_n that along y that must be applied. Infinite where mu times the
-    slope uphill reaches 1: the point jams. Source: balance of the forces n and mu n along normal
-    and tangent of the profile.
+    (mu + y') / (1 - mu y') towards +x, (-mu + y') / (1 + mu y') towards -x (`direction` -1); F_t is the force
+    along x and F_n that along y that must be applied. Infinite where mu times the slope uphill reaches 1: the
+    point jams. Source: balance of the forces n and mu n along normal and tangent of the profile.
 
     >>> float(sliding_force_ratio(0.0, 0.3)), float(sliding_force_ratio(0.5, 1.0))
     (0.3, 3.0)

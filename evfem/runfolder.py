@@ -1,11 +1,9 @@
-"""The folder of a run: history, fields, summary, picture and checkpoint, complete after every
-step.
+"""The folder of a run: history, fields, summary, picture and checkpoint, complete after every step.
 
-Every file is replaced in one step, so that a run killed at any moment leaves whole files and a
-checkpoint to go on from; what it was writing stays behind under a temporary name and is removed by
-the next run. Only files that evfem wrote are ever replaced or removed: the folder's `.evfem-files`
-lists their names (`evfem.common.listed`). `kept` and `saved` say what of an earlier run is
-there to go on from.
+Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint to
+go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only files
+that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names
+(`evfem.common.manifest`). `kept` and `saved` say what of an earlier run is there to go on from.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from evfem.common.listed import Listed
+from evfem.common.manifest import Manifest
 from evfem.common.notices import LOG
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
@@ -60,11 +58,9 @@ LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
 
 @dataclass
 class RunFolder:
-    """An observer of `evfem.simulation.run` that keeps a folder up to date; it writes from the
-    first step on.
+    """An observer of `evfem.simulation.run` that keeps a folder up to date; it writes from the first step on.
 
-    `fields` and `plots` False leave the .vtu series and the picture out. `resume` is what `saved`
-    returned.
+    `fields` and `plots` False leave the .vtu series and the picture out. `resume` is what `saved` returned.
     """
 
     path: Path
@@ -107,8 +103,8 @@ class RunFolder:
         return Checkpoint(self.path / STATE)
 
     @cached_property
-    def _listed(self) -> Listed:
-        return Listed(self.path / MANIFEST, OURS)
+    def _manifest(self) -> Manifest:
+        return Manifest(self.path / MANIFEST, OURS)
 
     @property
     def begun(self) -> bool:
@@ -124,7 +120,7 @@ class RunFolder:
         if frame is not None and self._wants(row):
             self._add(row, frame)
         if not self.rows or self.rows[-1]["step"] != row["step"]:
-            with self._listed.writing(self.path / STATE):
+            with self._manifest.writing(self.path / STATE):
                 self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
             self.rows.append(row)
         self._write_history()
@@ -134,12 +130,12 @@ class RunFolder:
     def _add(self, row: Row, frame: Frame) -> None:
         assert self.mesh is not None
         for series in self._series:
-            with self._listed.writing(series.frame_path(row["step"])):
+            with self._manifest.writing(series.frame_path(row["step"])):
                 series.add(row, frame, self.mesh)
 
     def _write_index(self, several: Sequence[ParaViewSeries]) -> None:
         for series in several:
-            with self._listed.writing(series.path):
+            with self._manifest.writing(series.path):
                 series.write_index()
 
     def _wants(self, row: Row) -> bool:
@@ -148,7 +144,7 @@ class RunFolder:
     def _write_history(self) -> None:
         self._lines += [csv_line(row) for row in self.rows[len(self._lines) :]]
         header = csv_header(columns_of(self.rows[0])) if self.rows else csv_header()
-        with self._listed.writing(self.path / HISTORY):
+        with self._manifest.writing(self.path / HISTORY):
             write_text(self.path / HISTORY, header + "".join(self._lines))
 
     def close(self, result: Result | None) -> dict[str, Any]:
@@ -176,18 +172,16 @@ class RunFolder:
 
     def _write_summary(self, result: Result) -> dict[str, Any]:
         summary = result.summary()
-        with self._listed.writing(self.path / SUMMARY):
+        with self._manifest.writing(self.path / SUMMARY):
             write_text(self.path / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
         return summary
 
     def _draw(self, result: Result) -> None:
-        with self._listed.writing(self.path / PICTURE):
+        with self._manifest.writing(self.path / PICTURE):
             _picture(result if result.depth is None else result.total, self.path / PICTURE)
 
     def completed(self) -> str:
-        """Write what is missing in the folder of a finished run, as far as its checkpoint has it;
-        returns a sentence about it.
-        """
+        """Write what is missing in a finished run's folder, as far as its checkpoint has it; says what."""
         without = _without_fields(self.path) if self.fields else ""
         told = [f"the run in {self.path} is complete"]
         if written := self._complete():
@@ -231,10 +225,10 @@ class RunFolder:
         """Make the folder, remove an earlier run's files (or go on from them), start the history."""
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
-            self._listed = Listed(self.path / MANIFEST, OURS)  # anew, where a first try was interrupted
+            self._manifest = Manifest(self.path / MANIFEST, OURS)  # anew, where a first try was interrupted
             if not self.resume:
-                self._listed.remove()
-            self._listed.begin()
+                self._manifest.remove()
+            self._manifest.begin()
             _remove_left(self.path)
         self._series = self._paraview()
         self._write_history()
@@ -257,8 +251,7 @@ def saved(path: Path, scene: Scene) -> Saved | None:
     """The checkpoint of an interrupted run of `scene` in the folder `path`; None if a run began
     there, but was killed before its first step was stored.
 
-    Raises InputError where no run began, and for a damaged checkpoint or one of another scene or
-    version.
+    Raises InputError where no run began, and for a damaged checkpoint or one of another scene or version.
     """
     if (path / STATE).is_file():
         try:
@@ -271,11 +264,9 @@ def saved(path: Path, scene: Scene) -> Saved | None:
 
 
 def kept(path: Path, scene: Scene) -> Saved | None:
-    """The finished run of `scene` in the folder `path`; None where nothing is there that could be
-    lost.
+    """The finished run of `scene` in the folder `path`; None where nothing is there that could be lost.
 
-    Raises InputError where results of another scene are, or of a run of this one that is not
-    finished.
+    Raises InputError where results of another scene are, or of a run of this one that is not finished.
     """
     _refuse_others(path)
     if not (path / STATE).is_file() and _without_a_row(path / HISTORY):
@@ -352,7 +343,7 @@ def _without_a_row(history: Path) -> bool:
 
 def _refuse_others(path: Path) -> None:
     """InputError where a file has a name that a run writes, and evfem did not write it."""
-    manifest = Listed(path / MANIFEST, OURS).manifest  # what a kill left open in it is decided
+    manifest = Manifest(path / MANIFEST, OURS).path  # what a kill left open in it is decided
     refuse_others(manifest, _present(path), "evfem")
 
 
@@ -412,8 +403,7 @@ def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> st
 
 
 def chosen(rows: Sequence[Row], most: int) -> list[int]:
-    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its
-    last.
+    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its last.
 
     >>> chosen([{"motion_index": int(i > 3)} for i in range(104)], 6)
     [0, 2, 3, 36, 70, 103]

@@ -32,8 +32,7 @@ def text(template: str) -> str:
 def write(template: str, path: Path) -> list[Path]:
     """Write the scene of a template, and what it needs beside it; the files that were written.
 
-    Raises InputError, with nothing written, where one of them exists; StorageError when the disk
-    refuses.
+    Raises InputError, with nothing written, where one of them exists; StorageError when the disk refuses.
     """
     from evfem.common.storage import replacing
 

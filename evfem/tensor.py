@@ -34,9 +34,7 @@ def det(A: Array) -> Array:
 
 
 def cofactor(A: Array) -> Array:
-    """Cofactors of A (n, n, ...), n = 2 or 3: d det(A) / dA = det(A) A^-T, finite for singular A
-    too.
-    """
+    """Cofactors of A (n, n, ...), n = 2 or 3: d det(A) / dA = det(A) A^-T, finite for singular A too."""
     out = np.empty_like(A)
     if len(A) == 2:
         out[0, 0], out[1, 1] = A[1, 1], A[0, 0]
@@ -84,9 +82,7 @@ def ddot(A: Array, B: Array) -> Array:
 
 
 def mul(A: Array, B: Array) -> Array:
-    """A_ik B_kj of two matrices with equally many trailing axes, or A_ik b_k if B has one axis
-    less.
-    """
+    """A_ik B_kj of two matrices with equally many trailing axes, or A_ik b_k if B has one axis less."""
     subscripts = "ik...,kj...->ij..." if A.ndim == B.ndim else "ik...,k...->i..."
     return np.einsum(subscripts, A, B)
 
@@ -115,8 +111,7 @@ def positive_part(x: Array) -> Array:
 
 
 def symmetric_power(C: Array, exponent: float) -> Array:
-    """C^exponent of symmetric positive definite C (n, n, ...), by its eigenvalues and
-    eigenvectors.
+    """C^exponent of symmetric positive definite C (n, n, ...), by its eigenvalues and eigenvectors.
 
     An imaginary part of C is taken as a perturbation of first order (C may be stepped by
     `complex_step`, not be any complex matrix): in the eigenbasis its entries are multiplied by the
@@ -135,9 +130,7 @@ def symmetric_power(C: Array, exponent: float) -> Array:
 
 
 def _power_in_plane(C: Array, e: float) -> Array:
-    """The same in two dimensions, without a solver: C = m 1 + r [[c, s], [s, -c]] has the eigenvalues
-    m + r and m - r, and c and s turn into the eigenbasis and back.
-    """
+    """The same in two dimensions in closed form: C = m 1 + r [[c, s], [s, -c]] has eigenvalues m +- r."""
 
     def parts(A: Array) -> tuple[Array, Array, Array]:
         return 0.5 * (A[0, 0] + A[1, 1]), 0.5 * (A[0, 0] - A[1, 1]), A[0, 1]
@@ -171,13 +164,11 @@ def _divided_difference(values: Array, e: float) -> Array:
 
 
 def complex_step(function: Callable[..., Array], x: Array, *others: Any, rank: int = 0) -> Array:
-    """Exact derivative of a pointwise `function(x, *others)` by x, whose first `rank` axes are
-    tensor axes.
+    """Exact derivative of a pointwise `function(x, *others)` by x, whose first `rank` axes are tensor axes.
 
-    The derivative Im f(x + i h) / h needs no subtraction, so h = 1e-30 costs no digits. x must be
-    real; the function must work pointwise along the trailing axes, accept complex x and be
-    analytic in it. The result has the tensor axes of the function's value, then those of x, then
-    the trailing axes.
+    The derivative Im f(x + i h) / h needs no subtraction, so h = 1e-30 costs no digits. x must be real; the
+    function must work pointwise along the trailing axes, accept complex x and be analytic in it. The result
+    has the tensor axes of the function's value, then those of x, then the trailing axes.
 
     >>> float(complex_step(np.sin, np.array(0.0)))
     1.0
@@ -194,9 +185,8 @@ def complex_step(function: Callable[..., Array], x: Array, *others: Any, rank: i
 
 
 def difference(function: Callable[..., Array], x: Array, step: float, rank: int = 0) -> Array:
-    """The derivative as in `complex_step`, by central differences of sixth order: for functions
-    that are not analytic in code, or take complex steps themselves. Errors are of the order step^6
-    and rounding / step.
+    """The derivative as in `complex_step`, by central differences of sixth order: for functions that are not
+    analytic in code, or take complex steps themselves. Errors are of the order step^6 and rounding / step.
 
     >>> abs(float(difference(np.sin, np.array(0.0), 4e-3)) - 1.0) < 1e-14
     True
@@ -229,9 +219,7 @@ def derivative(function: Callable[[Array], Any], x: Array, step: float) -> Array
 
 
 def _columns(column: Callable[[tuple[int, ...]], Array], x: Array, rank: int) -> Array:
-    """Derivatives by each tensor component of x, their axes between those of the value and the
-    trailing.
-    """
+    """Derivatives by each tensor component of x, their axes between those of the value and the trailing."""
     shape, trailing = np.shape(x)[:rank], np.ndim(x) - rank
     columns = [column(index) for index in np.ndindex(shape)]
     axes = columns[0].ndim - trailing

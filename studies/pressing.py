@@ -13,7 +13,7 @@ import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.faces import layer_thickness
-from evfem.surface.edge import outline_nodes
+from evfem.surface.pad import outline_nodes
 
 from .common import LAWS, paper_display, side_by_side, table2_layers, tissue
 

@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices checks views pools digest storage listed tables pictures",
+        "arrays constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -28,8 +28,7 @@ ROOMS = {
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
-        "fields forms elements moduli splitlaw ogden laws kernels.blocks "
-        "space pattern assembly weakform userforms dynamics drag body",
+        "forms splitlaw ogden laws kernels.blocks space pattern assembly weakform userforms dynamics body",
     ),
     "finger": (
         {"numpy", "PIL"},
@@ -42,12 +41,12 @@ ROOMS = {
     ),
     "field": (
         {"numpy", "scipy", "skfem"},
-        "outlines bounds curves fieldmesh poisson rigid columncells columns meanpull",
+        "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "friction surfaces textures own pad edge skin"),
+    "surface": ({"numpy", "scipy"}, "friction surfaces textures usersurface pad skin"),
     "contact": (
         {"numpy", "scipy"},
-        "charging attraction fullfield drivenfield attracted signorini solve follower condensed stability",
+        "charging attraction fullfield drivenfield signorini solve follower condensed stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -56,11 +55,11 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics options scene keys written format schema file spatial",
+        "motion terms electrics options scene keys serialiser format schema file spatial",
     ),
     "planning": (
         {"numpy"},
-        "resolution drift partchecks parts sense fieldchoice core timescales way plan",
+        "resolution loaddrift partchecks parts plausibility fieldchoice core timescales pathdependence plan",
     ),
     "simulation": (
         {"numpy", "scipy"},
@@ -68,7 +67,7 @@ ROOMS = {
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
-        "samples file units schema folder run check",
+        "samples file folder run check",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
@@ -81,7 +80,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "labels figures ground fields finger footprint curves sweeps meshes movie",
+        "labels figures fields finger footprint curves sweeps meshes movie",
     ),
     "studio": ({"numpy"}, "state page runs server"),
 }
@@ -114,8 +113,7 @@ LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 MOST_FILES, MOST_LINES = 12, 3600
 #: folders that are still larger, with their own limits in files and lines: the list only shrinks
 LARGER = {
-    "solver": (18, 3700),
-    "tissue": (15, MOST_LINES),
+    "solver": (18, MOST_LINES),
 }
 #: lines by which a folder may be below its own limit before that must follow
 SLACK = 150

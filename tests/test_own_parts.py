@@ -17,7 +17,7 @@ import evfem as ev
 from evfem.errors import InputError
 from evfem.protocols import CompleteSurface, Observer, Surface
 from evfem.runfolder import RunFolder, saved
-from evfem.surface.own import completed
+from evfem.surface.usersurface import completed
 
 FLAT = ev.Flat(friction=0.3)
 PRESS, SLIDE = ev.Press(indentation=0.15, steps=2), ev.Slide(distance=0.5, steps=3)

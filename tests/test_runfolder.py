@@ -142,7 +142,7 @@ def kill(monkeypatch):
 
             return wrapped
 
-        changes = {Path: ("touch", "unlink", "write_text"), os: ("replace",), folder.Listed: ("_append",)}
+        changes = {Path: ("touch", "unlink", "write_text"), os: ("replace",), folder.Manifest: ("_append",)}
         for owner, names in changes.items():
             for name in names:
                 monkeypatch.setattr(owner, name, counted(getattr(owner, name)))

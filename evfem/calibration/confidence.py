@@ -1,10 +1,9 @@
 r"""How well a least-squares fit knows its unknowns, from the Jacobian of the residuals.
 
-With N residuals r, P unknowns z and J = dr/dz at the solution, the residuals' variance is
-s^2 = r.r / (N - P), the covariance of the unknowns s^2 (J^T J)^-1, and the interval of confidence
-c of an unknown is z -+ t se, se the root of its variance and t the quantile (1 + c) / 2 of
-Student's distribution with N - P degrees of freedom (Seber and Wild, Nonlinear Regression, 1989,
-doi:10.1002/0471725315, section 5.1).
+With N residuals r, P unknowns z and J = dr/dz at the solution, the residuals' variance is s^2 = r.r / (N -
+P), the covariance of the unknowns s^2 (J^T J)^-1, and the interval of confidence c of an unknown is z -+ t
+se, se the root of its variance and t the quantile (1 + c) / 2 of Student's distribution with N - P degrees of
+freedom (Seber and Wild, Nonlinear Regression, 1989, doi:10.1002/0471725315, section 5.1).
 
 This assumes that the model is right, that measured values err independently of each other, by the
 normal distribution and as much as their standard deviations say relative to each other, and that
@@ -32,7 +31,7 @@ UNDETERMINED, NAMED, CORRELATED, NOTHING = 1e-3, 0.1, 0.95, 1e-6
 
 @dataclass(frozen=True)
 class Confidence:
-    """What the Jacobian (N, P) and the residuals (N,) say about P unknowns."""
+    """Confidence intervals of P unknowns from the Jacobian (N, P) and the residuals (N,)."""
 
     errors: Floats
     correlation: Floats

@@ -60,17 +60,37 @@ def fit(
     workers: int | None = None,
     progress: bool = False,
 ) -> FitResult:
-    """Choose parameters of a scene so that its runs agree best with what was measured.
+    """Fit parameters of a scene to measurements by least squares.
 
-    `scene` is a `Scene` that a file can hold, or the path of a scene file; `data` a `MeasuredCurve`,
-    `MeasuredValues`, or several of them; `parameters` {dotted key of a scene file: (low, high)}, or
-    `Parameter(low, high, start, apply)` in place of the pair.
+    Parameters
+    ----------
+    scene
+        A `Scene` that a file can hold, or the path of a scene file.
+    data
+        A `MeasuredCurve`, `MeasuredValues`, or several of them.
+    parameters
+        {dotted key of a scene file: (low, high)}, or `Parameter(low, high, start, apply)` in place of
+        the pair.
+    out
+        Folder that keeps every run: the same fit, called again, continues an interrupted one.
+    workers
+        Number of processes; None: one per core, 1: this process only.
+    progress
+        Print a line per step of the fit.
 
-    `workers` processes (None: one for each core; 1: none but this one) run the scenes. The folder
-    `out` keeps every run: the same fit, called again, goes on where it was interrupted. `progress`
-    prints a line for each step of the fit. Raises InputError for what cannot be used, before
-    anything is computed as far as it can be known, and for a start at which the scene is not solved.
+    Returns
+    -------
+    FitResult
+        Values with 95 % intervals, residuals, and the parameters that the data do not determine.
 
+    Raises
+    ------
+    InputError
+        Input that cannot be used, mostly before anything is computed, or a start at which the scene
+        has no solution.
+
+    Examples
+    --------
     >>> from evfem.surface.surfaces import Display
     >>> from evfem.electrostatics.laws import Kaczmarek
     >>> from evfem.finger.fingerpad import FingerPad
@@ -159,7 +179,7 @@ class _Problem:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the fit came from, in plain values ready for JSON."""
+        """Provenance of the fit, in plain values ready for JSON."""
         return {
             "fit": self.name,
             **origin(),
@@ -170,7 +190,7 @@ class _Problem:
 
 
 def _scale(one: Measured) -> Floats:
-    """What the residuals of a measurement are divided by."""
+    """Scale of the residuals of a measurement."""
     if one.sd is not None:
         return np.asarray(one.sd)
     size = float(np.sqrt(np.mean(np.square(one.values))))
@@ -185,9 +205,7 @@ class _Residuals:
         self.failed = ""
 
     def predicted(self, points: Sequence[Floats]) -> list[Floats]:
-        """What the runs say in place of each measured value, at each of the points; NaN where a
-        scene is not solved.
-        """
+        """What the runs say for each measured value at each point; NaN where a scene is not solved."""
         problem = self.problem
         values = [problem.parameters.values(z) for z in points]
         texts = [[problem.text(keys, one) for keys, _ in problem.runs] for one in values]
@@ -272,16 +290,8 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
         raise InputError(
             "scene", f"one that cannot be run at the start: {residuals.failed}", "one that can be"
         )
-    found = least_squares(
-        residuals,
-        start,
-        residuals.jacobian,
-        bounds,
-        xtol=UNKNOWNS,
-        ftol=SQUARES,
-        gtol=1e-12,
-        max_nfev=MOST_STEPS,
-    )
+    ends = {"xtol": UNKNOWNS, "ftol": SQUARES, "gtol": 1e-12, "max_nfev": MOST_STEPS}
+    found = least_squares(residuals, start, residuals.jacobian, bounds, **ends)
     known = confidence(found.jac, found.fun, parameters.names)
     warnings = [*([] if found.success else [f"not finished after {MOST_STEPS} steps"]), *known.warnings]
     warnings += residuals.roughness(found.x, found.fun, found.jac)
@@ -318,9 +328,7 @@ def _at_bounds(parameters: Parameters, z: Floats) -> list[str]:
 
 
 def _misfit(problem: _Problem, residuals: Floats) -> list[str]:
-    """A sentence where residuals are larger than the given standard deviations allow (chi-square
-    test at 1 %).
-    """
+    """A sentence where residuals are larger than the given sd allow (chi-square test at 1 %)."""
     from scipy.stats import chi2
 
     if not problem.provenance["sd"]:

@@ -1,4 +1,4 @@
-"""What was measured, and what a run says at the same places.
+"""Measurements, and the values of a run at the same places.
 
 A `MeasuredCurve` belongs to one run: a column of its history over another one, as force over
 indentation or friction over position. `MeasuredValues` belong to a run each: one output of it, and
@@ -39,9 +39,7 @@ SOLVED = 10.0
 
 @dataclass(frozen=True)
 class Along:
-    """What is asked of a run: values of `column` where the column `over` is `at`, in motion
-    `motion` or in all.
-    """
+    """What is asked of a run: `column` where the column `over` is `at`, in motion `motion` or in all."""
 
     column: str
     over: str
@@ -203,9 +201,7 @@ class MeasuredValues:
 
     @classmethod
     def from_csv(cls, path: str | Path, sd: float | None = None) -> MeasuredValues:
-        """The values in a file with the header `KEY,...,OUTPUT` or `KEY,...,OUTPUT,sd`:
-        `electrostatics.voltage,motion.0.gap,electrostatic_force.last`.
-        """
+        """The values in a file with the header `KEY,...,OUTPUT[,sd]`, keys as `motion.0.gap`."""
         table = read_table(Path(path), "data")
         spread = sd if "sd" not in table else table.pop("sd")
         *keys, last = table
@@ -234,13 +230,11 @@ Measured = MeasuredCurve | MeasuredValues
 
 
 def along(result: Result, column: str, over: str, at: Floats, motion: int | None = None) -> Floats:
-    """Values of a column of the history where the column `over` is `at` (N,), in a motion or in
-    all.
+    """Values of a column where the column `over` is `at` (N,), in a motion or in all.
 
-    The state before the motion is the last one of the motion before; before the first motion, if
-    that is a press without voltage, it is zero. A solved column is known to `SOLVED` tolerances of
-    the solver: a place that much beyond its end is at the end, and less is no advance. Raises
-    InputError where `over` turns round, and for places beyond it.
+    Before the motion is the last state of the one before; before a first press without voltage it is zero.
+    Columns are known to `SOLVED` tolerances: a place that little beyond the end is at it. Raises InputError
+    where `over` turns round, and beyond it.
     """
     from scipy.interpolate import PchipInterpolator
 

@@ -1,8 +1,7 @@
-"""What is free in a fit: keys of a scene with bounds, and the unknowns that the fit works on.
+"""Free parameters of a fit: keys of a scene with bounds, and the unknowns of the optimiser.
 
-The unknown of a parameter that is positive between its bounds is z = ln(v / start): a fit takes
-steps by factors, and the value cannot become negative. Any other parameter has
-z = (v - start) / (high - low).
+The unknown of a parameter that is positive between its bounds is z = ln(v / start): a fit takes steps by
+factors, and the value cannot become negative. Any other parameter has z = (v - start) / (high - low).
 """
 
 from __future__ import annotations
@@ -28,10 +27,9 @@ APPLIES = ("value", "factor", "offset")
 class Parameter:
     """A number that a fit may choose between `low` and `high`, from `start` on.
 
-    Without a start it begins in the middle: that of the logarithms for a parameter that is
-    positive, else that of the numbers. `apply` says what it does to its key: value replaces the
-    number of the scene, factor multiplies it, offset is added to it (as an unknown error of a gap
-    that was set).
+    Without a start it begins in the middle: that of the logarithms for a parameter that is positive, else
+    that of the numbers. `apply` says what it does to its key: value replaces the number of the scene, factor
+    multiplies it, offset is added to it (as an unknown error of a gap that was set).
 
     >>> Parameter(0.01, 1.0).start
     0.1
@@ -86,7 +84,7 @@ class Parameters:
 
     @classmethod
     def of(cls, given: Any) -> Parameters:
-        """Of {key: Parameter, or (low, high)}."""
+        """Parameters from {key: Parameter, or (low, high)}."""
         allowed = "{key: (low, high)} or {key: Parameter(low, high)} for one key of the scene or more"
         if not isinstance(given, Mapping) or not given:
             raise InputError("parameters", shown(given), allowed)

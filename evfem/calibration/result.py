@@ -30,11 +30,10 @@ PLAIN = ("values", "names", "warnings", "tables", "provenance")
 class FitResult:
     """P parameters fitted to N measured numbers.
 
-    `values` by key; `errors` (P,) standard errors of the `unknowns` (P,) as
-    `evfem.calibration.parameters` has them, `correlation` (P, P), `singular_values` (P,) of the
-    Jacobian with columns of length 1. `names`, `measured`, `predicted` and `scale` (N,): what was
-    measured, what the fitted scene says there, and the sd or size that residuals are divided by.
-    `warnings` has a sentence for whatever the data do not determine.
+    `values` by key; `errors` (P,) standard errors of the `unknowns` (P,) as `evfem.calibration.parameters`
+    has them, `correlation` (P, P), `singular_values` (P,) of the Jacobian with columns of length 1. `names`,
+    `measured`, `predicted` and `scale` (N,): what was measured, what the fitted scene says there, and the sd
+    or size that residuals are divided by. `warnings` has a sentence for whatever the data do not determine.
     """
 
     parameters: dict[str, Parameter]
@@ -65,9 +64,7 @@ class FitResult:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals: in sd where there is one, else as a share of the
-        measured values' root mean square.
-        """
+        """Root mean square of the residuals: in sd, or as a share of that of the measured values."""
         return math.sqrt(float(np.mean(self.residuals**2)))
 
     @property
@@ -76,11 +73,7 @@ class FitResult:
         return loads(tomli_w.dumps(self.tables), self.paths, str(self.provenance.get("fit", "fit")))
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Lowest and highest value of each parameter with that confidence (0 to 1), by Student's
-        distribution.
-
-        What they assume stands in `evfem.calibration.confidence`.
-        """
+        """Ends of each parameter's interval with that confidence (0 to 1) by Student's distribution."""
         from scipy.stats import t
 
         confidence = real("confidence", confidence, "a number between 0 and 1", lambda c: 0.0 < c < 1.0)
@@ -134,9 +127,7 @@ class FitResult:
         return rows
 
     def save(self, path: str | Path) -> None:
-        """Write everything to one JSON file, in one step. Raises StorageError when the disk
-        refuses, and InputError for the ending of another format.
-        """
+        """Write one JSON file, in one step. Raises StorageError, and InputError for another ending."""
         check_ending(path, ".json")
         content: dict[str, Any] = {"format": FORMAT}
         content |= {name: getattr(self, name) for name in PLAIN}

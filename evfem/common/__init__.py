@@ -1,3 +1,1 @@
-"""What every room uses: checks of input, tables, fingerprints, whole-or-nothing files, notices,
-views.
-"""
+"""Shared by all folders: checks of input, tables, fingerprints, whole-or-nothing files, notices, views."""

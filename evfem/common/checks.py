@@ -285,9 +285,7 @@ def check_fields(target: Any, prefix: str = "") -> None:
 
 
 class Checked:
-    """A frozen dataclass whose fields obey the rules of their annotations; sentences name them in the table
-    `_table`.
-    """
+    """A frozen dataclass whose fields obey their annotations' rules; sentences begin with `_table`."""
 
     _table = ""
 
@@ -296,9 +294,7 @@ class Checked:
 
 
 class Named(Checked):
-    """A class with a name in files. A family derives from this one and has a live dict of its `kinds`:
-    `class Own(Family, kind="own")` is all that one more needs, here or in a module that has been imported.
-    """
+    """A class with a name in files; `class Own(Family, kind="own")` adds to its family's live dict."""
 
     kind: ClassVar[str]
     kinds: ClassVar[dict[str, Any]]

@@ -1,5 +1,4 @@
-"""A stable fingerprint of plain values: numbers, arrays, dataclasses, files, and the code of user
-functions.
+"""A stable fingerprint of plain values: numbers, arrays, dataclasses, files, and the code of user functions.
 
 Equal content has the same fingerprint in every process, so that a checkpoint of another scene can
 be told apart.
@@ -19,9 +18,8 @@ import numpy as np
 def digest(value: object) -> str:
     """SHA-256 over the content of `value`, as 64 hexadecimal digits.
 
-    Dataclasses count field by field (but those with `compare=False`), mappings in sorted order,
-    paths by the content of the file, functions by their code, defaults and closure, other objects
-    by class and attributes.
+    Dataclasses count field by field (but those with `compare=False`), mappings in sorted order, paths by the
+    content of the file, functions by their code, defaults and closure, other objects by class and attributes.
 
     >>> digest({"a": 1.0, "b": (2, 3)}) == digest({"b": (2, 3), "a": 1})
     True

@@ -1,9 +1,7 @@
-"""What the package tells a person who waits: lines, progress bars, and a status that goes when it
-is done.
+"""What the package tells a person who waits: lines, progress bars, and a status that goes when it is done.
 
-Lines and details are records of the logger `evfem`, so that a caller may show them in another way:
-INFO is worth a line, DEBUG only counts ("step 3 of 60"). Nothing is coloured. Everything goes to
-standard error.
+Lines and details are records of the logger `evfem`, so that a caller may show them in another way: INFO is
+worth a line, DEBUG only counts ("step 3 of 60"). Nothing is coloured. Everything goes to standard error.
 """
 
 from __future__ import annotations
@@ -21,8 +19,7 @@ LOG = logging.getLogger("evfem")
 
 
 def wrapped(text: str, stream: TextIO) -> str:
-    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep
-    their lines.
+    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep their lines.
 
     >>> import io
     >>> wrapped("one sentence " * 20, io.StringIO()).count(chr(10))
@@ -83,7 +80,7 @@ def shown(wanted: bool = True) -> Iterator[None]:
 
 
 class _NoBar:
-    """What is done with a bar, and nothing to see."""
+    """A progress bar that shows nothing."""
 
     leave = False
 
@@ -93,20 +90,11 @@ class _NoBar:
     def __exit__(self, *reason: object) -> None:
         return
 
-    def update(self, steps: int = 1) -> None:
-        """Steps are done."""
-
-    def set_postfix_str(self, text: str, refresh: bool = True) -> None:
-        """Something to say behind the bar."""
-
-    def close(self) -> None:
-        """No more to come."""
+    update = set_postfix_str = close = staticmethod(lambda *told, **how: None)
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
-    """A progress bar (tqdm) with the time that is left, in a notebook a widget; one that is not
-    `wanted` draws nothing, and does not load what would draw it.
-    """
+    """A progress bar (tqdm) with the time left, in a notebook a widget; without tqdm if not `wanted`."""
     if not wanted:
         return _NoBar()
     from tqdm.auto import tqdm

@@ -58,7 +58,7 @@ def read_grey(
 
 
 def _values(image: object) -> tuple[Floats, float | None]:
-    """What is stored, NaN where nothing is seen, and what is white, None where nothing says so."""
+    """Stored values, NaN for transparent pixels, and the value of white, None if unknown."""
     from PIL import Image, ImageOps
 
     assert isinstance(image, Image.Image)

@@ -38,7 +38,7 @@ class Died(Exception):
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -70,11 +70,7 @@ def _here(function: Callable[[Any], Any], tasks: Mapping[Any, Any]) -> Iterator[
 
 
 class Worker:
-    """A process that calls `function(line, *arguments)`, `line` being the other end of `self.line`.
-
-    It is a fresh interpreter with the BLAS on one thread, leaves Ctrl-C to the process that made
-    it, and ends with that one, however it went.
-    """
+    """A fresh interpreter, BLAS on one thread, without Ctrl-C, that calls `function(line, *arguments)`."""
 
     def __init__(self, function: Callable[..., None], *arguments: Any) -> None:
         self.line, theirs = Pipe()
@@ -92,11 +88,7 @@ class Worker:
 
 
 def blas_limits(threads: int | None = 1) -> threadpool_limits:
-    """The limit of every BLAS to so many threads, from now on or of a block.
-
-    A limit holds for what is loaded, and scipy has another BLAS than numpy: one that comes later has
-    all cores, and its idle threads spin. MKL has its own limit, `Pardiso` sets it.
-    """
+    """Limits every BLAS loaded by now, scipy's too, to so many threads; MKL has its own limit."""
     import scipy.linalg  # noqa: F401
 
     return threadpool_limits(limits=threads)

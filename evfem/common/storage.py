@@ -1,5 +1,4 @@
-"""Files that are either complete or untouched: written beside their place, then moved there in one
-step.
+"""Files that are either complete or untouched: written beside their place, then moved there in one step.
 
 This holds when the process is killed at any moment and when the disk is full; nothing is forced
 through the disk's own cache, so a power failure may cost the last steps. `alone_in` keeps other
@@ -30,11 +29,9 @@ FORMATS = (".csv", ".json", ".mat", ".msh", ".npy", ".npz", ".pdf", ".png", ".pv
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary path in the folder of `path`; what was written there takes the place of `path`
-    at the end.
+    """A temporary path in the folder of `path`; what was written there takes the place of `path` at the end.
 
-    On an error inside the block nothing changes. Raises StorageError when the disk or folder
-    refuses.
+    On an error inside the block nothing changes. Raises StorageError when the disk or folder refuses.
 
     >>> with replacing("numbers.txt") as temporary:
     ...     _ = temporary.write_text("1 2 3")
@@ -88,8 +85,7 @@ def disk(doing: str) -> Iterator[None]:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Inside, this is the only process at work in `folder`, which is made, and removed if it is
-    left empty.
+    """Inside, this is the only process at work in `folder`, which is made, and removed if it is left empty.
 
     The lock belongs to the opened folder, so that nothing is written for it and it ends with the
     process, however that ends. Raises StorageError where another one has it, or the disk refuses.
@@ -109,9 +105,7 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no
-    locks. Own: filelock would be one more package, and a file in the folder.
-    """
+    """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no locks."""
     try:
         from fcntl import LOCK_EX, LOCK_NB, flock
     except ModuleNotFoundError:  # Windows
@@ -149,9 +143,7 @@ def refuse_others(manifest: Path, present: Iterable[str], owner: str) -> None:
 
 
 def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write named arrays of numbers or text to one .npz file, in one step and without pickled
-    objects.
-    """
+    """Write named arrays of numbers or text to one .npz file, in one step and without pickled objects."""
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise InputError(name, "an array of Python objects", "numbers or text")

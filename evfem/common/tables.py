@@ -39,8 +39,7 @@ def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
 
 
 def piecewise_slope(place: Floats, value: Floats, x: Any) -> Floats:
-    """Slope at x of the same rows: 0 beyond the ends, jumps left out, on a row that of the piece
-    behind it.
+    """Slope at x of the same rows: 0 beyond the ends, jumps left out, on a row that of the piece behind it.
 
     >>> piecewise_slope(np.array([0.0, 1.0, 1.0]), np.array([0.0, 4.0, 9.0]), [-1.0, 0.5, 1.0, 2.0]).tolist()
     [0.0, 4.0, 0.0, 0.0]
@@ -71,9 +70,7 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
 
 
 def frame(columns: Mapping[str, Any]) -> Any:
-    """Columns of equal length as a `pandas.DataFrame`, or where pandas is not installed as a numpy
-    record array.
-    """
+    """Columns of equal length as a `pandas.DataFrame`, without pandas as a numpy record array."""
     if find_spec("pandas") is not None:
         from pandas import DataFrame
 
@@ -98,8 +95,7 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
 
 
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
-    """Columns of a csv file whose first line is `header` and whose other lines hold one number per
-    column.
+    """Columns of a csv file whose first line is `header` and whose other lines hold one number per column.
 
     Raises `InputError` with `key` for a file that cannot be read or has anything else in it, or
     more than `MOST_ROWS` rows.
@@ -125,8 +121,7 @@ def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
 
 
 def read_table(path: Path, key: str) -> dict[str, Any]:
-    """All columns of a csv file by the names in its first line: arrays of numbers, or lists of
-    words.
+    """All columns of a csv file by the names in its first line: arrays of numbers, or lists of words.
 
     Raises `InputError` with `key` for a file that cannot be read, has nothing below its first
     line, a name twice, or lines of another length.

@@ -1,6 +1,4 @@
-"""How objects show themselves: their fields that are not as usual, small tables and curves for
-notebooks; and what `help` says of the parameters of a class.
-"""
+"""How objects show themselves: changed fields, tables and curves for notebooks, parameters in `help`."""
 
 from __future__ import annotations
 
@@ -80,11 +78,9 @@ def table(title: str, rows: Sequence[tuple[str, str]], below: str = "") -> str:
 
 
 def curves(lines: Mapping[str, tuple[str, Sequence[float]]]) -> str:
-    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small
-    SVG.
+    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG.
 
-    Coordinates are number and value; the view box scales them. About one point for each pixel is
-    drawn.
+    Coordinates are number and value; the view box scales them. About one point for each pixel is drawn.
     """
     finite = [0.0, *(v for _, values in lines.values() for v in values if math.isfinite(v))]
     longest = max(len(values) for _, values in lines.values())
@@ -108,7 +104,7 @@ def describe(cls: Any) -> None:
     lines = []
     for key in keys:
         words = key.meaning if key.annotation is bool or key.allowed.startswith("a table [") else key.told
-        lines += [fill(f"- `{key.field}`: {words}", COLUMNS, subsequent_indent="  ")]
-    cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "", *lines])
+        lines += [key.field, fill(words, COLUMNS, initial_indent="    ", subsequent_indent="    ")]
+    cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "", "Parameters", "----------", *lines])
     plain = {key.field: key.annotation for key in fields_of(cls) if key.rule}
     cls.__init__.__annotations__ = {**cls.__init__.__annotations__, **plain}

@@ -1,3 +1,1 @@
-"""Where finger and surface meet: surfaces, pad, attraction, Signorini-Coulomb on the dense
-compliance.
-"""
+"""Where finger and surface meet: surfaces, pad, attraction, Signorini-Coulomb on the dense compliance."""

@@ -1,9 +1,7 @@
 r"""Electrostatic attraction of the pad: nodal forces (9a), (9b), (10) and their derivative.
 
-The attraction is a boundary traction that depends on the current gap, the weak form `attraction`
-below. What runs is its nodal rule: each pad node j carries the pressure p(g_j) of its current gap
-on its current projected length A_j. On linear edges that is the form with its quadrature points at
-the nodes; on quadratic edges the rule shares out the chord's projection instead of the curve's.
+Each pad node j carries the pressure p(g_j) of its current gap on its current projected length A_j, the nodal
+rule of the weak form `attraction` below (docs, Theory).
 
 Trial states that penetrate count as touching, g = 0.
 
@@ -45,9 +43,7 @@ TOUCHING = 1e-9
 
 @form
 def attraction(u: Any, v: Any, w: Any) -> Any:
-    """p(g) v_y in the residual on the current projected width max(0, (F T)_x), with g the gap
-    below X + u.
-    """
+    """p(g) v_y in the residual on the current projected width max(0, (F T)_x), with g the gap below X + u."""
     T = np.stack([-w.n[1], w.n[0]])
     width = positive_part(mul(deformation_gradient(u), T)[0])
     x, y = w.x[0] + u[0], w.x[1] + u[1]
@@ -90,9 +86,7 @@ class Attraction:
     def charged(
         self, position: Floats, voltage: float, pressing: Floats | None, charges: Floats | None = None
     ) -> Charged:
-        """The electric state at positions (P, dim): with the charges (M, P), or those at the end of
-        the present step.
-        """
+        """The electric state at positions (P, dim): with the charges (M, P), or those at the step's end."""
         assert self.charging is not None
         apart = self._separation(position, pressing)
         gap = np.maximum(surface_state(self.surface, position).gap, 0.0) + apart
@@ -103,9 +97,7 @@ class Attraction:
     def forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """Nodal forces on the finger (P, dim); `touching` (P,) says who carries force without an air
-        layer.
-        """
+        """Nodal forces on the finger (P, dim); without an air layer only `touching` nodes (P,) have any."""
         pressed = None if pressing is None else pressing[None]
         return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
 
@@ -129,9 +121,7 @@ class Attraction:
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """`forces` at W places of a way (W, P, dim), from positions (W, P, dim), voltages (W,) and
-        contact forces (W, P).
-        """
+        """`forces` at W places (W, P, dim) of a way, by voltages (W,) and contact forces (W, P)."""
         if not voltages.any() and self.charging is None:
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
@@ -151,9 +141,7 @@ class Attraction:
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
-        """What a core of the law (`roughness.Cored`) withholds of the attraction of closed nodes,
-        and what it leaves of it, (P,) in MPa each; None without a core.
-        """
+        """What a core withholds of closed nodes' attraction, and leaves, (P,) in MPa; or None."""
         if not isinstance(self.law, Cored) or voltage == 0.0:
             return None
         found = np.broadcast_arrays(*self.law.withheld(voltage, self.layers), np.zeros(self.pad.nodes.size))
@@ -168,9 +156,7 @@ class Attraction:
     def way_forces(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """`forces_along`, of the columns where there are fringes: what a way has beyond the mean of its
-        ends comes from closing gaps, and the columns know these.
-        """
+        """`forces_along` of the columns alone, which know what closing gaps add between the ends."""
         return self.forces_along(positions, voltages, touching, pressing)
 
     def _sideways(self, x: Floats, potential: Floats) -> Floats:
@@ -194,9 +180,7 @@ class Attraction:
         return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, share, 1.0), 0.0)
 
     def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
-        """By how much the attraction of a node grows per contact force that presses it (P,): the
-        rough faces come closer. 0 without them.
-        """
+        """Growth of a node's attraction per contact force (P,): the rough faces come closer."""
         if self.roughness is None:
             return np.zeros(len(position))
         on = 1.0 if self.air_layer else touching.astype(float)
@@ -230,9 +214,7 @@ class Attraction:
     def stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Any:
-        """Derivative of `forces` by the node positions, sparse (dim P, dim P), unknowns ordered
-        (node, component).
-        """
+        """Derivative of `forces` by node positions, sparse (dim P, dim P), ordered (node, component)."""
         size, dim = position.shape
         frame = surface_state(self.surface, position)
         on = 1.0 if self.air_layer else touching.astype(float)

@@ -1,13 +1,10 @@
-"""Charges of the pad nodes under a voltage that is resolved in time: internal variables of the
-attraction.
+"""Charges of the pad nodes under a voltage that is resolved in time: internal variables of the attraction.
 
 Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.relaxation`) on its
-tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them.
-A step goes in two parts: the pad moves with the charges and the voltage that it had, the charge of
-each node r A staying what it is while A changes; then, in its new place, charge flows for the
-seconds of the step while the voltage goes straight to its new value. So the charges at the end are
-a function of gap and voltage, the force law sees their effective voltage, and contact and Newton
-stay as they are. Nothing is committed before a step is accepted.
+tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them. In a step first
+the pad moves with its charges and voltage, r A of each node staying what it is while A changes; then charge
+flows for the seconds of the step while the voltage goes straight to its new value. So the end's charges are a
+function of gap and voltage, and contact and Newton stay as they are.
 
 The balance of a step, each term from its own integral::
 
@@ -37,9 +34,7 @@ REMEMBERED = 4
 
 @dataclass(frozen=True, eq=False)
 class Charged:
-    """An electric state of the pad: charges over eps_0 (M, P) in V/mm, voltage (V), gaps (P,) and
-    tributary lengths (P,) in mm.
-    """
+    """Electric state: charges over eps_0 (M, P) in V/mm, voltage (V), gaps, tributary lengths (P,) in mm."""
 
     charges: Floats
     voltage: float
@@ -49,9 +44,7 @@ class Charged:
 
 @dataclass(frozen=True)
 class Flow:
-    """Energies of one step (N mm per mm of depth): what the source gave, and what charge that
-    crossed the layers dissipated.
-    """
+    """Energies of a step (N mm per mm of depth): from the source, and dissipated across the layers."""
 
     source_work: float
     leakage: float
@@ -86,18 +79,14 @@ class Charging:
         return self.stack.after(gap, self.carried(length), before, voltage, self.seconds)
 
     def effective(self, gap: Any, voltage: float, length: Floats) -> Any:
-        """The voltage (P,) that the force law sees at the end of the step; gaps (P,) may have a small
-        imaginary part, for derivatives.
-        """
+        """Voltage (P,) that the force law sees at the step's end; gaps (P,) may be complex (derivatives)."""
         if self.seconds == 0.0:
             return self.stack.effective(gap, voltage, self.carried(length))
         value, slope = self._at(np.real(gap), voltage, length)
         return value + 1j * np.imag(gap) * slope if np.iscomplexobj(gap) else value
 
     def _at(self, gap: Floats, voltage: float, length: Floats) -> tuple[Floats, Floats]:
-        """That voltage (P,) and its derivative by the gap, remembered for the last few places: an
-        iteration asks for forces and their derivative, one after the other.
-        """
+        """That voltage (P,) and its derivative by the gap, remembered for the last few places."""
         key = (gap.tobytes(), voltage, length.tobytes())
         if (known := self._known.get(key)) is not None:
             return known
@@ -121,9 +110,7 @@ class Charging:
         return (one - none) / KILOVOLT
 
     def charge_slopes(self, at: Charged) -> tuple[Floats, Floats]:
-        """Derivatives of that charge by the gap and by the tributary length of every node (P,), of charges
-        that follow until the end of the step.
-        """
+        """Derivatives of that charge at the step's end by gap and tributary length of every node (P,)."""
         gap, seconds = at.gap + 1j * STEP, self.seconds
         by_gap = self.stack.fields(gap, at.voltage, self.after(gap, at.voltage, at.length))[2].imag / STEP
         # the charge that a node brings along does not grow with its length
@@ -133,11 +120,7 @@ class Charging:
         return np.asarray(at.length * by_gap), np.broadcast_to(by_length, at.gap.shape)
 
     def energy_density(self, at: Charged) -> Floats:
-        """Energy of the field in skin, gap and insulator of every node (P,), N mm per mm^2.
-
-        It is also what the field would do as work, with given charges of the nodes and a given
-        voltage, per mm that a node's tributary length grows.
-        """
+        """Energy of the field at every node (P,), N mm per mm^2; its work per mm of tributary length."""
         return np.asarray(eps_0 * self.stack.energy(at.gap, at.voltage, at.charges))
 
     def field_energy(self, at: Charged) -> float:
@@ -145,7 +128,7 @@ class Charging:
         return float(np.sum(at.length * self.energy_density(at)))
 
     def flow(self, new: Charged) -> Flow:
-        """What the source gave and what leaked in the step that ended at `new`."""
+        """Charge supplied and charge leaked in the step that ended at `new`."""
         old, stack, seconds = self.old, self.stack, self.seconds
         start = self.carried(new.length)
         before, moved = (

@@ -1,13 +1,8 @@
 r"""The linearised body as its contact candidates see it: a dense compliance, and the contact
 problem posed on it.
 
-With the condensed tangent S, the bone's known increment b and extra unknowns d (the bone's travel
-under a prescribed force, the squared voltage under a prescribed friction force) that push with p,
-
-.. math:: S_{cc}\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
-          S_{bc}\Delta u_c + S_{bb} b = g_b + F_b + p_b d .
-
-:math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns
+The compliance :math:`C = S_{cc}^{-1}` (`evfem.solver`) is kept with the factorisation.
+On a curved profile the contact force turns
 with the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
 :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the
 nodes near contact, so it is put into their small block alone (`evfem.contact.follower`).
@@ -31,18 +26,19 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
-from evfem.contact.attracted import AttractionStiffness, Roughness
+from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
     SLIP,
+    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
+    Roughness,
     Unstable,
 )
 from evfem.contact.solve import solve_with_attraction
@@ -54,17 +50,14 @@ LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What is known of the c candidate nodes at the iterate; d = 1 in the plane, 2 in three dimensions.
+    """What is known of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in
+    N).
 
-    The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d)
-    along normal and tangents in N/mm (N in three dimensions), statuses (c,), friction coefficients (c,) and
-    their slopes over x (c,) in 1/mm. `interface_compliance` (c, 1 + d) in mm per N/mm along normal and
-    tangents: 0 for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
-    needs no other solver. A law of friction other than Coulomb's gives its derivative by the
-    contact force as the coefficient, and beside it `cohesion` (c,) in N/mm and how much friction
-    grows with the slip of the step, `slip_stiffness` (c,) in N/mm per mm. The attraction weakens
-    with a node's gap by `negative_stiffness` (c,) N/mm per mm and is stronger by `gain_on_closing`
-    (c,) N/mm where the gap is closed; `roughness` says how it depends on the contact force.
+    The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
+    N/mm, statuses (c,), friction coefficients (c,) and slopes over x (c,) in 1/mm. `interface_compliance` (c,
+    1 + d) in mm per N/mm: 0, or 1 / (penalty x tributary length). A law of friction gives its derivative by
+    the contact force as the coefficient, `cohesion` (c,) in N/mm, and the growth with the slip,
+    `slip_stiffness` (c,) in N/mm per mm. Attraction: see `AttractionStiffness`.
     """
 
     surface: SurfaceState
@@ -93,9 +86,7 @@ class Candidates:
         return axes
 
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force (y, x[, z]) per x displacement of its node, (c, 1 + d): it turns with
-        the profile, and friction grows where its coefficient does; `own` (c,) as for `friction_growth`.
-        """
+        """Change of the contact force (y, x[, z]) per x displacement of its node, (c, 1 + d); `own` (c,)."""
         axes = self.axes
         rate = self.surface.curvature / self.surface.stretch**2
         turned = rate[:, None] * (self.force[:, 1:2] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
@@ -111,16 +102,11 @@ class Candidates:
         return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
 
     def by_chords(self, near: Ints, compliance: Floats) -> Floats | None:
-        """Coefficients (k,) of the `near` nodes by the chords of their friction law from no force to the
-        present one, none so steep that friction presses a slipping node on without end; None for Coulomb's.
-        """
+        """Coefficients (k,) of `near` nodes by the chords of their friction law, not too steep, or None."""
         if self.cohesion is None:
             return None
-        normal, along, n = (
-            np.maximum(self.force[near, 0], 0.0),
-            self.shear_direction[near],
-            self.axes.shape[1],
-        )
+        normal, along = np.maximum(self.force[near, 0], 0.0), self.shear_direction[near]
+        n = self.axes.shape[1]
         chord = self.friction[near] + self.cohesion[near] / np.where(normal > 0.0, normal, np.inf)
         blocks = compliance.reshape(near.size, n, near.size, n)[np.arange(near.size), 0, np.arange(near.size)]
         pressed = -blocks[:, 1:] / blocks[:, :1]
@@ -130,11 +116,9 @@ class Candidates:
     def friction_growth(self, own: Floats) -> Floats:
         """That part of it which is friction: change of the shear force per x displacement, (c, d).
 
-        `own` (c,) is the compliance of each node along x. Where friction falls along the way
-        faster than the tissue stiffens, a node snaps forward and has no equilibrium at the slope:
-        its friction is then left at the present coefficient, and the iterations go the way of the
-        snap. Friction that rises along the way holds, whatever the body alone would do: the own
-        compliance of a squeezed pad, which only its contact holds, is negative.
+        `own` (c,) is each node's compliance along x. Where friction falls faster than the tissue stiffens, a
+        node snaps forward: its friction stays at the present coefficient. Friction that rises along the way
+        holds in any case.
         """
         growth = self.shear_direction * (self.friction_slope * self.force[:, 0])[:, None]
         if self.slip_stiffness is not None:
@@ -145,10 +129,7 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class StepSolution:
-    """A solved linear step: displacements (dim c,), contact forces (c, dim) along n and t, statuses
-    (c,), the extra unknowns, number of dense contact solves, and whether the negative stiffness
-    had to be scaled down.
-    """
+    """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns."""
 
     moved: Floats
     force: Floats
@@ -160,9 +141,7 @@ class StepSolution:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """The condensed tangent on (candidates, bone x, bone y[, bone z]) and the compliance of the
-    candidates, coupled by the attraction.
-    """
+    """Condensed tangent on (candidates, bone x, y[, z]) and compliance of the candidates, with attraction."""
 
     schur: Floats
     compliance: Floats
@@ -180,9 +159,7 @@ class CondensedTangent:
         return np.asarray((self.dim * near[:, None] + np.array([1, 0, 2])[: self.dim]).ravel())
 
     def among(self, near: Ints) -> Floats:
-        """Compliance among these candidates, in the order of `rows`; they are often those of the
-        last call.
-        """
+        """Compliance among these candidates, in the order of `rows`; often those of the last call."""
         key = near.tobytes()
         if key not in self._last:
             rows = self.rows(near)
@@ -198,9 +175,7 @@ class CondensedTangent:
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """A linear equation for an extra unknown: `row` (m,) times the displacements of candidates and bone, and
-    `share` (p,) times the unknowns of the step, this one last, shall be `wanted`.
-    """
+    """`row` (m,) times displacements of candidates and bone plus `share` (p,) times unknowns is `wanted`."""
 
     row: Floats
     share: Floats
@@ -245,18 +220,19 @@ class LinearContactStep:
         gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
         status, solves = self.candidates.status.copy(), 0
         own = np.diagonal(self.body.compliance)[1 :: self.body.dim]
+        # in contact, in the surface, or attracted with a feedback on the node itself
         near = np.flatnonzero(
             (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
         )
-        if not near.size:
+        if not near.size:  # the dense problem has at least one node: the one with the smallest gap
             near = np.array([np.argmin(gap)])
-        while True:
+        while True:  # solve on the near nodes, join those that sink in, until none does
             found, pushed = self._solve_near(near, free, status[near])
             solves += found.solves
             status[near] = found.status
             moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
             gap = normal_gap + self._along_normal(moved)
-            gap[near] = 0.0
+            gap[near] = 0.0  # the dense problem has settled theirs
             hit = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
             if not hit.size:
                 break
@@ -264,14 +240,13 @@ class LinearContactStep:
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
         own = np.diagonal(self.body.compliance)[0 :: self.body.dim]
+        # the shear of closed nodes also follows x within the step, by the slope of their friction
         grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim, None]
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
-        """Force (N/mm) that the bone lacks, along the axis of the first unknown, when this step
-        has been solved with that unknown, a `travel` of the bone, given instead.
-        """
+        """Force (N/mm) that the bone lacks along the first unknown's axis, were its `travel` given."""
         unknown = self.unknowns[0]
         bone = self.bone.copy()
         bone[unknown.axis] += travel
@@ -286,9 +261,7 @@ class LinearContactStep:
         return np.einsum("ck,ck->c", normal[:, :2], moved.reshape(-1, self.body.dim)[:, 1::-1])
 
     def _free_motion(self) -> Floats:
-        """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1
-        + p).
-        """
+        """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1 + p)."""
         dim = self.body.dim
         right = self.residual[:-dim] - self._present - self.body.schur[:-dim, -dim:] @ self.bone
         return self.body.compliance @ np.column_stack(
@@ -302,9 +275,7 @@ class LinearContactStep:
         return np.concatenate([force[:, 1::-1], force[:, 2:]], axis=1).ravel()
 
     def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
-        """Candidates' motion (dim c,) by forces on the near ones, in the order of
-        `CondensedTangent.rows`.
-        """
+        """Candidates' motion (dim c,) by forces on the near ones, in the order of `CondensedTangent.rows`."""
         force = np.zeros(self.body.dim * self.candidates.status.size)
         force[self.body.rows(near)] = pushed
         return self.body.compliance @ force
@@ -321,7 +292,7 @@ class LinearContactStep:
         among, own, held = self.body.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
-        W[:, 0] -= C @ held
+        W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
         problem = self._problem(near, (C, W), self._bone_balance(rows, free, (C, W), follower))
         attraction = AttractionStiffness(
             known.negative_stiffness[near],
@@ -345,7 +316,7 @@ class LinearContactStep:
     def _problem(
         self, near: Ints, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
     ) -> ContactProblem:
-        """That of the `near` nodes in their frames, which other forces have `moved`."""
+        """Compliance of the `near` nodes in their frames, which other forces have `moved`."""
         known, (C, W), extra = self.candidates, moved, None
         axes = known.axes[near]
         at_rest = np.column_stack([known.surface.normal_gap[near], known.slip[near]])
@@ -367,9 +338,7 @@ class LinearContactStep:
     def _bone_balance(
         self, rows: Ints, free: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
     ) -> tuple[Floats, Floats, Floats] | None:
-        """Balance of the bone along the unknowns' axes, as the equations that settle them: what forces on
-        these rows of the candidates and what the unknowns add, and what is missing without both.
-        """
+        """The bone's balance along the unknowns' axes: by forces on candidates, unknowns, and what lacks."""
         if not self.unknowns:
             return None
         C, W = near
@@ -397,12 +366,10 @@ class LinearContactStep:
         return S, share, wanted, carried
 
     def _held(self, pivot: Floats, free: Floats) -> Floats:
-        """The pivot without the zeros of a body that nothing holds, whose rounding may be negative: let it
-        fall, not rise. A condition keeps its own.
-        """
+        """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
         dim = self.body.dim
         axis = [unknown.axis - dim for unknown in self.unknowns]
-        floor = UNHELD * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
+        floor = SMALLEST_PIVOT * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
         return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
 

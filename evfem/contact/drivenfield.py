@@ -1,7 +1,7 @@
 r"""The mean attraction over the cycle from the full field, in layers that conduct.
 
 As `evfem.contact.fullfield`, with Poisson's problem of complex permittivities at each harmonic n of
-the drive and the mean pulls :math:`F_n` on the nodes at 1 V (`evfem.field.meanpull`),
+the drive and the mean pulls :math:`F_n` on the nodes at 1 V (`evfem.field.meanattraction`),
 
 .. math:: f_j = U^2 \sum_n w_n F_{n, j}, \qquad \sum_n w_n = 1,
 
@@ -22,14 +22,12 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.fullfield import FieldAttraction
 from evfem.field.columns import Columns, Nearby
-from evfem.field.meanpull import mean_pull
+from evfem.field.meanattraction import mean_pull
 
 
 @dataclass(frozen=True)
 class Harmonic:
-    """A sine of a cycle: its share of the squared effective voltage, and the complex relative
-    permittivities of insulator, gap and skin at its frequency.
-    """
+    """A sine of a cycle: share of the squared effective voltage, complex eps_r of insulator, gap, skin."""
 
     share: float
     insulator: complex

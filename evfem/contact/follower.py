@@ -1,10 +1,8 @@
-r"""Stiffness of contact forces that turn with the profile, in the small block of the nodes near
-contact.
+r"""Stiffness of contact forces that turn with the profile, in the small block of the nodes near contact.
 
-A node that moves by dx along a profile takes the direction of its contact force along, and at a
-slope of the friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body
-that gives :math:`u = C (f + T u)`, so :math:`(1 - C T)^{-1} C` takes the place of C, and the same of
-free motions.
+A node that moves by dx along a profile takes the direction of its contact force along, and at a slope of the
+friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body that gives :math:`u = C
+(f + T u)`, so :math:`(1 - C T)^{-1} C` takes the place of C, and the same of free motions.
 
 Where the feedback C T of the slipping nodes exceeds 1, the forces push them aside harder than the
 tissue holds them: stability is lost, and the linear problem has no solution, or one the wrong way.
@@ -24,18 +22,14 @@ from evfem.common.arrays import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class FollowerStiffness:
-    """Forces (y, x[, z]) per x displacement, `rate` (l, 1 + d), of the `loaded` ones (l,) among the nodes
-    near contact.
-    """
+    """Forces (y, x[, z]) per x displacement, `rate` (l, 1 + d), of the `loaded` (l,) near nodes."""
 
     loaded: Ints
     rate: Floats
 
     @classmethod
     def of(cls, rate: Floats) -> FollowerStiffness:
-        """From the rates of all nodes (k, 1 + d); on a flat surface without slopes of friction no node
-        is loaded.
-        """
+        """From the rates of all nodes (k, 1 + d); on flat surfaces without slopes of friction none counts."""
         loaded = np.flatnonzero(rate.any(axis=1))
         return cls(loaded, rate[loaded])
 
@@ -49,9 +43,7 @@ class FollowerStiffness:
         return np.asarray(sum(each))
 
     def apply(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
-        """(1 - C T)^-1 applied to the compliance (m, m) and to motions (m, p): a small system, T has few
-        columns.
-        """
+        """(1 - C T)^-1 applied to the compliance (m, m) and to motions (m, p): T has few columns."""
         if not self.loaded.size:
             return C, W
         x, B = self._x, self._through(C)

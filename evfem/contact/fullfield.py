@@ -1,12 +1,11 @@
 r"""The attraction of the pad from the full field instead of column by column.
 
-Below the part of the outline that faces the display (its flanks keep the column law) Poisson's
-problem is solved in insulator, air and stratum corneum, in columns that stand at the pad nodes,
-on quadratic edges between them too, and move with them (`evfem.field.columns`). The
-electrode is at the voltage, living tissue at 0; the skin's layer is as thick above each node as it
-is undeformed. Nodes that touch keep `SERIES_GAP` of the insulator's reduced thickness, and what
-rough faces keep, as a gap in series.
-Nodal forces are derivatives of the discrete energy
+Below the part of the outline that faces the display (its flanks keep the column law) Poisson's problem is
+solved in insulator, air and stratum corneum, in columns that stand at the pad nodes, on quadratic edges
+between them too, and move with them (`evfem.field.columns`). The electrode is at the voltage, living tissue
+at 0; the skin's layer is as thick above each node as it is undeformed. Nodes that touch keep `SERIES_GAP` of
+the insulator's reduced thickness, and what rough faces keep, as a gap in series. Nodal forces are derivatives
+of the discrete energy
 
 .. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)},
 
@@ -82,9 +81,7 @@ def in_sight(places: Floats) -> Ints:
 
 
 def facing(pad: Pad, points: Floats) -> Ints:
-    """Pad edges (K,), from left to right, of the chain that faces the display below the lowest node;
-    `points` (P, 2) of the pad undeformed. Its ends are where the flanks begin.
-    """
+    """Edges (K,), left to right, of the chain below the lowest node's flanks; `points` (P, 2) undeformed."""
     way = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
     after = {int(edge[0]): k for k, edge in enumerate(pad.edges)}
     before = {int(edge[1]): k for k, edge in enumerate(pad.edges)}
@@ -109,9 +106,7 @@ def in_line(pad: Pad, edges: Ints) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Lower and upper bound of a capacitance in F per m of depth (N/V^2); the lower one is the
-    column law's.
-    """
+    """Bounds of a capacitance in F per m of depth (N/V^2), the lower by the column law."""
 
     lower: float
     upper: float
@@ -123,13 +118,11 @@ class Bounds:
 
 
 def certificate(x: Floats, levels: Floats, insulator: Layer, skin: Floats, gap_eps_r: float = 1.0) -> Bounds:
-    """Bounds for an outline without solving: points at `x` (L,), the heights `levels` (2, L) of the
-    ground and of the outline above in mm, the gap between them filled with `gap_eps_r`, an insulator
-    below; `skin` (L,) is the skin's layer, reduced (mm).
+    """Bounds for an outline without solving: points at `x` (L,), `levels` (2, L) of ground and outline in mm,
+    the gap filled with `gap_eps_r`, an insulator below; `skin` (L,) is the skin's layer, reduced (mm).
 
-    Below: the vertical flux through all layers, the column law. Above: the energy of potentials that
-    are linear along verticals, with the skin's layer a conductor (`evfem.field.bounds`).
-    C is proportional to all permittivities, and the bounds are those of a gap of air.
+    Below: the column law. Above: potentials linear along verticals, the skin's layer a conductor
+    (`evfem.field.bounds`). C is proportional to all permittivities.
     """
     eps_r, gap = float(insulator.eps_r) / gap_eps_r, levels[1] - levels[0]
     lower = columns_sum(x, gap + float(insulator.thickness) / eps_r + skin * gap_eps_r)
@@ -194,9 +187,7 @@ class FieldAttraction(Attraction):
         return forces
 
     def weights(self, position: Floats) -> Floats:
-        """Lengths (P,): half the distance of each column from the next ones, by the shape functions that
-        make its force nodal, and the columns' own on the flanks.
-        """
+        """Lengths (P,): half the distance to the next columns, on the flanks the columns' own."""
         lines = self.seen(position)
         half = 0.5 * np.diff(lines @ position[:, 0])
         own = lines.T @ (np.append(half, 0.0) + np.append(0.0, half))
@@ -228,10 +219,9 @@ class FieldAttraction(Attraction):
     ) -> Floats:
         """Factor (P,) of the column law's derivatives: the squared share of the voltage below a node.
 
-        Between rough faces it is the ratio of the field's force on the node to the columns', at most 1:
-        on a summit, whose neighbours stand off, the field pulls less and also gains less as the faces
-        come closer. Without rough faces the forces are no measure of the derivatives: beside a node
-        that touches, the field may pull less than columns and yet weaken faster with the gap.
+        Between rough faces it is the ratio of the field's force to the columns', at most 1: on a summit the
+        field pulls less, and gains less. Without them a field may pull less and yet weaken faster with the
+        gap.
         """
         if self.roughness is None:
             return self.share(position[:, 0]) ** 2
@@ -253,9 +243,7 @@ class FieldAttraction(Attraction):
         return np.asarray(weakening * self.tangent_factor(position, voltage, touching, pressing))
 
     def beyond_trapezoidal(self, begin: Floats, end: Floats, voltages: tuple[float, float]) -> float:
-        """What the change of energy on the way between two positions (P, 2) has beyond the trapezoidal
-        work of the forces at its ends (N mm per mm of depth), the squared voltage growing evenly.
-        """
+        """Energy on the way between positions (P, 2) beyond the trapezoidal work (N mm per mm of depth)."""
         self.check(end)
         squared = [voltage**2 for voltage in voltages]
         before, after = self.solve(begin), self.solve(end)
@@ -295,9 +283,7 @@ class FieldAttraction(Attraction):
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
-        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
-        component). Nodes that touch move along the surface alone: contact holds their gap.
-        """
+        """Derivative of `forces` by positions, sparse (2 P, 2 P); touching nodes move along the surface."""
         lines, frame = self.seen(position), surface_state(self.surface, position)
         nodes = in_line(self._plane, self.edges)
         closed, near = frame.gap <= TOUCHING, self._nearby(*self.outline(position, lines, pressing))
@@ -321,15 +307,13 @@ class FieldAttraction(Attraction):
         return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(share @ outer)
 
     def _nearby(self, x: Floats, levels: Floats) -> Nearby | None:
-        """What fields of outlines close to this one start from; None where each is solved anew."""
+        """Start values of the fields of close outlines; None if each is solved anew."""
         return None if self.floating or self._electrodes is not None else self._columns.nearby(x, levels)
 
     def _solved(
         self, x: Floats, levels: Floats, slope: Floats, near: Nearby | None = None
     ) -> tuple[Capacitance | None, Floats]:
-        """The field of an outline and its forces (L, 2) on the lines at 1 V, above a surface of that
-        slope (L,).
-        """
+        """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""
         found = self._columns.solve(x, levels, self._electrodes, self.floating, near)
         along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
         return found, 0.5 * np.stack([along, found.by_level[2:].sum(axis=0)], axis=1)
@@ -357,9 +341,7 @@ class FieldAttraction(Attraction):
         return float(self.surface.insulator.eps_r)
 
     def columns_of(self, insulator: complex, gap: complex, skin: complex) -> Columns:
-        """Columns of layers with these relative permittivities; without a skin's layer where it has no
-        thickness.
-        """
+        """Columns of layers with these relative permittivities; no skin's layer where it has no thickness."""
         if np.max(self.skin.thickness) > 0.0:
             return Columns((insulator, gap, skin), (INSULATOR, AIR, SKIN))
         return Columns((insulator, gap), (INSULATOR, AIR))
@@ -370,9 +352,7 @@ class FieldAttraction(Attraction):
         return self._lines if kept.size == self._lines.shape[0] else self._lines[kept]
 
     def outline(self, position: Floats, lines: Any, pressing: Floats | None = None) -> tuple[Floats, Floats]:
-        """x (L,) of columns at `lines` (L, P) and the curves' heights (n + 1, L): electrode, insulator,
-        skin, living tissue.
-        """
+        """x (L,) of columns at `lines` (L, P), heights (n + 1, L) of electrode, insulator, skin, tissue."""
         place = lines @ position
         frame = surface_state(self.surface, place)
         insulator = self.surface.insulator
@@ -391,9 +371,7 @@ class FieldAttraction(Attraction):
         return certificate(x, levels[1:3], self.surface.insulator, skin, self._columns.eps_r[1].real)
 
     def check(self, position: Floats) -> None:
-        """Raise Unresolved if the capacitance under the pad at `position` (P, 2) is not between its
-        bounds.
-        """
+        """Raise Unresolved if the capacitance at `position` (P, 2) is not between its bounds."""
         if self._electrodes is not None or self.floating:
             return  # the bounds are those of a grounded pad over one electrode
         bounds = self.bounds(*self.outline(position, self.seen(position)))

@@ -30,15 +30,14 @@ has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A 
 none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
 only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
 closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
-gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
+gained. For the tangent of a concave law one of the two statuses is always consistent.
 
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
 
-Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175,
-doi:10.1016/0045-7825(86)90095-2 (the frictional problem as complementarity); P. Alart and A.
-Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353, doi:10.1016/0045-7825(91)90022-X
-(projections and their linearisation).
+Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175, doi:10.1016/0045-7825(86)90095-2 (the
+frictional problem as complementarity); P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991)
+353, doi:10.1016/0045-7825(91)90022-X (projections and their linearisation).
 """
 
 from __future__ import annotations
@@ -51,7 +50,52 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import DISC_OWN
-from evfem.contact.attracted import AttractionStiffness
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """Attraction between rough faces, along normal and tangent: stronger by `gain` (k, 1 + d) times what a
+    contact force has beyond `present` (k,), weaker by `loss_on_opening` (k, 1 + d) N/mm where open.
+    """
+
+    gain: Floats
+    loss_on_opening: Floats
+    present: Floats
+
+    def of(self, nodes: Ints) -> Roughness:
+        """The same of these nodes alone."""
+        return Roughness(self.gain[nodes], self.loss_on_opening[nodes], self.present[nodes])
+
+
+@dataclass(frozen=True)
+class AttractionStiffness:
+    """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
+    per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
+    `gain_on_closing` (k,) at g = 0. `roughness` says how it depends on the contact force there.
+    """
+
+    negative_stiffness: Floats
+    reference_gap: Floats
+    gain_on_closing: Floats
+    roughness: Roughness | None = None
+
+
+def feedback(compliance: Floats, held_by: Floats, gaps: Ints, held: Ints, stiffness: Floats) -> float:
+    """Largest factor by which the attraction of open nodes returns to itself: from 1 on they snap.
+
+    Their `gaps` (m,) are rows of the compliance, and the attraction weakens with them by `stiffness`
+    (m,). The rows `held` (h,) of closed nodes do not move; `held_by` is the compliance to their forces.
+    """
+    if not gaps.size:
+        return 0.0
+    free = compliance[np.ix_(gaps, gaps)]
+    if held.size:
+        back = np.linalg.solve(held_by[np.ix_(held, held)], compliance[np.ix_(held, gaps)])
+        free = free - compliance[np.ix_(gaps, held)] @ back
+    root = np.sqrt(stiffness)
+    gain = root[:, None] * free * root
+    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
+
 
 #: of a node; `FORWARD` or `BACKWARD` in the plane where it slips, `SLIP` in three dimensions
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
@@ -60,9 +104,7 @@ NO_NODES: Ints = np.zeros(0, dtype=np.int64)
 
 
 class ContactNotSolved(ArithmeticError):
-    """The sub-problem cycles: it has no solution near the start, or several. `softest` (k,): the last
-    statuses, those that keep changing open.
-    """
+    """The sub-problem cycles: no solution near, or several. `softest` (k,): statuses, cycling ones open."""
 
     def __init__(self, message: str, softest: Ints = NO_NODES) -> None:
         super().__init__(message)
@@ -70,7 +112,7 @@ class ContactNotSolved(ArithmeticError):
 
 
 class Unstable(ContactNotSolved):
-    """It has none because the body gives way the more, the more it is loaded."""
+    """No solution because the stiffness of the body is not positive definite."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +130,7 @@ class ExtraUnknowns:
 
     @property
     def followed(self) -> Floats:
-        """What the conditioned ones take from the compliance (m, m)."""
+        """Reduction of the compliance (m, m) by the conditioned components."""
         some = self.conditioned
         return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
@@ -143,9 +185,7 @@ class ContactProblem:
 
     @cached_property
     def gives_way(self) -> bool:
-        """Whether the body gives way the more, the more it is loaded: this compliance, which contains
-        the forces that turn with the profile, is not positive.
-        """
+        """Whether the body gives way the more, the more it is loaded: the compliance is not positive."""
         try:
             return not np.linalg.cholesky(self.under_forces + self.under_forces.T).size
         except np.linalg.LinAlgError:
@@ -153,7 +193,7 @@ class ContactProblem:
 
     @property
     def resists(self) -> Any:
-        """Which nodes have friction (k,) bool."""
+        """Nodes with friction, (k,) bool."""
         rough = self.friction > 0.0
         return rough if self.cohesion is None else rough | (self.cohesion > 0.0)
 
@@ -164,9 +204,7 @@ class ContactProblem:
 
     @cached_property
     def own(self) -> tuple[Floats, Floats]:
-        """Size of each node's own compliance along the normal and, the largest one, along the tangents,
-        (k,), nowhere less than the fraction `DISC_OWN` of the mean.
-        """
+        """Size of each node's own compliance, normal and tangent, (k,), at least `DISC_OWN` of the mean."""
         i, C = self.dim * np.arange(self.size), self.under_forces
         shear = np.abs(C[i + 1, i + 1])
         if self.dim == 3:
@@ -185,9 +223,8 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (m,), drops of the attraction (m,), statuses (k,), the extra unknowns
-    (p,), new gaps and slips (m,), the number of dense solves, and whether the negative stiffness
-    had to be scaled down.
+    """Contact forces (m,), drops of the attraction (m,), statuses (k,), the extra unknowns (p,), new gaps and
+    slips (m,), the number of dense solves, and whether the negative stiffness had to be scaled down.
     """
 
     force: Floats
@@ -220,11 +257,13 @@ class Projected:
         """Of these forces."""
         state, (normal_own, shear_own) = problem.state(forces), problem.own
         force, v, drop = (each.reshape(problem.size, -1) for each in (forces.contact, state, forces.drop))
+        # trial forces: those that would close gap and slip if each node had its own compliance alone
         p = force[:, 0] - v[:, 0] / normal_own
         z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
         limit, size = np.where(p > 0.0, problem.limit(p), 0.0), sizes(z)
         slip = np.where(z[:, 0] < 0.0, FORWARD, BACKWARD) if problem.dim == 2 else SLIP
         status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.resists, STICK, slip))
+        # radial return onto the disc of friction: sticking keeps z, slipping scales it to the limit
         part = np.where(status == STICK, 1.0, limit / np.maximum(size, np.maximum(limit, 1e-300)))
         wanted = np.column_stack([np.maximum(p, 0.0), z * np.where(status == OPEN, 0.0, part)[:, None]])
         held = 1e-3 * v[:, 0] / normal_own  # what would close the gap, where no node presses
@@ -272,7 +311,7 @@ class _Unknowns:
         return cls(place, closed, attracted, (known.sheared - known.gain)[closed], turned, aside, kept, turns)
 
     def columns(self, C: Floats) -> Floats:
-        """What they do to the rows of C (q, m)."""
+        """Their effect on the rows of C, (q, m)."""
         found, n = C[:, self.place], self.felt.shape[1]
         first = found[:, : self.closed.size]
         if (self.felt[:, 0] != 1.0).any():

@@ -15,14 +15,11 @@ No constant has to be chosen. What has not converged is never used. In three dim
 what the laws make of the last iteration's forces after the motion, then with the nodes that touched, and
 with all nodes, sticking: slips found by chance may drive it about, but nothing changes for nodes that stick.
 
-If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no
-solution, or the wrong one; its negative stiffness is then scaled to 0.9 of the critical value
-(`solve_with_attraction`).
+If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no solution, or
+the wrong one; its negative stiffness is then scaled to 0.9 of the critical value (`solve_with_attraction`).
 
-Sources: P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353,
-doi:10.1016/0045-7825(91)90022-X (projections and their linearisation); S. Hueeber, G. Stadler and
-B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572,
-doi:10.1137/060671061 (primal-dual active set).
+The projections' sources are in `evfem.contact.signorini`; primal-dual active set: S. Hueeber, G. Stadler,
+B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
 """
 
 from __future__ import annotations
@@ -36,18 +33,19 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
-from evfem.contact.attracted import AttractionStiffness, feedback
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
     SLIP,
     STICK,
+    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ContactSolution,
     Forces,
     Projected,
+    feedback,
     linearised,
 )
 
@@ -57,9 +55,7 @@ SCALINGS, SOFTER = 2, 1.1
 
 
 def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = None) -> ContactSolution:
-    """Signorini and Coulomb, started from `status` (k,) and, in three dimensions, contact forces (m,); raises
-    `ContactNotSolved` where no start ends.
-    """
+    """Signorini and Coulomb from `status` (k,) and, in space, forces (m,); raises `ContactNotSolved`."""
     total, softest = 0, status
     for start in _starts(problem, status, np.zeros(problem.start.size) if force is None else force):
         forces, found, solves, softest = _newton(problem, start)
@@ -71,7 +67,7 @@ def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = 
 
 
 def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Projected]:
-    """What Newton's method starts from, one after the other until it ends."""
+    """Start values of Newton's method, tried one after the other until it converges."""
     held, slip = problem.resists, FORWARD if problem.dim == 2 else SLIP
     pressing, shear = np.split(force.reshape(problem.size, -1), [1], axis=1)
     none, touched = np.zeros(problem.size), status != OPEN
@@ -88,9 +84,7 @@ def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Pr
 
 
 def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, Projected, int, Ints]:
-    """The forces, or None where it does not end within `ACTIVE_SET_LIMIT` solves, what the laws make of
-    them, the number of solves, and the last statuses (k,) where those that keep changing are open.
-    """
+    """Forces or None, what the laws make of them, the number of solves, last statuses (k,), cycling open."""
     met, alone, late, softest = set[bytes](), set[bytes](), False, found.status
     for solves in range(1, ACTIVE_SET_LIMIT + 1):
         try:
@@ -106,8 +100,8 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
             return forces, found, solves, softest
         if changed.any():
             key, softest = found.status.tobytes(), np.where(changed, OPEN, found.status)
-            late = late or key in met
-            if key in alone:
+            late = late or key in met  # a cycle: from here on change the node that is furthest off alone
+            if key in alone:  # and that has led back too
                 break
             if late:
                 worst = np.where(changed, after.miss, -1.0).argmax()
@@ -126,10 +120,10 @@ def solve_with_attraction(
 
     If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
     linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
-    `STABLE` of the critical value, which goes the right way in small steps: of the body as its
-    closed nodes hold it, then as those hold it that do not keep changing, at last of the much softer
-    one without them. The law of friction is taken by its tangents first, then by its chords: the
-    tangent of one that levels off soon grows so fast that there may be no solution.
+    `STABLE` of the critical value, which gives small steps in the right direction: the critical value
+    with the closed nodes fixed, then with those fixed that no longer change, at last with all nodes
+    free. Friction is linearised by tangents first, then by chords: the tangent of a law that levels
+    off soon may be so steep that there is no solution.
     """
     laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:
@@ -176,9 +170,7 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
 
 
 def _passing(before: Projected, after: Projected) -> Projected:
-    """The same, in the plane with nodes that pass through slip as they close, one that sticks beside a
-    pulling shear force would seem to open, and through stick from one slip to the other.
-    """
+    """The same; in the plane closing nodes and changes of the slip's side pass through slip, or stick."""
     if after.z.shape[1] == 2:
         return after
     way = after.z[:, 0]

@@ -16,8 +16,8 @@ a stiffness D of their own:
 - friction that falls with the speed, :math:`D = -(db/dv)/\Delta t`,
 - the attraction of open nodes, :math:`D = -A\,dp/dg` with their gaps.
 
-Together they grow `share` times as fast as what holds the tissue, the largest real eigenvalue of
-A D; at 1 the equilibrium is lost. The force that works most in that motion wins (`verge`).
+`stability_ratio` is the ratio of destabilising to stabilising stiffness: the largest real eigenvalue
+of A D. At 1 stability is lost; the cause named is the force that works most in the eigenvector.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ ATTRACTION = "the attraction grows as the gap closes"
 
 
 @dataclass(frozen=True)
-class Verge:
-    """How close an equilibrium is to its loss, 1: how fast what takes it away grows relative to
-    what holds the tissue; and the force that works most in it, in words.
+class StabilityRatio:
+    """The ratio of destabilising to stabilising stiffness, 1 at the loss of stability, and the force that
+    works most in the unstable motion, in words.
     """
 
-    share: float
+    ratio: float
     cause: str
 
 
-def verge(step: LinearContactStep) -> Verge:
-    """Of the equilibrium that `step` begins at."""
+def stability_ratio(step: LinearContactStep) -> StabilityRatio:
+    """Stability of the equilibrium that `step` begins at."""
     known, surface = step.candidates, step.candidates.surface
     slipping = np.flatnonzero(known.status >= FORWARD)
     opened = np.flatnonzero((known.status == OPEN) & (known.negative_stiffness > 0.0))
@@ -70,7 +70,7 @@ def verge(step: LinearContactStep) -> Verge:
     share, motion = _fastest(
         _freed(step, slipping, opened), sum(grows.values(), np.zeros(none.size + far.size))
     )
-    return Verge(share, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
+    return StabilityRatio(share, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
 
 
 def _shear_ratio(step: LinearContactStep) -> Floats:
@@ -79,9 +79,7 @@ def _shear_ratio(step: LinearContactStep) -> Floats:
 
 
 def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
-    """Compliance (f, f) of the slips and gaps of these nodes, with everything held that contact
-    holds, and the bone free where a force on it is prescribed.
-    """
+    """Compliance (f, f) of these slips and gaps, contact held, the bone free where it is loaded."""
     known = step.candidates
     C, bone = _compliance(step), _bone(step)
     closed, stick = np.flatnonzero(known.status != OPEN), np.flatnonzero(known.status == STICK)

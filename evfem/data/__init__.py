@@ -21,9 +21,7 @@ NAMES = ("area_laws", "meyer", "table1", "table2", "thresholds")
 
 @dataclass(frozen=True)
 class Table:
-    """Columns by name (arrays of numbers or lists of words), `units` per column, and where they
-    come from.
-    """
+    """Columns by name (arrays of numbers or lists of words), `units` per column, and where they come from."""
 
     name: str
     title: str

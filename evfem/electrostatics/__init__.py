@@ -1,5 +1,4 @@
-"""Electrostatic attraction and voltage signals: force laws, dielectrics, closed forms, encoding,
-files.
+"""Electrostatic attraction and voltage signals: force laws, dielectrics, closed forms, encoding, files.
 
 The full field of rigid bodies is loaded when it is first asked for: the closed forms need numpy alone.
 """

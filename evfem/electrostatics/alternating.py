@@ -205,9 +205,7 @@ def square_harmonics() -> tuple[Floats, Floats]:
 
 
 def grouped(order: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """The first `SINGLE` of these orders as they are, those above in at most `GROUPS` groups: orders
-    that grow, from 1 on, and weights, of the same total.
-    """
+    """The first `SINGLE` orders as they are, those above in at most `GROUPS` groups of equal total."""
     if order.size <= SINGLE:
         return order, weight
     ends = np.unique(np.geomspace(SINGLE, order.size, GROUPS + 1).astype(int))[:-1]

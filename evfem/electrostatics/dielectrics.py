@@ -6,12 +6,11 @@ With the time dependence exp(+i w t), w = 2 pi f, a dielectric has the complex r
           + \sum_k \frac{\Delta\varepsilon_k}{(i\omega\tau_k)^{b_k} + (i\omega\tau_k)^{1-\alpha_k}}
           + \frac{\sigma}{i\omega\varepsilon_0},
 
-with b = 0 the sum of Cole and Cole (K. S. Cole, R. H. Cole, J. Chem. Phys. 9 (1941) 341), as
-S. Gabriel, R. W. Lau, C. Gabriel, Phys. Med. Biol. 41 (1996) 2271, use it for tissues; with b > 0
-the function of V. Raicu, N. Kitagawa, A. Irimajiri, Phys. Med. Biol. 45 (2000) L1, for skin.
-A pole with b = 0 and alpha = 0 is Debye's: one relaxation in time. A sum of these with weights that
-are not negative, found by least squares at given times :math:`\tau_k`, follows any passive
-dielectric over a band of frequencies (`Dielectric.debye`).
+with b = 0 the sum of Cole and Cole (K. S. Cole, R. H. Cole, J. Chem. Phys. 9 (1941) 341), as S. Gabriel, R.
+W. Lau, C. Gabriel, Phys. Med. Biol. 41 (1996) 2271, use it for tissues; with b > 0 the function of V. Raicu,
+N. Kitagawa, A. Irimajiri, Phys. Med. Biol. 45 (2000) L1, for skin. A pole with b = 0 and alpha = 0 is
+Debye's: one relaxation in time. A sum of these with weights that are not negative, found by least squares at
+given times :math:`\tau_k`, follows any passive dielectric over a band of frequencies (`Dielectric.debye`).
 
 All presets were measured on the skin of the forearm; none is the stratum corneum of a fingertip.
 Units: Hz, s, S/m.
@@ -52,14 +51,14 @@ LEAST = 1e-300
 
 @runtime_checkable
 class Permittivity(Protocol):
-    """What a layer needs of a dielectric: its permittivity at a frequency."""
+    """A dielectric as a layer uses it: permittivity at a frequency."""
 
     def permittivity(self, frequency: Any) -> Any:
         """Complex relative permittivity at frequencies in Hz, of their shape."""
 
 
 class _Fitted:
-    """What every dielectric here can do with its permittivity."""
+    """Common methods of the dielectrics here."""
 
     def permittivity(self, frequency: Values) -> Values:
         raise NotImplementedError
@@ -78,9 +77,8 @@ class _Fitted:
         relative error of `tolerance`.
 
         The fewest relaxation times, evenly spaced on a logarithmic scale, that reach it; weights,
-        high-frequency permittivity and conductivity by non-negative least squares of the relative
-        errors. Raises InputError where no sum of poles does, as for a table that no passive
-        dielectric has.
+        high-frequency permittivity and conductivity by non-negative least squares of the relative errors.
+        Raises InputError where no sum of poles does, as for a table that no passive dielectric has.
 
         >>> skin = SKINS["gabriel_dry"].debye(1.0, 1e5, 2e-3)
         >>> sorted({pole[2] for pole in skin.poles})
@@ -114,9 +112,7 @@ def _times(low: float, high: float, number: int, reach: float) -> Floats:
 
 
 def _fit(of: _Fitted, frequency: Floats, times: Floats) -> tuple[Dielectric, float]:
-    """The sum of Debye poles at these times closest to a permittivity, and its largest relative
-    error.
-    """
+    """The sum of Debye poles at these times closest to a permittivity, and its largest relative error."""
     from scipy.optimize import nnls
 
     wanted = np.asarray(of.permittivity(frequency))
@@ -255,9 +251,7 @@ def dielectric(skin: Any) -> Any:
 
 
 def constants(layer: Layer, frequency: Values | None) -> tuple[Values, Values]:
-    """Relative permittivity and conductivity (S/m) of a layer at a frequency (Hz); without one
-    those of a layer that does not depend on it.
-    """
+    """Relative permittivity and conductivity (S/m) at a frequency (Hz) or, if constant, without."""
     of: Any = layer.eps_r
     if not callable(getattr(of, "permittivity", None)):
         return of, 0.0

@@ -1,9 +1,8 @@
-r"""How a scene's voltage alternates, what conducts, and what a force law sees of it.
+r"""The alternating voltage of a scene: waveform, conduction, and its effective value in a force law.
 
-A voltage is the effective one (root mean square). Under a sine the mean attraction over the cycle
-is a law of the complex length z (`evfem.electrostatics.laws`). A square wave of the same effective
-voltage U is the sum of its odd harmonics, :math:`U_n^2 = 8 U^2 / (\pi n)^2`, whose mean pressures
-add up:
+A voltage is the effective one (root mean square). Under a sine the mean attraction over the cycle is a law of
+the complex length z (`evfem.electrostatics.laws`). A square wave of the same effective voltage U is the sum
+of its odd harmonics, :math:`U_n^2 = 8 U^2 / (\pi n)^2`, whose mean pressures add up:
 
 .. math:: \bar p = \sum_{n = 1, 3, ...} p(g, U_n, z(n \omega)) .
 
@@ -92,9 +91,7 @@ class Drive:
         return plain(WAVEFORMS[self.waveform].crest * np.asarray(effective))
 
     def signal(self, voltage: float) -> TimeSignal | float:
-        """The voltage of the moment with this effective value (V), where it is resolved: a signal,
-        or a direct voltage without a frequency.
-        """
+        """Voltage of the moment with this effective value (V), where resolved: a signal, or constant."""
         if self.frequency is None:
             return voltage
         return WAVEFORMS[self.waveform](self.frequency, abs(self.peak(voltage)))
@@ -106,9 +103,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class CycleMean:
-    """A force law over the cycle of a voltage with several harmonics: the sum of its tractions
-    times `weights` (H,), over layers whose first axis is that of the harmonics.
-    """
+    """A force law over a cycle of harmonics: tractions times `weights` (H,), the layers' first axis."""
 
     law: ForceLaw
     weights: Any
@@ -144,9 +139,7 @@ def powers(signal: Any) -> tuple[float, Floats, Floats] | None:
 
 
 def spectrum(drive: Drive, signal: Any) -> tuple[Floats, Floats]:
-    """Orders of the harmonics of a drive, or of a `signal` that repeats, and their shares of the squared
-    effective voltage.
-    """
+    """Harmonics of a drive, or of a periodic `signal`: orders and shares of the squared effective voltage."""
     found = powers(signal)
     if found is not None:
         return found[1:]
@@ -168,9 +161,7 @@ def steady_layers(solids: tuple[Layer, ...], drive: Drive, gap_eps_r: float) -> 
 def mean_law(
     law: ForceLaw, drive: Drive, frequency: float | None, solids: tuple[Layer, ...], signal: Any = None
 ) -> tuple[Any, Layers]:
-    """The law and the layers that give the mean attraction over the cycle at `frequency` (Hz), of the
-    drive's waveform or of a `signal` that repeats with it.
-    """
+    """Law and layers of the mean attraction over the cycle at `frequency` (Hz), of drive or `signal`."""
     gap_eps_r = getattr(law, "gap_eps_r", 1.0)
     given = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": gap_eps_r}
     single = powers(signal) is None and WAVEFORMS[drive.waveform].harmonics()[0].size == 1

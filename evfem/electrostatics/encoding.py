@@ -1,10 +1,8 @@
-"""Closed-form rendering: from the friction of a real surface to a display's voltage, (1),
-(12)-(20b).
+"""Closed-form rendering: from the friction of a real surface to a display's voltage, (1), (12)-(20b).
 
-Friction on a display is ``F_t = mu (F_n + F_e)``. The attraction of touching skin is
-``F_e = A p(0, U)`` with the contact area ``A = k F_n^m``; the air layer around it is left out.
-Units: mm, N, V. In plane strain, forces are per mm of depth; then only a linear area law (m = 1)
-keeps its k, in mm^2/N.
+Friction on a display is ``F_t = mu (F_n + F_e)``. The attraction of touching skin is ``F_e = A p(0, U)`` with
+the contact area ``A = k F_n^m``; the air layer around it is left out. Units: mm, N, V. In plane strain,
+forces are per mm of depth; then only a linear area law (m = 1) keeps its k, in mm^2/N.
 """
 
 from __future__ import annotations
@@ -45,8 +43,7 @@ class AreaLaw:
         return plain(self.k * np.asarray(force) ** self.m)
 
     def linearised(self, highest: float) -> AreaLaw:
-        """The line through the origin closest to this law in least squares over 0 <= F_n <=
-        `highest`.
+        """The line through the origin closest to this law in least squares over 0 <= F_n <= `highest`.
 
         k' = 3 k highest^(m - 1) / (m + 2): what the paper's k' in (20a) stands for.
 
@@ -58,8 +55,7 @@ class AreaLaw:
 
 
 def required_attraction(friction: Values, display_friction: Values, normal_force: Values) -> Values:
-    """Attraction (force of `normal_force`'s unit) that makes the display feel like `friction`,
-    equation (18).
+    """Attraction (force of `normal_force`'s unit) that makes the display feel like `friction`, equation (18).
 
     ``F_e = (mu_rs / mu_hd - 1) F_n``; 0 where the surface is slipperier than the display, because
     attraction can only add friction (see `share_not_renderable`).
@@ -72,8 +68,7 @@ def required_attraction(friction: Values, display_friction: Values, normal_force
 
 
 def share_not_renderable(position: Values, friction: Values, display_friction: float) -> float:
-    """Share of the path on which `friction` (linear between `position` in mm) is below the
-    display's own.
+    """Share of the path on which `friction` (linear between `position` in mm) is below the display's own.
 
     >>> share_not_renderable([0.0, 1.0, 2.0], [0.4, 0.6, 0.6], display_friction=0.5)
     0.25
@@ -92,9 +87,8 @@ def share_not_renderable(position: Values, friction: Values, display_friction: f
 
 @dataclass(frozen=True)
 class Encoding:
-    """A display with what is needed to encode friction as voltage: law, solid layers, area law,
-    own friction. Voltages are effective ones; `crest` is the peak of the display's waveform over
-    them.
+    """A display with what is needed to encode friction as voltage: law, solid layers, area law, own friction.
+    Voltages are effective ones; `crest` is the peak of the display's waveform over them.
 
     The paper's (16a), (17), (19), (20a) are this with `Kaczmarek`, (16b), (20b) with
     `StrongTroxel`; (20a) and (20b) have a linear area law, where the voltage does not depend on
@@ -175,9 +169,7 @@ class Encoding:
 
 @dataclass(frozen=True)
 class PowerFit:
-    """``y = k x^m`` fitted to points, with the standard errors of both (infinite with only two
-    points).
-    """
+    """``y = k x^m`` fitted to points, with the standard errors of both (infinite with only two points)."""
 
     k: float
     m: float
@@ -188,10 +180,9 @@ class PowerFit:
 def fit_power(x: Values, y: Values, *, relative: bool = True) -> PowerFit:
     """Least-squares fit of ``y = k x^m`` to at least two points.
 
-    `relative` (the default) minimises the errors of ln y, which needs y > 0; otherwise those of y
-    itself. Area laws (15) are ``fit_power(normal_force, area)``; in (11), alpha is k and beta is
-    -m. Raises InputError for other than two equally long lists, x <= 0, or fewer than two
-    different x.
+    `relative` (the default) minimises the errors of ln y, which needs y > 0; otherwise those of y itself.
+    Area laws (15) are ``fit_power(normal_force, area)``; in (11), alpha is k and beta is -m. Raises
+    InputError for other than two equally long lists, x <= 0, or fewer than two different x.
 
     >>> fit = fit_power([0.1, 0.5, 1.0], [63.0 * 0.1**0.68, 63.0 * 0.5**0.68, 63.0])
     >>> round(fit.k, 9), round(fit.m, 9)
@@ -238,9 +229,7 @@ def _straight_line(log_x: Floats, log_y: Floats) -> tuple[float, float]:
 
 
 def _standard_errors(jacobian: Floats, residual: Floats) -> Floats:
-    """Square roots of the diagonal of s^2 (J J^T)^-1, s^2 per degree of freedom; J (parameters,
-    points).
-    """
+    """Square roots of the diagonal of s^2 (J J^T)^-1, s^2 per degree of freedom; J (parameters, points)."""
     freedom = residual.size - len(jacobian)
     if freedom == 0:
         return np.full(len(jacobian), np.inf)

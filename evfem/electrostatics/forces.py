@@ -1,9 +1,7 @@
-"""Closed-form forces on flat and ellipsoidal pads (2)-(8b), (11), (24); skin thickness from
-thresholds.
+"""Closed-form forces on flat and ellipsoidal pads (2)-(8b), (11), (24); skin thickness from thresholds.
 
-Units: mm, N, V; permittivities relative. All arguments broadcast; scalars give a float. Equation
-numbers are those of the paper on modelling and validating electrovibration displays that the
-project starts from.
+Units: mm, N, V; permittivities relative. All arguments broadcast; scalars give a float. Equation numbers are
+those of the paper on modelling and validating electrovibration displays that the project starts from.
 """
 
 from __future__ import annotations
@@ -23,8 +21,7 @@ Outline = Literal["rectangle", "ellipse"]
 
 
 def capacitor_force(area: Values, voltage: Values, thickness: Values, eps_r: Values) -> Values:
-    """Force in N on plates of `area` in mm^2, one dielectric, equation (2): eps_0 eps A U^2 / (2
-    d^2).
+    """Force in N on plates of `area` in mm^2, one dielectric, equation (2): eps_0 eps A U^2 / (2 d^2).
 
     >>> round(1e3 * capacitor_force(area=100.0, voltage=1000.0, thickness=0.1, eps_r=1.0), 3)  # mN
     44.271
@@ -36,9 +33,7 @@ def capacitor_force(area: Values, voltage: Values, thickness: Values, eps_r: Val
 
 
 def plate_force(law: ForceLaw, area: Values, gap: Values, voltage: Values, layers: Layers) -> Values:
-    """Force in N on a flat pad of `area` in mm^2: equations (3) and (5) at gap 0, (6) and (7)
-    above it.
-    """
+    """Force in N on a flat pad of `area` in mm^2: equations (3) and (5) at gap 0, (6) and (7) above it."""
     area = at_least("area", area, 0.0, "an area in mm^2, not negative")
     gap = at_least("gap", gap, 0.0, "an air gap in mm, not negative")
     return plain(np.asarray(area * law.traction(gap, voltage, layers)))
@@ -62,9 +57,7 @@ class EllipsoidalPad:
             object.__setattr__(self, name, value)
 
     def gap(self, x: Values, y: Values, lowest: Values) -> Values:
-        """Air gap d^a(x, y) in mm, equation (24); abs(x) <= a, abs(y) <= c; `lowest`: d^a0 in the
-        middle.
-        """
+        """Air gap d^a(x, y) in mm, equation (24); abs(x) <= a, abs(y) <= c; `lowest`: d^a0 in the middle."""
         b = self.height / 2.0
         rise_x = 1.0 - np.sqrt(1.0 - (2.0 * np.asarray(x) / self.width) ** 2)
         rise_y = 1.0 - np.sqrt(1.0 - (2.0 * np.asarray(y) / self.length) ** 2)
@@ -81,9 +74,7 @@ def _unit_gauss() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
 
 
 def _near_pole(scale: Values, upper: Values) -> tuple[Values, Values]:
-    """Gauss points and weights (last axis) on [0, upper] for 1 / (scale^2 + t^2)^q: t = scale
-    sinh(v).
-    """
+    """Gauss points and weights (last axis) on [0, upper] for 1 / (scale^2 + t^2)^q: t = scale sinh(v)."""
     nodes, weights = _unit_gauss()
     end = np.arcsinh(upper / scale)[..., None]
     scale = np.asarray(scale)[..., None]
@@ -108,14 +99,12 @@ def pad_force(
     layers: Layers,
     over: Outline = "rectangle",
 ) -> Values:
-    """Force in N on an ellipsoidal pad at lowest air gap `gap` in mm: (8a) or (8b) with (24),
-    1e-10 relative.
+    """Force in N on an ellipsoidal pad at lowest air gap `gap` in mm: (8a) or (8b) with (24), 1e-10 relative.
 
-    `over` chooses the area of integration: the rectangle abs(x) <= a, abs(y) <= c (the paper's
-    numbers) or the ellipse in it. All arguments broadcast; the result has their common shape. With
-    x = a sin(t), y = c sin(v) the gap is ``gap + b (2 - cos t - cos v)``, so the integrand is
-    smooth and one product Gauss rule serves every evaluation. Raises InputError for a negative gap
-    or where nothing insulates.
+    `over` chooses the area of integration: the rectangle abs(x) <= a, abs(y) <= c (the paper's numbers) or
+    the ellipse in it. All arguments broadcast; the result has their common shape. With x = a sin(t), y = c
+    sin(v) the gap is ``gap + b (2 - cos t - cos v)``, so the integrand is smooth and one product Gauss rule
+    serves every evaluation. Raises InputError for a negative gap or where nothing insulates.
 
     >>> from evfem.electrostatics.laws import Kaczmarek
     >>> pad, skin, film = EllipsoidalPad(16.70, 12.80, 22.5), Layer(0.38, 1650.0), Layer(0.09, 3.35)
@@ -153,8 +142,7 @@ def _pad_force_batch(law: ForceLaw, columns: list[npt.NDArray[Any]], over: Outli
 def pad_force_per_depth(
     law: ForceLaw, pad: EllipsoidalPad, gap: Values, voltage: Values, layers: Layers
 ) -> Values:
-    """Force in N/mm per depth on the lower half of the elliptic cross-section of `pad`, 1e-10
-    relative.
+    """Force in N/mm per depth on the lower half of the elliptic cross-section of `pad`, 1e-10 relative.
 
     The two-dimensional counterpart of (8a), (8b): the vertical traction on the projected width;
     `pad.length` is not used.
@@ -174,11 +162,9 @@ def pad_force_per_depth(
 
 
 def air_layer_ratio(normal_force: Values, alpha: Values, beta: Values) -> Values:
-    """Attraction of the air layer relative to that of touching skin alone, equation (11): alpha
-    F_n^-beta.
+    """Attraction of the air layer relative to that of touching skin alone, equation (11): alpha F_n^-beta.
 
-    `normal_force` in N/mm in the two-dimensional model. The share of the total is ratio / (1 +
-    ratio).
+    `normal_force` in N/mm in the two-dimensional model. The share of the total is ratio / (1 + ratio).
     """
     force = above("normal_force", normal_force, 0.0, "a normal force above zero")
     return plain(np.asarray(alpha * np.asarray(force) ** -np.asarray(beta)))
@@ -201,8 +187,7 @@ def effective_thickness_from_thresholds(
     insulators: tuple[Layer, Layer],
     friction: tuple[Values, Values] = (1.0, 1.0),
 ) -> Values:
-    """Reduced thickness d_sc / eps_sc in mm of skin that feels the same with two insulators,
-    equation (21).
+    """Reduced thickness d_sc / eps_sc in mm of skin that feels the same with two insulators, equation (21).
 
     `voltages` are the two thresholds in V. The printed closed form (22) is the special case d_i3 =
     2 d_i2 with d_i = d_i2. Raises InputError if no positive thickness satisfies (21).
@@ -225,9 +210,8 @@ def stratum_corneum_from_thresholds(
 ) -> Values:  # fmt: skip
     """Thickness d_sc in mm of skin of permittivity `eps_r` after Kaczmarek's law, equation (23).
 
-    (23) is a quadratic in d_sc; its positive root. With Strong-Troxel's law the thickness is
-    `eps_r` times `effective_thickness_from_thresholds`. Raises InputError if no positive thickness
-    satisfies (23).
+    (23) is a quadratic in d_sc; its positive root. With Strong-Troxel's law the thickness is `eps_r` times
+    `effective_thickness_from_thresholds`. Raises InputError if no positive thickness satisfies (23).
     """
     first, second = (np.asarray(w) for w in _threshold_weights(voltages, friction))
     (da, ea), (db, eb) = ((film.thickness, film.eps_r) for film in insulators)

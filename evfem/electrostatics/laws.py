@@ -1,5 +1,4 @@
-"""Electrostatic attraction between skin and an insulated electrode: solid layers and the two force
-laws.
+"""Electrostatic attraction between skin and an insulated electrode: solid layers and the two force laws.
 
 Both laws treat skin and electrode as parallel plates with solid layers (stratum corneum, insulator) and
 a gap in series. With ``s`` = sum of d / eps_r over the solid layers (`Layers.reduced`), ``D`` = their
@@ -20,8 +19,7 @@ cycle is::
 The second is our definition, which follows the law's derivation: nobody has defined it for
 alternating voltage in print. Without losses, l = 0, both are what stands above, bit for bit.
 
-`StrongTroxel` is electrostatics of rigid layers and a movable gap; `Kaczmarek` lets the layers
-stretch with the gap. Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are
+Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are
 positive where they attract. Equation numbers are those of the paper on modelling and validating
 electrovibration displays that the project starts from. Every function takes scalars or arrays that
 broadcast, real or complex (for derivatives by complex step); scalars give a float.
@@ -79,9 +77,7 @@ class Layer:
             object.__setattr__(self, "eps_r", eps_r)
 
     def permittivity(self, frequency: Values | None) -> Values:
-        """Relative permittivity at `frequency` (Hz): complex if the layer is a dielectric that
-        depends on it. Raises InputError if that is asked without a frequency.
-        """
+        """Relative permittivity at `frequency` (Hz), complex of dielectrics: InputError without."""
         of: Any = getattr(self.eps_r, "permittivity", None)
         if of is None:
             return self.eps_r
@@ -101,8 +97,7 @@ INSULATORS = {"film": FILM, "touchscreen": TOUCHSCREEN}
 
 @dataclass(frozen=True)
 class Layers:
-    """A stack of solid layers as the laws see it: `reduced` = sum d / eps_r, `thickness` = sum d,
-    in mm.
+    """A stack of solid layers as the laws see it: `reduced` = sum d / eps_r, `thickness` = sum d, in mm.
 
     Both are numbers or arrays per node. `Layers.of` adds up any number of layers. `loss` (mm) is the
     imaginary part of the reduced thickness under alternating voltage, 0 without losses.
@@ -207,9 +202,7 @@ class StrongTroxel(NamedLaw, name="strong_troxel"):
     of_a_field = True
 
     def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
-        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be
-        infinite.
-        """
+        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be infinite."""
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         if np.any(layers.loss):
             near = np.sqrt(near**2 + (self.gap_eps_r * layers.loss) ** 2)
@@ -256,12 +249,11 @@ def _atan_ratio(ratio: npt.NDArray[Any]) -> npt.NDArray[Any]:
 class Kaczmarek(NamedLaw, name="kaczmarek"):
     """Attraction of layers that stretch with the gap, equations (5) and (7).
 
-    ``p = e eps_0 U^2 / (2 (g + e s)(g + D))``, potential per area
-    ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g + D) / (g + e s))`` with ``p = dPi/dg``; for
-    ``D -> e s`` both become those of `StrongTroxel`. `gap_eps_r` is ``e``, for what fills the gap:
-    1 for air. With losses under alternating voltage (`Layers.loss`) the law is our own definition:
-    ``p = e eps_0 U^2 a / (2 (a^2 + c^2)(a + d))`` with a = g + e s, c = e l, d = D - e s and ``Pi = -e
-    eps_0 U^2 ((d/2) ln((a + d)^2 / (a^2 + c^2)) + c atan(c/a)) / (2 (c^2 + d^2))``.
+    ``p = e eps_0 U^2 / (2 (g + e s)(g + D))``, potential per area ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g +
+    D) / (g + e s))`` with ``p = dPi/dg``; for ``D -> e s`` both become those of `StrongTroxel`. `gap_eps_r`
+    is ``e``, for what fills the gap: 1 for air. With losses under alternating voltage (`Layers.loss`) the law
+    is our own definition: ``p = e eps_0 U^2 a / (2 (a^2 + c^2)(a + d))`` with a = g + e s, c = e l, d = D - e
+    s and ``Pi = -e eps_0 U^2 ((d/2) ln((a + d)^2 / (a^2 + c^2)) + c atan(c/a)) / (2 (c^2 + d^2))``.
 
     >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
     >>> round(1e3 * Kaczmarek().traction(0.0, 2000.0, layers), 2)         # kPa, touching skin
@@ -271,9 +263,7 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
     gap_eps_r: GapPermittivity = 1.0
 
     def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
-        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be
-        infinite.
-        """
+        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be infinite."""
         near, far = _lengths(gap, layers, self.gap_eps_r)
         if np.any(layers.loss):
             near = near + (self.gap_eps_r * layers.loss) ** 2 / near
@@ -290,9 +280,7 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
         return plain(-traction * (1.0 / near + 1.0 / far))
 
     def potential(self, gap: Values, voltage: Values, layers: Layers) -> Values:
-        """Pi in N/mm (= N mm per mm^2), zero at infinite gap; exact to rounding also where D = e
-        s.
-        """
+        """Pi in N/mm (= N mm per mm^2), zero at infinite gap; exact to rounding also where D = e s."""
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         ratio = np.asarray((layers.thickness - self.gap_eps_r * layers.reduced) / near)
         share = _log1p_ratio(ratio)
@@ -304,11 +292,9 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
 
 
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:
-    """dp/dg in MPa/mm of any law: its own `traction_derivative`, else a complex step on
-    `traction`.
+    """dp/dg in MPa/mm of any law: its own `traction_derivative`, else a complex step on `traction`.
 
-    A law that drops the imaginary part (it takes absolute values, say) is differenced over
-    `GAP_STEP`.
+    A law that drops the imaginary part (it takes absolute values, say) is differenced over `GAP_STEP`.
     """
     own = getattr(law, "traction_derivative", None)
     if own is not None:

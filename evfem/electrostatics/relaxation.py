@@ -50,9 +50,9 @@ its end. Energy and loss per area over eps_0 are
 .. math:: \tfrac12\sum_j d_j\Big(\varepsilon_\infty E^2 + \sum_k p_k^2/\Delta_k\Big)_j, \qquad
           \sum_j d_j\Big(\kappa E^2 + \sum_k \tau_k\dot p_k^2/\Delta_k\Big)_j .
 
-A force law sees the layers with their permittivity at the voltage's frequency (static without one) and
-the voltage that makes the same field in the gap. A dielectric that is no sum of Debye poles is fitted
-by one (`debye_layer`). Lengths in mm, charges and polarisations over eps_0 in V/mm,
+A force law sees the layers with their permittivity at the voltage's frequency (static without one) and the
+voltage of the same field in the gap. Other dielectrics are fitted by Debye poles (`debye_layer`).
+Lengths in mm, charges and polarisations over eps_0 in V/mm,
 rates in 1/s. Arguments broadcast; gaps may have a small imaginary part (for derivatives).
 """
 
@@ -87,9 +87,7 @@ def _phi(z: Any) -> tuple[Any, Any, Any]:
 
 
 def _difference(f: tuple[Any, Any], rates: tuple[Any, Any]) -> Any:
-    """Divided difference of a function over two rates; A is a multiple of one where they are one,
-    and it does not count.
-    """
+    """Divided difference of a function over two rates, times A; the derivative where they are one."""
     apart = rates[0] - rates[1]
     same = apart == 0.0
     return np.where(same, 0.0, (f[0] - f[1]) / np.where(same, 1.0, apart))
@@ -106,9 +104,7 @@ def _contour() -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class Relaxing:
-    """A layer: `thickness` (mm), permittivity at high frequency, conductivity over eps_0 `kappa`
-    (1/s), and Debye poles as columns `strength` (K,) and `tau` (K,) in s.
-    """
+    """A layer: `thickness` (mm), eps_r, `kappa` = sigma/eps_0 (1/s), Debye `strength`, `tau` (K,) in s."""
 
     thickness: Values
     eps_inf: Values
@@ -147,9 +143,7 @@ class Relaxing:
         return np.einsum("ks...,k...->s...", tau / (1.0 + s * tau), polarisation)
 
     def polarised(self, s: Any, weight: Any, field: Any) -> Any:
-        """Polarisations (K, ...) under a field with the transform (S, ...) at s, by their sum over
-        the contour with the weight (S, ...).
-        """
+        """Polarisations (K, ...) under a field with transform (S, ...), summed over the contour by weight."""
         strength, tau = self.poles(s)
         return np.einsum("ks...,s...->k...", weight * strength / (1.0 + s * tau), field)
 
@@ -167,11 +161,9 @@ class Relaxing:
 
 @dataclass(frozen=True)
 class Sandwich:
-    """Layers in series as the charges see them: `skin`, `insulator`, the gap's conductivity over eps_0
-    `leak` (1/s), the reduced thickness (mm) of both that force laws see, `reference`, and the gap's
-    permittivity. Numbers, or without poles arrays over nodes.
-
-    The state (M, ...) has the two charges, then the polarisations of skin and insulator.
+    """Layers in series as the charges see them: `skin`, `insulator`, the gap's conductivity over eps_0 `leak`
+    (1/s) and permittivity, the reduced thickness (mm) that laws see, `reference`. The state (M, ...) has the
+    two charges, then the polarisations of skin and insulator.
     """
 
     skin: Relaxing
@@ -185,9 +177,7 @@ class Sandwich:
         cls, skin: Layer, insulator: Layer, *, frequency: Values | None, gap_conductivity: Values,
         gap_eps_r: float = 1.0,
     ) -> Sandwich:  # fmt: skip
-        """Without poles, from two solid layers: dielectrics among them by permittivity and conductivity at
-        `frequency` (Hz), or without one if they depend on it by their conductivity alone.
-        """
+        """Without poles, of two solid layers; dielectrics at `frequency` (Hz), or by conductivity alone."""
         (eps_1, sigma_1), (eps_3, sigma_3) = (constants(layer, frequency) for layer in (skin, insulator))
         # a layer as its displacement sees it: reduced thickness, permittivity 1, relaxation rate
         first = Relaxing(skin.thickness / eps_1, 1.0, sigma_1 / (eps_0 * eps_1))
@@ -245,9 +235,7 @@ class Sandwich:
         return self.skin.loss(E_1, first) + gap * self.leak * E_2**2 + self.insulator.loss(E_3, third)
 
     def after(self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values) -> Any:
-        """State (M, ...) that `charges` become at a fixed `gap` (mm) in so many `seconds`, the
-        voltage going straight from `before` to `after` (V).
-        """
+        """State (M, ...) of `charges` after `seconds` at `gap` (mm), voltage from `before` to `after` (V)."""
         if self.states == 2:
             return self._exactly(gap, charges, before, after, seconds)
         axes = np.broadcast(gap, before, after, seconds, charges[0]).ndim
@@ -266,15 +254,13 @@ class Sandwich:
         return value
 
     def _kept(self, charges: Any, time: Any) -> Any:
-        """What is left of a state (M, ...) after the `time` without fields."""
+        """Decay of a state (M, ...) over the `time` without fields."""
         tau = np.concatenate([one.poles(time)[1] for one in (self.skin, self.insulator)])
         polarised = charges[2:] * np.exp(-time / tau)
         return np.concatenate([np.broadcast_to(charges[:2], (2, *polarised.shape[1:])), polarised])
 
     def _fields(self, gap: Any, start: Any, volts: Any, s: Any) -> tuple[Any, Any]:
-        """The transforms (S, ...) of the three fields at s under the voltage's, and their derivatives
-        by the gap.
-        """
+        """Transforms (S, ...) at s of the three fields under the voltage's, and derivatives by the gap."""
         first, third = self._polarisations(start)
         left, right = self.skin.left(s, first) + start[0] / s, self.insulator.left(s, third) - start[1] / s
         Y_1, Y_3 = self.skin.admittance(s), self.insulator.admittance(s)
@@ -287,9 +273,7 @@ class Sandwich:
         return fields, (steeper / Y_1, steeper / Y_2, steeper / Y_3)
 
     def _moved(self, s: Any, weight: Any, fields: tuple[Any, Any, Any]) -> Any:
-        """What the transforms (S, ...) of the three fields add to the state (M, ...), by the sum over
-        the contour with the `weight` (S, ...).
-        """
+        """What transforms (S, ...) of the fields add to the state (M, ...), summed by `weight`."""
         E_1, E_2, E_3 = fields
         share = weight / s
         first = np.sum(share * (self.skin.kappa * E_1 - self.leak * E_2), axis=0)
@@ -298,7 +282,7 @@ class Sandwich:
         return 2.0 * np.real(np.concatenate([np.stack([first, second]), *parts]))
 
     def _polarisations(self, charges: Any) -> tuple[Any, Any]:
-        """Those of skin and insulator (K, ...) in a state."""
+        """Polarisations of skin and insulator (K, ...) in a state."""
         end = 2 + self.skin.tau.size
         return charges[2:end], charges[end:]
 
@@ -329,9 +313,7 @@ class Sandwich:
         return np.stack(np.broadcast_arrays(*result))
 
     def step_response(self, gap: Any, time: Values) -> Any:
-        """Without poles the effective voltage at `time` (s) after a step of 1 V from no charge: straight
-        from its start, its first slope and its end, so that it decays to rounding of itself.
-        """
+        """Without poles effective voltage at `time` (s) after 1 V from no charge, by start, slope, end."""
         k1, k2, k3 = self.rates
         slow, fast = self.eigenvalues(gap)
         skin, air, film = self._reduced(gap)
@@ -344,9 +326,7 @@ class Sandwich:
         return end + decay * (1.0 - end) + both * (slope - slow * (1.0 - end))
 
     def eigenvalues(self, gap: Any) -> tuple[Any, Any]:
-        """The slower and the faster of the two rates (1/s, not positive) at a fixed `gap` (mm),
-        without poles.
-        """
+        """The slower and the faster rate (1/s, not positive) at a fixed `gap` (mm), without poles."""
         (a11, a12, a21, a22), _ = self._system(gap)
         square = (0.5 * (a11 - a22)) ** 2 + a12 * a21
         root = np.sqrt(np.where(np.real(square) > 0.0, square, 0.0))
@@ -378,9 +358,7 @@ def _lifted(values: Any, axes: int) -> Any:
 def stack_of(
     skin: Layer, insulator: Layer, *, frequency: float | None, gap_conductivity: float, gap_eps_r: float
 ) -> Sandwich:
-    """The layers of a voltage that is resolved in time, as their charges see them. `frequency` (Hz) is the
-    voltage's, None of a direct one.
-    """
+    """The layers as their charges see them. `frequency` (Hz) is the voltage's, None of a direct one."""
     if not (relaxes(skin) or relaxes(insulator)):
         given = {"gap_conductivity": gap_conductivity, "gap_eps_r": gap_eps_r}
         return Sandwich.of(skin, insulator, frequency=frequency, **given)

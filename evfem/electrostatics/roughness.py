@@ -2,10 +2,9 @@ r"""What a force law becomes on faces that touch: rough ones keep a gap, a core 
 
 **Rough faces** keep an air gap between them, in series with the solid layers.
 
-Skin and glass touch at their highest asperities; the mean separation s of their mean planes falls
-as the contact pressure p grows. A force law then sees the gap g + s (`evfem.contact.attraction`).
-Without it a node that touches an insulator of 1 um at 100 V is pulled by some 80 kPa, which no
-finger shows.
+Skin and glass touch at their highest asperities; the mean separation s of their mean planes falls as the
+contact pressure p grows. A force law then sees the gap g + s (`evfem.contact.attraction`). Without it a node
+that touches an insulator of 1 um at 100 V is pulled by some 80 kPa, which no finger shows.
 
 ==========================  ============================  ==========================================
 law                         s above p_c                   source
@@ -25,19 +24,12 @@ A part of one's own needs `separation(pressure)` (`evfem.protocols.RoughnessLaw`
 
 **A linear core** of a force law (`Cored`): below a gap a straight line of the same work takes its place.
 
-Under a strong attraction each node of a mesh snaps by itself where the traction p(g) falls faster with
-the gap than the mesh resolves. The work of adhesion is what counts then, not the strength [1]_ [2]_.
-With :math:`g_0` the gap of closed faces, :math:`e = g_0 + h^*` and the potential :math:`\Pi`,
-
-.. math:: p'(g) = p(e) + m\,(e - g) \quad (g_0 \le g < e), \qquad p'(g) = p(g) \quad (g \ge e),
-
-.. math:: m = 2\,\frac{\Pi(e) - \Pi(g_0) - h^* p(e)}{h^{*2}} .
-
-The work from :math:`g_0` to any gap beyond e is that of the law, and m is the steepest slope. No law of
-the same work that is nowhere steeper and differs from p only below a gap differs from it less far. For
-given m, :math:`h^*` is the only root, found by Newton's method between bounds; it depends on the
-voltage, and is nothing where the law is not steeper than m. Below :math:`g_0`, where pressed rough faces
-come closer, the traction grows as the law's does.
+Where the traction falls faster than the mesh resolves, the work of adhesion counts, not the strength [1]_
+[2]_ (docs, Theory, a strong attraction on a mesh, has the equations). No law of the same work that is nowhere
+steeper and differs from p only below a gap differs from it less far. For given slope m, :math:`h^*` is the
+only root, found by Newton's method between bounds; it depends on the voltage, and is nothing where the law is
+not steeper than m. Below :math:`g_0`, where pressed rough faces come closer, the traction grows as the law's
+does.
 
 .. [1] K. L. Johnson, K. Kendall, A. D. Roberts, Proc. R. Soc. A 324 (1971) 301,
    doi:10.1098/rspa.1971.0141.
@@ -198,9 +190,7 @@ RoughnessGap = Annotated[
 
 
 def separation_derivative(law: RoughnessLaw, pressure: Values) -> Values:
-    """ds/dp in mm/MPa of any law: its own, else a complex step on `separation`, or a difference
-    over `PRESSURE_STEP`.
-    """
+    """ds/dp in mm/MPa of any law: its own, a complex step, or a difference over `PRESSURE_STEP`."""
     own = getattr(law, "separation_derivative", None)
     if own is not None:
         return own(pressure)
@@ -225,9 +215,7 @@ class Line(NamedTuple):
 
 
 class Cored:
-    """`law` with a core no steeper than `steepest` (MPa/mm), or of the `length` (mm) that is given, for
-    faces that are closed at the gap `closed` (mm).
-    """
+    """`law` with a core no steeper than `steepest` (MPa/mm), or of `length` (mm), shut at `closed` (mm)."""
 
     def __init__(self, law: ForceLaw, closed: Values, steepest: Values, length: float | None = None) -> None:
         self.law, self.closed = law, np.asarray(closed, dtype=float)

@@ -1,12 +1,10 @@
-r"""Voltage signals in files: out as csv, 16-bit WAV, friction map and MPEG haptics, back from csv
-and WAV.
+r"""Voltage signals in files: out as csv, 16-bit WAV, friction map and MPEG haptics, back from csv and WAV.
 
 A WAV runs over time, a signal over position; the sliding speed turns one into the other. What a
 file needs to be understood (volts of the largest sample, speed, first position) stands in its own
 comment. Units: V, mm, mm/s, Hz.
 
-**MPEG haptics** have friction over position in the JSON interchange file `.hjif` of ISO/IEC
-23090-31:2025.
+**MPEG haptics** have friction over position in the JSON interchange file `.hjif` of ISO/IEC 23090-31:2025.
 
 Names, types and limits follow MPEG's reference software, which is public under a BSD licence:
 repository MPEGGroup/HapticReferenceSoftware, `source/IOHaptics/src/IOJson.cpp` and `source/Types`,
@@ -42,14 +40,12 @@ MOST_COLUMNS, ROWS = 100_000, 64
 
 @dataclass(frozen=True)
 class Playback:
-    """What turns volts over millimetres into a file for a device: the scale, and how the finger
-    slides.
+    """What turns volts over millimetres into a file for a device: the scale, and how the finger slides.
 
-    `full_scale` (V) is the largest voltage the file can hold; `speed` (mm/s) is needed for .wav
-    and .hjif; `friction`, the coefficients at 0 V and at `full_scale`, for .hjif. `rate` (Hz) is
-    the WAV's, `carrier` (Hz) modulates it: a sine of amplitude `carrier_amplitude(U)`, which
-    attracts like the effective U; a .hjif names it. `pixel` (mm) is the width of a column of the
-    friction map.
+    `full_scale` (V) is the largest voltage the file can hold; `speed` (mm/s) is needed for .wav and .hjif;
+    `friction`, the coefficients at 0 V and at `full_scale`, for .hjif. `rate` (Hz) is the WAV's, `carrier`
+    (Hz) modulates it: a sine of amplitude `carrier_amplitude(U)`, which attracts like the effective U; a
+    .hjif names it. `pixel` (mm) is the width of a column of the friction map.
 
     >>> Playback(full_scale=2000.0, speed=-1.0)
     Traceback (most recent call last):
@@ -104,9 +100,25 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
       stands in the text chunk Comment (JSON), the size of a pixel in pHYs.
     - `.hjif`: MPEG haptics, see `haptics`.
 
-    Raises InputError for another ending, a profile without length, more volts than full scale, or
-    something missing in `playback`; StorageError when the disk refuses.
+    Parameters
+    ----------
+    path
+        The file; its ending decides the format.
+    profile
+        The voltage (V) over the position (mm).
+    playback
+        Full scale, speed and rate of the device.
 
+    Raises
+    ------
+    InputError
+        Another ending, a profile without length, a voltage above full scale, or a value missing in
+        `playback`.
+    StorageError
+        The file cannot be written.
+
+    Examples
+    --------
     >>> slope = VoltageProfile([0.0, 5.0, 10.0], [0.0, 1500.0, 1500.0])
     >>> write_signal("slope.wav", slope, Playback(full_scale=2000.0, speed=20.0, rate=8000))
     >>> back = read_signal("slope.wav")
@@ -136,14 +148,24 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
 
 
 def read_signal(path: str | Path) -> VoltageProfile:
-    """The voltage over the position in a `.wav` that `write_signal` wrote, or in a csv file, for
-    `Scene`.
+    """Read a voltage over the position.
 
-    A WAV gives a row per sample: the voltage within half a step (full_scale / 32767) at the
-    samples, linear in between, so that a jump takes speed / rate mm. A file with another ending is
-    taken for csv. Raises InputError for `.png` and `.hjif`, a missing, cut off or foreign file,
-    more than 1,000,000 rows, and a WAV with a carrier, whose samples are not the effective
-    voltage.
+    Parameters
+    ----------
+    path
+        A `.wav` of `write_signal`, or a csv file (any other ending).
+
+    Returns
+    -------
+    VoltageProfile
+        From a WAV a row per sample: the voltage within half a step (full_scale / 32767) at the
+        samples, linear in between, so that a jump takes speed / rate mm.
+
+    Raises
+    ------
+    InputError
+        A `.png`, `.hjif`, missing, cut off or foreign file, more than 1,000,000 rows, or a WAV with a
+        carrier, whose samples are not the effective voltage.
     """
     ending = Path(path).suffix.lower()
     if ending == ".wav":
@@ -154,9 +176,7 @@ def read_signal(path: str | Path) -> VoltageProfile:
 
 
 def read_voltage(path: str | Path) -> VoltageProfile | Sampled:
-    """The voltage in a file: over time in a csv file with the header ``time,voltage``, else over
-    the position (`read_signal`).
-    """
+    """The voltage in a file: over time (csv with the header ``time,voltage``), else over the position."""
     path = Path(path)
     with suppress(OSError, UnicodeDecodeError), path.open(encoding="utf-8-sig") as lines:
         if [cell.strip() for cell in lines.readline(100).split(",")] == timesignals.HEADER:
@@ -189,13 +209,13 @@ def _hjif(profile: VoltageProfile, playback: Playback) -> str:
 
 
 def _positions(number: int, start: float, spacing: float) -> Floats:
-    """Where the samples are, the same to the last bit when written and when read."""
+    """Positions of the samples, bitwise the same when written and when read."""
     with np.errstate(over="ignore"):  # infinite positions in a damaged file are refused by the profile
         return np.asarray(start + spacing * np.arange(number), dtype=np.float64)
 
 
 def _number(profile: VoltageProfile, spacing: float, most: int, what: str) -> int:
-    """How many spacings cover the profile."""
+    """Number of spacings that cover the profile."""
     number = float(np.ptp(profile.position)) / spacing
     if number > most:
         raise InputError("path", f"a file of {number:.3g} {what}", f"at most {most} of them")
@@ -284,8 +304,7 @@ NO_AVATAR, ANY_BODY_PART = 0, 0
 
 
 def ticks(length: float, speed: float) -> tuple[int, int]:
-    """Unit exponent and ticks per second for `length` (mm) passed at `speed` (mm/s): the finest
-    that fit.
+    """Unit exponent and ticks per second for `length` (mm) passed at `speed` (mm/s): the finest that fit.
 
     >>> ticks(length=10.0, speed=20.0)  # micrometres
     (-6, 20000)

@@ -1,5 +1,4 @@
-r"""Voltage as a function of position, its effective value, and what a carrier and an amplifier make
-of it.
+r"""Voltage as a function of position, its effective value, and what a carrier and an amplifier make of it.
 
 The laws need the effective voltage across skin and insulator. Units: V, mm (of bone position), s.
 
@@ -32,8 +31,7 @@ LARGEST = 1e6
 
 @dataclass(frozen=True)
 class VoltageProfile:
-    """Voltage in V over the position in mm: linear between the rows, constant beyond the first and
-    the last.
+    """Voltage in V over the position in mm: linear between the rows, constant beyond the first and the last.
 
     Positions must not fall; at a repeated position the later row holds from that position on (a
     jump). Calling the profile with positions gives voltages of the same shape.
@@ -77,8 +75,7 @@ class VoltageProfile:
 
     @classmethod
     def from_csv(cls, path: str | Path) -> VoltageProfile:
-        """Read a file with the header ``position,voltage`` and a row of numbers in mm and V per
-        point.
+        """Read a file with the header ``position,voltage`` and a row of numbers in mm and V per point.
 
         Raises InputError for a missing file, another header, or a row that is not two numbers.
         """
@@ -90,8 +87,7 @@ class VoltageProfile:
         write_text(path, ",".join(HEADER) + "\n" + "".join(rows))
 
     def rms(self, start: float, stop: float) -> float:
-        """Root mean square in V over start <= position <= stop: exact, since the profile is
-        piecewise linear.
+        """Root mean square in V over start <= position <= stop: exact, since the profile is piecewise linear.
 
         At constant speed this is the mean over time. The mean attraction follows rms(U)^2.
         """
@@ -110,9 +106,7 @@ class VoltageProfile:
         return float(reverse(-position))
 
     def steepest(self) -> float:
-        """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in
-        V/s.
-        """
+        """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in V/s."""
         rise, run = np.abs(np.diff(self.voltage)), np.diff(self.position)
         rise, run = rise[rise > 0], run[rise > 0]
         if rise.size == 0:
@@ -122,8 +116,7 @@ class VoltageProfile:
 
 @dataclass(frozen=True)
 class FollowForce:
-    """A voltage that is not given but found: whatever makes the friction force on the bone follow
-    a target.
+    """A voltage that is not given but found: whatever makes the friction force on the bone follow a target.
 
     `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between
     its rows; during slides the effective voltage stays between 0 and `largest_voltage` (V),
@@ -149,8 +142,7 @@ class FollowForce:
 
 
 def carrier_amplitude(effective: Values) -> Values:
-    """Amplitude in V of a sinusoidal carrier with the mean attraction of the `effective` voltage:
-    sqrt(2) U.
+    """Amplitude in V of a sinusoidal carrier with the mean attraction of the `effective` voltage: sqrt(2) U.
 
     >>> round(carrier_amplitude(1000.0), 3)
     1414.214
@@ -159,8 +151,7 @@ def carrier_amplitude(effective: Values) -> Values:
 
 
 def applied_voltage(effective: Values) -> Values:
-    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17):
-    about 2 U.
+    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17): about 2 U.
 
     This is a rule from experience that contains losses outside the finger; `carrier_amplitude` is
     the mean alone.
@@ -170,8 +161,7 @@ def applied_voltage(effective: Values) -> Values:
 
 @dataclass(frozen=True)
 class Amplifier:
-    """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the
-    profile).
+    """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
 
     >>> Amplifier(voltage_max=200.0).limit(VoltageProfile([0.0, 4.0], [0.0, 400.0])).voltage.tolist()
     [0.0, 200.0, 200.0]
@@ -190,12 +180,9 @@ class Amplifier:
             above("slew", self.slew, 0.0, "a rate in V/s above zero, or None")
 
     def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
-        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed`
-        (mm/s).
-
-        Both are exact: rows are added where the profile crosses the limit, and where the
-        amplifier, which moves towards the target as fast as it can, catches up with it. Raises
-        InputError for a slew without a speed.
+        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s), both
+        exactly: with rows where it crosses the limit or catches up. Raises InputError for a slew without a
+        speed.
         """
         cut = self._clipped(profile)
         if self.slew is None:
@@ -222,7 +209,7 @@ class Amplifier:
 
 
 def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
-    """What follows the profile from its first row on with a slope of at most `steepest` (V/mm)."""
+    """The profile from its first row on, with its slope limited to `steepest` (V/mm)."""
     now = float(profile.voltage[0])
     rows = [(float(profile.position[0]), now)]
     for i in np.flatnonzero(np.diff(profile.position) > 0):
@@ -248,9 +235,7 @@ CLOSED = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the attraction sees of a state: positions (P, dim), the surface below them, voltage (V), contact
-    forces along the normal (P,), and who touched when the step began (P,).
-    """
+    """What attraction sees: positions (P, dim), surface, voltage (V), contact forces (P,), who touched."""
 
     attraction: Any
     position: Floats
@@ -261,7 +246,7 @@ class Seen:
 
     @classmethod
     def of(cls, attraction: Any, interface: Any, state: Any, touching: Any) -> Seen:
-        """Of a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
+        """From a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
         at = interface.resting(state), interface.surface_at(state)
         return cls(attraction, *at, state.voltage, state.contact_force[:, 0], touching)
 
@@ -286,9 +271,7 @@ class Reading:
 
 
 def electrode_charge(seen: Seen) -> Reading:
-    """Charge of the electrode over eps_0 (V, in space V mm): its derivative by the gap of a touching node is
-    left out.
-    """
+    """Charge over eps_0 (V, in space V mm): its derivative by a touching node's gap is left out."""
     charging, surface = seen.attraction.charging, seen.surface
     at = seen.attraction.charged(seen.position, seen.voltage, seen.pressing)
     by_gap, by_length = charging.charge_slopes(at)

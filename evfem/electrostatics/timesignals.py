@@ -213,7 +213,7 @@ class ChargeControl:
 
     @property
     def highest_frequency(self) -> float:
-        """That of the charge (Hz)."""
+        """Frequency of the charge (Hz)."""
         return self.charge.highest_frequency if isinstance(self.charge, TimeSignal) else 0.0
 
     def charge_at(self, time: float) -> float:
@@ -264,7 +264,7 @@ class Carrier:
 
     @property
     def highest_frequency(self) -> float:
-        """That of the envelope, plus the carrier's where it is resolved (Hz)."""
+        """Frequency of the envelope, plus the carrier's if it is resolved (Hz)."""
         slow = self.envelope.highest_frequency if isinstance(self.envelope, TimeSignal) else 0.0
         return float(slow + self.frequency * self.resolved)
 
@@ -309,9 +309,7 @@ class Sampled:
         return self.rate / self.voltage.size if self.repeat else None
 
     def powers(self) -> tuple[float, Floats, Floats] | None:
-        """Effective voltage (V), orders and shares: straight lines between the samples, whose transform is
-        that of the samples times sinc^2, over and over.
-        """
+        """Effective voltage (V), orders and shares of straight lines between samples, repeated."""
         if not self.repeat:
             return None
         size = self.voltage.size

@@ -1,7 +1,6 @@
-r"""What the model's friction curve differs by from that of a pad that yields linearly.
+r"""Difference between the model's friction curve and that of a linear elastic pad.
 
-The curve p of `sliding.slid`, with the mean m, is stretched, moved and lifted to come near that of
-the model,
+The curve p of `sliding.slid`, with the mean m, is stretched, moved and lifted to come near that of the model,
 
 .. math:: \mu(x) \approx m + s\,o + \alpha\,(p(x - \delta) - m),
 

@@ -1,15 +1,14 @@
 """The database of parametric textures: which points it has, how it is computed, and its file.
 
 Each of both fingers has `INNER` points of Sobol's sequence in the box of `RANGES` (Sobol 1967,
-doi:10.1016/0041-5553(67)90144-9) and the corners of the box, without the 16 at which the shortest
-wave is the steepest: sliding snaps from crest to crest there, and takes fifty times longer.
-`compute_database` runs `parametric.scene` of every point; what is finished lies in its folder and
-is not computed again. Beside each curve stand that of the pad that yields linearly (`sliding`), and
-how wrong the estimator is there when it does not know the point: the root mean square of what is
-left of the friction, over the slope.
+doi:10.1016/0041-5553(67)90144-9) and the corners of the box, without the 16 at which the shortest wave is the
+steepest: sliding snaps from crest to crest there, and takes fifty times longer. `compute_database` runs
+`parametric.scene` of every point; what is finished lies in its folder and is not computed again. Beside each
+curve stand that of the pad that yields linearly (`sliding`), and how wrong the estimator is there when it
+does not know the point: the root mean square of what is left of the friction, over the slope.
 
-The reference textures are slid over too, by both fingers at the usual touch: what an estimate of
-them is off by, none of which is a point of the database, stands in a table of its own.
+Errors of the estimate for the reference textures, which are not in the database, are in a separate
+table: both fingers, at the default touch.
 """
 
 from __future__ import annotations

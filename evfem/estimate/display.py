@@ -116,7 +116,7 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
 
 
 def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) -> Rendering:
-    """What is `felt` (n,) against the wish."""
+    """Comparison of the `felt` friction (n,) with the target."""
     frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
     _, given = spectrum_of(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
@@ -173,7 +173,7 @@ class ExactCurve:
 
 
 def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: Device) -> Rendering:
-    """What the coupled model makes of a friction curve with its own voltage, compared as by `render`."""
+    """Friction of the coupled model under its own voltage, compared as by `render`."""
     felt = np.interp(curve.x, found.x, found.friction)
     voltage = np.interp(curve.x, found.x, found.voltage)
     signal = Signal(

@@ -6,10 +6,9 @@ to the two harmonics of the database that explain most of its heights::
 
     h(x) ~ a (sin(q (x - x0)) + c sin(2 q (x - x0)) + d cos(2 q (x - x0)))
 
-For a texture that repeats, 2 pi / q is a whole fraction of its period; else the best one of
-`TRIED` wavelengths. That what they leave out is not corrected is said. A place outside the database
-is moved to its nearest edge, and said too, as is one outside the hull of its points; the model has
-no such limits. A friction
+For a texture that repeats, 2 pi / q is a whole fraction of its period; else the best one of `TRIED`
+wavelengths. That what they leave out is not corrected is said. A place outside the database is moved to its
+nearest edge, and said too, as is one outside the hull of its points; the model has no such limits. A friction
 profile is taken as it is.
 """
 

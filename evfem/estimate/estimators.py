@@ -1,11 +1,10 @@
 r"""The estimator of the friction curve from the database, and how wrong it is.
 
 It gives a weighted sum of the database's responses r_i (`correction`) for a point p of the box
-(`parametric`), whose axes are stretched by `scale` first: responses change faster along some
-parameters than along others. The weights are those of radial basis functions ``exp(-|r|^2 / 2)``
-with a linear polynomial and `smoothing` on the diagonal (scipy's `RBFInterpolator`). The conditional
-average of the paper and linear interpolation were as good: medians of the errors 3.4 to 4.4 % of the
-range of a curve.
+(`parametric`), whose axes are stretched by `scale` first: responses change faster along some parameters than
+along others. The weights are those of radial basis functions ``exp(-|r|^2 / 2)`` with a linear polynomial and
+`smoothing` on the diagonal (scipy's `RBFInterpolator`). The conditional average of the paper and linear
+interpolation were as good: medians of the errors 3.4 to 4.4 % of the range of a curve.
 
 The scale and the smoothing are those with the smallest mean error when each point is left out in
 turn, which is known without solving again: ``e_i = (A^-1 r)_i / (A^-1)_ii`` (Rippa 1999,
@@ -74,7 +73,7 @@ class Estimator:
         )
 
     def left_out(self) -> Floats:
-        """What the other points say of each point's response, (N, M)."""
+        """Leave-one-out prediction of each point's response, (N, M)."""
         return np.array([self.without(i)(place) for i, place in enumerate(self.points)])
 
     def without(self, i: int) -> Estimator:

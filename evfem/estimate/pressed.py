@@ -1,10 +1,9 @@
 r"""The pad of the textures as it slides over a flat surface, and how it yields there.
 
-On a flat surface, once all of its contact slips, the pad's nodes have moved by q relative to the
-bone and carry the forces f. With the condensed tangent's compliance C, other forces f' move them by
-``q + C (f' - f)`` to first order. `remember` takes these from the model at `LOADS` and `FRICTIONS`,
-for a smooth and a ridged finger. In between, with bilinear weights w over the logarithm of the load
-and the friction,
+On a flat surface, once all of its contact slips, the pad's nodes have moved by q relative to the bone and
+carry the forces f. With the condensed tangent's compliance C, other forces f' move them by ``q + C (f' - f)``
+to first order. `remember` takes these from the model at `LOADS` and `FRICTIONS`, for a smooth and a ridged
+finger. In between, with bilinear weights w over the logarithm of the load and the friction,
 
 .. math:: q(f') = \sum_k w_k \left(q_k - \tfrac12 C_k f_k\right) + \bar C\,(f' - \tfrac12 \bar f)
 
@@ -32,7 +31,7 @@ from evfem.contact.signorini import OPEN
 from evfem.estimate.parametric import SLIP_PER_FORCE, STEPS_BEFORE, Parametric, sliding
 from evfem.simulation.run import Run
 from evfem.solver.condensation import make_condensation
-from evfem.surface.edge import outline_nodes
+from evfem.surface.pad import outline_nodes
 from evfem.surface.surfaces import Flat
 
 FILE, FORMAT = "textures-pads.npz", "evfem-textures-pads-2"

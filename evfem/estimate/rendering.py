@@ -34,8 +34,7 @@ NOISE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A scene, its result, and the position (mm) of the first step in which no touching node
-    sticks.
+    """A scene, its result, and the position (mm) of the first step in which no touching node sticks.
 
     `full_slip` is None if some node sticks in every step of the slides.
     """
@@ -134,15 +133,13 @@ def _slide_rows(result: Result) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """An effective voltage over the position, and what is known of it before anything is
-    simulated.
+    """An effective voltage over the position, and what is known of it before anything is simulated.
 
-    `share_not_renderable`: share of the path on which the wish is below the display's own
-    friction; while the finger still sticks at the start, that is no loss. Voltages in V:
-    `largest`, `rms` over the path, `carrier` (peak of the display's waveform at the largest).
-    `error_of_display`: relative L2 error of the friction force by (16a), (16b) without the
-    amplifier, `error_of_amplifier` the change it makes, relative to the wish; `share_limited` the
-    share of the path on which it acts.
+    `share_not_renderable`: share of the path on which the wish is below the display's own friction; while the
+    finger still sticks at the start, that is no loss. Voltages in V: `largest`, `rms` over the path,
+    `carrier` (peak of the display's waveform at the largest). `error_of_display`: relative L2 error of the
+    friction force by (16a), (16b) without the amplifier, `error_of_amplifier` the change it makes, relative
+    to the wish; `share_limited` the share of the path on which it acts.
     """
 
     profile: VoltageProfile
@@ -167,11 +164,10 @@ def voltage_for(
 
     .. math:: U = \sqrt{F_e / (p_1 k F_n^m)}, \quad F_e = (\mu_{rs} / \mu_{hd} - 1) F_n \ge 0
 
-    with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear
-    area law (m = 1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops
-    out. Otherwise the area law needs the force of `depth` mm. The voltage is 0 where the wish is
-    below the display's own friction. `amplifier` limits the profile (its slew needs `speed` in
-    mm/s).
+    with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear area law (m =
+    1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops out. Otherwise the area
+    law needs the force of `depth` mm. The voltage is 0 where the wish is below the display's own friction.
+    `amplifier` limits the profile (its slew needs `speed` in mm/s).
 
     >>> from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
     >>> from evfem.electrostatics.encoding import AreaLaw
@@ -206,9 +202,7 @@ def voltage_for(
 
 
 def _share_apart(one: VoltageProfile, other: VoltageProfile) -> float:
-    """Share of the path on which two profiles differ; pieces between rows are judged in their
-    middle.
-    """
+    """Share of the path on which two profiles differ; pieces between rows are judged in their middle."""
     x = np.unique(np.concatenate([one.position, other.position]))
     middle = 0.5 * (x[:-1] + x[1:])
     apart = np.abs(one(middle) - other(middle)) > 1e-9 * np.max(np.abs(one.voltage), initial=1.0)
@@ -244,15 +238,13 @@ def exact(
     largest_voltage: float = 10_000.0,
     drive: Drive | None = None,
 ) -> Recording:
-    """The display's own voltage that makes the coupled model reproduce the reference: exact
-    encoding.
+    """The display's own voltage that makes the coupled model reproduce the reference: exact encoding.
 
-    In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t =
-    reference as its equation; where that lies outside, the voltage stays at its limit. While part
-    of the contact sticks, attraction hardly changes the friction force; a wish that then no
-    voltage meets leaves the voltage as it was. The voltage found, an effective one, is in
-    `result.voltage`, the peak of the `drive`'s waveform in `peak_voltage`;
-    `Comparison.unmet` says where the wish was out of reach.
+    In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as its
+    equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
+    attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
+    was. The voltage found, an effective one, is in `result.voltage`, the peak of the `drive`'s waveform in
+    `peak_voltage`; `Comparison.unmet` says where the wish was out of reach.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
@@ -278,7 +270,7 @@ class Comparison:
     voltage_difference: float
 
     def __repr__(self) -> str:
-        """How good it is."""
+        """Quality of the rendering."""
         good = f"pearson {self.pearson:.4g}, relative L2 error {self.relative_l2:.4g}"
         most = f"at most {self.largest_error:.4g} N/mm and {self.voltage_difference:.4g} V apart"
         return f"Comparison({len(self.position)} positions: {good}, {most})"
@@ -289,7 +281,7 @@ class Comparison:
         return float(np.max(np.abs(self.error)))
 
     def unmet(self, tolerance: float) -> Array:
-        """Where the wish was missed by more than `tolerance` (N/mm), (n,) bool."""
+        """Places that miss the target by more than `tolerance` (N/mm), (n,) bool."""
         return np.abs(self.error) > tolerance
 
 

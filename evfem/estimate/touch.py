@@ -67,7 +67,7 @@ def touch_scene(texture: Texture, touch: Touch, *, every: int = 0) -> Scene:
 
 
 def steps_over(length: float) -> int:
-    """How many steps a slide over `length` (mm) has."""
+    """Number of steps of a slide over `length` (mm)."""
     return int(np.clip(round(STEPS_PER_MM * length), 20, MOST_STEPS))
 
 

@@ -57,9 +57,7 @@ def _columns(x: Floats, distance: Floats) -> Floats:
 def upper_sum(
     x: Floats, distance: Floats, reduced: float, eps_r: float, ground: Floats | None = None
 ) -> float:
-    """The upper bound's integral over the polyline `distance` = h + s (mm) without walls, above a flat
-    ground or one of these heights (mm).
-    """
+    """The upper bound's integral over the polyline `distance` (mm), above flat or given ground (mm)."""
     dx, a, b = np.diff(x), distance[:-1], distance[1:]
     first = _columns(x, distance)
     slope, uneven = (_slopes(dx, y) for y in (distance, np.zeros_like(x) if ground is None else ground))
@@ -102,9 +100,7 @@ def least_upper_sum(
     periodic: bool = False,
     ground: Floats | None = None,
 ) -> float:
-    """The least of `upper_sum` over lower envelopes of a polyline whose ends are planes of symmetry, or
-    of one that is `periodic`; `height` (L,) is above the ground.
-    """
+    """Least `upper_sum` over lower envelopes of a polyline, mirrored or `periodic`, at `height` (L,)."""
     reduced, envelope = thickness / eps_r, spread_around if periodic else spread
     below = (envelope(x, height, slope) + reduced for slope in SLOPES)
     return min(upper_sum(x, distance, reduced, eps_r, ground) for distance in below)

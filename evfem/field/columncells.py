@@ -16,7 +16,7 @@ by two points of Gauss along either coordinate. All matrices are one product of 
 derivatives by X, h and Y at a fixed potential, which are virtual works, are read off. With complex
 permittivities the matrix is complex and symmetric, and the squares in forces are
 :math:`|\varphi_\xi|^2`, :math:`\mathrm{Re}\,\varphi_\xi \bar\varphi_\eta`, :math:`|\varphi_\eta|^2`
-with the real parts of the permittivities (`evfem.electrostatics.lossycolumns`).
+with the real parts of the permittivities (`evfem.field.columns`).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _PLACES = [(i, j) for i in range(2) for j in range(3)]
 
 
 def _products() -> Floats:
-    """What the reference cell says: (36, 8), for h at two points, Y at two and h and Y at four."""
+    """Integrals of the reference cell, (36, 8): for h at two points, Y at two and h and Y at four."""
     along = np.einsum("pq,apq,bpq->abp", _WEIGHT, _BY_XI, _BY_XI)
     mixed = np.einsum("pq,apq,bpq->abq", _WEIGHT, _BY_XI, _BY_ETA)
     across = np.einsum("pq,apq,bpq->abpq", _WEIGHT, _BY_ETA, _BY_ETA)
@@ -67,9 +67,7 @@ class Lowest(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Products of a potential's derivatives at the points of all cells (2, 2, E, R), times weights and
-    the real parts of the permittivities: by xi, twice by xi and eta, by eta.
-    """
+    """A potential's squared derivatives at the points (2, 2, E, R), weighted: by xi, xi and eta, eta."""
 
     along: Floats
     mixed: Floats
@@ -122,9 +120,7 @@ class Cells:
         return result
 
     def potential(self, strips: Lowest | None, floating: bool) -> Any:
-        """Potential (L, rows): 1 on the lowest curve, or as the strips hold it, and 0 on the highest one,
-        or, `floating`, at the constant at which it has no charge.
-        """
+        """Potential (L, rows): 1 on the lowest curve (or strips), 0 on the highest; `floating`: no charge."""
         given = np.zeros((2, self.lines, self.per_line))  # for the electrodes, and for 1 on the highest curve
         given[1, :, -1] = 1.0
         given[0, :, 0] = float(strips is None)
@@ -148,9 +144,7 @@ class Cells:
         return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
 
     def corrected(self, phi: Floats, factor: Floats) -> Floats:
-        """Potential (L, rows) from that of cells that nearly are these and their `factor`, by two steps:
-        exact to the second order in the difference.
-        """
+        """Potential (L, rows) from the `factor` of nearly these cells, by two steps: of second order."""
         from scipy.linalg import cho_solve_banded
 
         for _ in range(2):

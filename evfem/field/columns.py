@@ -47,9 +47,7 @@ class Capacitance:
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
-    """What solutions of outlines close to a solved one start from: its potential `phi` (L, rows) and the
-    factor of its matrix.
-    """
+    """Start for outlines close to a solved one: its potential `phi` (L, rows) and its matrix's factor."""
 
     phi: Floats
     factor: Floats
@@ -57,9 +55,7 @@ class Nearby:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Layers of relative permittivity `eps_r` (n,), from the electrode up, each with rows at the
-    shares `shares[l]` of its height, from 0 to 1.
-    """
+    """Layers of relative permittivity `eps_r` (n,), upwards; rows at the `shares[l]` of the height."""
 
     eps_r: tuple[complex, ...]
     shares: tuple[Floats, ...]
@@ -98,7 +94,7 @@ class Columns:
         return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, cells.heights())
 
     def nearby(self, x: Floats, levels: Floats) -> Nearby:
-        """What outlines close to this one start from, under one electrode and a grounded finger."""
+        """Start values for close outlines, under one electrode and a grounded finger."""
         cells, _ = self.cells(x, levels, None)
         return Nearby(cells.potential(None, False), cells.factor())
 
@@ -112,11 +108,9 @@ class Columns:
 
 
 class Strips:
-    """Electrodes that end somewhere. A share `THIN` of the lowest layer, of thickness d, is taken to the
-    second order in its thickness: where the potential above it is phi, and w is the share of electrode
-    within d to either side, of voltage V, its energy is eps times the integral of
-    w (phi - V)^2 / d + (1 - 2 w / 3) d phi'^2. So plates stay exact, the field at an edge is smoothed
-    over that thickness, and the energy changes smoothly when lines move over an edge.
+    """Electrodes that end somewhere: in a share `THIN` of the lowest layer, of thickness d, the energy is eps
+    times the integral of w (phi - V)^2 / d + (1 - 2 w / 3) d phi'^2, w being the share of electrode within d
+    to either side. Plates stay exact, edges are smoothed over d, and lines may move over them.
     """
 
     def __init__(self, x: Floats, electrodes: Floats, depth: float, eps_r: complex) -> None:
@@ -161,9 +155,7 @@ class Strips:
         return np.asarray(np.append(own[0], 0.0) + np.append(0.0, own[1]))
 
     def energy(self, phi: Floats) -> tuple[float, Floats]:
-        """The integral for potentials (L,) of the lowest row, and its derivative by x (L,): the
-        electrodes stay where they are when the lines move.
-        """
+        """The integral for potentials (L,) of the lowest row, and its derivative by x (L,) of the lines."""
         beyond = phi[:-1, None] * self.shapes[0] + phi[1:, None] * self.shapes[1] - self.voltage
         rise = np.diff(phi)
         value = np.sum(self.weight * self.width[:, None] * beyond**2) + np.sum(self.along * rise**2)

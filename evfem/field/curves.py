@@ -94,7 +94,7 @@ def _of_chords(bend: Floats) -> tuple[Floats, Floats]:
 
 
 def _alike(a: Floats, b: Floats) -> Any:
-    """Where two curvatures are of one sign and of a size."""
+    """Places where two curvatures have the same sign and a similar size."""
     small, large = np.minimum(np.abs(a), np.abs(b)), np.maximum(np.abs(a), np.abs(b))
     return (a * b > 0.0) & (large <= RATIO * small)
 

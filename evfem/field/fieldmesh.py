@@ -21,15 +21,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
-from evfem.field.outlines import (
-    Outline,
-    Run,
-    corner_sizes,
-    graded,
-    right_angle,
-    spread,
-    spread_around,
-)
+from evfem.field.outlines import Outline, Run, corner_sizes, graded, right_angle, spread, spread_around
 
 #: how fast cells grow away from a corner, per length
 GROWTH = 0.7
@@ -61,9 +53,7 @@ class FieldMesh:
     periodic: bool
 
     def located(self, x: Floats, y: Floats) -> tuple[Ints, Floats]:
-        """The cells (n,) of places and their coordinates (2, n) in them; a `y` above the air takes its
-        upper end. InputError for places outside.
-        """
+        """Cells (n,) of places, coordinates (2, n) in them; above the air its end counts, else InputError."""
         order = np.lexsort((self.row[self.cells[0]], self.line[self.cells[0]]))
         cells = self.cells[:, order]
         column = self.line[cells[0]]
@@ -117,9 +107,8 @@ def columns(run: Run, sizes: Floats, reduced: float, growth: float) -> Floats:
 
 @dataclass(frozen=True)
 class _Ends:
-    """A body that ends in the air: `sizes` of the cells at its two ends and height of the `box` (mm);
-    `foot` and `edge` are sizes at the lower and upper end of its end walls as shares of the two
-    blocks beside them.
+    """A body that ends in the air: `sizes` of the cells at its two ends and height of the `box` (mm); `foot`
+    and `edge` are sizes at the lower and upper end of its end walls as shares of the two blocks beside them.
     """
 
     sizes: tuple[float, float]
@@ -129,9 +118,7 @@ class _Ends:
 
     @classmethod
     def of(cls, outline: Outline, runs: list[Run], near: list[Floats], slab: tuple[float, float]) -> _Ends:
-        """The ends of an outline whose cells have the sizes `near`, over a slab of that thickness and
-        reduced thickness.
-        """
+        """Ends of an outline with cells of the sizes `near`, over a slab of (reduced) thickness."""
         thickness, reduced = slab
         box = BOX * (outline.length + float(outline.lid(outline.x).max()) + thickness)
         sizes, feet, edges = [], [np.inf], [np.inf]
@@ -191,9 +178,7 @@ def _walls(runs: list[Run], corners: list[Floats]) -> list[tuple[Run, Run, float
 
 
 def make_mesh(outline: Outline, thickness: float, reduced: float, growth: float = GROWTH) -> FieldMesh:
-    """The mesh of the air below `outline` and of a slab of that `thickness` (mm); `reduced` is its
-    thickness over its permittivity.
-    """
+    """Mesh of the air below `outline` and of a slab: `thickness` (mm), `reduced` over its permittivity."""
     runs = outline.runs()
     corners = corner_sizes(outline, runs, reduced)
     x = np.concatenate([run.x for run in runs])

@@ -1,11 +1,9 @@
 """Outlines of grounded bodies above a slab: polylines with vertical walls, their ends and corners.
 
-An outline is what its points say: straight between them, vertical where an x is repeated. One that
-is periodic repeats from its last x on; where its two heights differ there is a wall. One that is
-not ends in the open air: the body is what lies between the outline and the straight line between
-its ends (stretched over what rises above it), so a flat outline is a thin sheet and one with end
-walls a bar. Where both ends rise more steeply than `FLANK`, without being walls, they are flanks of
-a body that is symmetric about that line: the lower half of a cylinder stands for the cylinder.
+An outline is straight between its points, vertical where an x is repeated. A periodic one repeats from its
+last x on, with a wall where its two heights differ. Another one ends in the open air: the body lies between
+it and the straight line between its ends; ends steeper than `FLANK`, but no walls, are flanks of a body
+symmetric about it.
 
 At a corner whose air angle is w the potential grows like r^(pi/w), so the field is singular where
 w > pi; `corner_sizes` says how small cells must be there.
@@ -48,9 +46,7 @@ TURN = np.radians(15.0)
 
 @dataclass(frozen=True)
 class Run:
-    """A piece of an outline between two walls: points `x`, `height` (mm); of rank 2 with the
-    `shares` of its height, left and right, at which its lower block ends.
-    """
+    """A piece of an outline between walls: points `x`, `height` (mm); of rank 2 with block `shares`."""
 
     x: Floats
     height: Floats
@@ -199,14 +195,14 @@ def _upright(x: Floats, height: Floats) -> Floats:
 
 
 def _straight(x: Floats, height: Floats) -> Any:
-    """Which inner points are on the line between their neighbours."""
+    """Inner points on the line between their neighbours."""
     way = np.diff(x) + 1j * np.diff(height)
     turned = np.abs((way[1:] * way[:-1].conj()).imag) <= STRAIGHT * np.abs(way[1:] * way[:-1])
     return turned & ((way[1:] * way[:-1].conj()).real > 0.0)
 
 
 def _without_repetitions(x: Floats, height: Floats) -> Floats:
-    """Which points to keep: two of each x at most, and not the same one twice."""
+    """Points to keep: at most two of each x, none twice."""
     same = np.diff(x) == 0.0
     rises = np.sign(np.diff(height)) * same
     inner = same[:-1] & same[1:]
@@ -220,9 +216,7 @@ def _without_repetitions(x: Floats, height: Floats) -> Floats:
 
 
 def _ranked(piece: Run, left: float | None, right: float | None) -> list[Run]:
-    """The piece with its rank; `left` and `right` are the shares of its height where lower
-    neighbours end.
-    """
+    """The piece with its rank; `left` and `right` are the shares of its height where lower neighbours end."""
     if left is None and right is None:
         return [piece]
     if left is not None and right is not None:

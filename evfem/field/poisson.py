@@ -66,9 +66,7 @@ class Potential:
         return float(eps_0 * self.phi @ (self.space.stiffness @ self.phi))
 
     def force(self, lift: Floats | None = None, direction: int = 1) -> float:
-        """Force in N/mm at 1 V along y (along x with `direction` 0) on what moves with `lift`: on the
-        body unless something else is said.
-        """
+        """Force in N/mm at 1 V along y (`direction` 0: x) on what moves with `lift`, by default the body."""
         return self.space.force(self.phi, self.space.mesh.lift if lift is None else lift, direction)
 
     def values(self, x: Floats, y: Floats) -> Floats:
@@ -143,9 +141,7 @@ class Space:
         return np.asarray(phi + T @ solve_spd(T.T @ self.stiffness @ T, -(T.T @ (self.stiffness @ phi))))
 
     def conditions(self) -> tuple[Floats, Ints, Ints]:
-        """Values of the potential on body and electrode, the unknowns held there, and for each unknown
-        its master: itself, or on the right end of a period its twin on the left.
-        """
+        """Values of the potential where held, and each unknown's master: itself, or its periodic twin."""
         mesh, grid = self.mesh, self.basis.mesh
         facets = grid.boundary_facets()
         row, line = mesh.row[grid.facets[:, facets]], mesh.line[grid.facets[:, facets]]

@@ -32,12 +32,11 @@ MARGIN = 1e-4
 
 @dataclass(frozen=True)
 class FieldSolution:
-    """The field between a grounded body and an electrode, per mm of depth.
+    """The field between a grounded body and an electrode, per mm of depth (of one period if periodic).
 
-    `capacitance` in F/mm; `force` in N/mm, the attraction towards the electrode, of one period where
-    the outline is periodic; `bounds`, lower and upper bound of the exact capacitance of the outline
-    in F/mm; capacitance * voltage^2 / 2 is the energy in J/mm (1000 N). Fields are in V/mm, the
-    electrode's upper face is at y = -`thickness` mm, the slab's at y = 0.
+    `capacitance` in F/mm with its `bounds` for the exact outline; `force` in N/mm, towards the electrode;
+    capacitance * voltage^2 / 2 is the energy in J/mm (1000 N). Fields are in V/mm, the electrode's upper face
+    is at y = -`thickness` mm, the slab's at y = 0.
     """
 
     capacitance: float
@@ -88,15 +87,14 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
                 periodic: bool = True) -> FieldSolution:  # fmt: skip
     """Solve for the field between a grounded outline and an electrode under `slab`.
 
-    `x` and `height` (N,) in mm are points of the outline above the slab's upper face, from left to
-    right. Points that turn by less than 15 degrees each, ever the same way, are taken as those of a
-    curve (`evfem.field.curves`), the others are joined by straight lines. An `x` given
-    twice is a vertical wall, as is a chord steeper than 20 between two corners, which then stands on
-    its foot. With `periodic` the outline
-    repeats from its last x on. Without, it ends in the air over an endless slab and electrode: as a
-    thin sheet where it is flat, as a bar where it ends in walls, and as the lower half of a
-    symmetric body where both ends rise steeply (see `evfem.field.outlines`). The force
-    is the derivative of the discrete energy when the body is lifted. Touching places need a slab.
+    `x` and `height` (N,) in mm are points of the outline above the slab's upper face, from left to right.
+    Points that turn by less than 15 degrees each, ever the same way, are taken as those of a curve
+    (`evfem.field.curves`), the others are joined by straight lines. An `x` given twice is a vertical wall, as
+    is a chord steeper than 20 between two corners, which then stands on its foot. With `periodic` the outline
+    repeats from its last x on. Without, it ends in the air over an endless slab and electrode: as a thin
+    sheet where it is flat, as a bar where it ends in walls, and as the lower half of a symmetric body where
+    both ends rise steeply (see `evfem.field.outlines`). The force is the derivative of the discrete energy
+    when the body is lifted. Touching places need a slab.
 
     The capacitance, always found from above, is compared with its bounds; EvfemError if it is
     not between them. InputError for arrays that are no outline.

@@ -36,8 +36,7 @@ PLAIN = np.array([[(0, 0), (1, 0), (1, 1), (0, 1)]])
 
 
 def block(columns: tuple[int, int], rows: int, merging: Sequence[Sequence[int]], order: int) -> Mesh:
-    """Hexahedra with points (u, v, r): u and v from 0 to 1, r from 0 to `rows`; `region` is the
-    row.
+    """Hexahedra with points (u, v, r): u and v from 0 to 1, r from 0 to `rows`; `region` is the row.
 
     `columns` are those of the last row in u and in v; in the rows `merging[0]` three columns in u
     become one, in `merging[1]` in v.

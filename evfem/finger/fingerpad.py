@@ -17,13 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import (
-    check_fields,
-    instance,
-    one_of,
-    set_frozen,
-    yes_or_no,
-)
+from evfem.common.checks import check_fields, instance, one_of, set_frozen, yes_or_no
 from evfem.common.views import short
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import NAIL, thickness_of
@@ -82,17 +76,15 @@ _REGIONS["check"] = _regions
 
 @dataclass(frozen=True, repr=False)
 class FingerPad(LayeredFinger):
-    """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail
-    above.
+    """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail above.
 
     **Outline.** On the lower side fingerprint ridges, whose crests lie on the ellipse at x = (k +
     `ridge_phase`) `ridge_width`. With t = abs(x - crest) / (`ridge_width`/2), x the abscissa of the point of
     the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep, along the ellipse's normal; with
-    `ridge_crest` > 0 crest and groove are flat instead, with cosine-shaped walls. Ridges fade
-    out between 0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape
-    that meets the ratio of ridge to gross contact area of Adams et al.
-    (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan` (or a `RidgeScan`) takes the place of this
-    profile; `ridge_width` then says how finely the pad is divided.
+    `ridge_crest` > 0 crest and groove are flat instead, with cosine-shaped walls. Ridges fade out between
+    0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape that meets the ratio of
+    ridge to gross contact area of Adams et al. (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan` (or a
+    `RidgeScan`) takes the place of this profile; `ridge_width` then says how finely the pad is divided.
 
     **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the ridges: the
     stratum corneum is `ridge_height` thinner in a groove. Its thickness, outline and ridges are Table 2 of
@@ -238,8 +230,7 @@ def _check_scan(ridges: ScannedRidges, slope: float, spacing: float) -> None:
 class MeshedFinger:
     """A finger on a mesh of the user's own: a file or a `Mesh`, whose `regions` are those of `meshfile.read`.
 
-    The mesh is read and checked at once: raises `InputError` when it is faulty or does not fit the
-    materials.
+    The mesh is read and checked at once: raises `InputError` when it is faulty or does not fit the materials.
     """
 
     source: Annotated[str | os.PathLike[str] | Mesh, _MESH, "a mesh of your own, in mm"]

@@ -12,8 +12,7 @@ loop       distance from a ray over p, which begins at the core: ridges come in,
 arch       :math:`(z - h e^{-x^2/2w^2})/p`: ridges across that rise in the middle
 =========  ================================================================================
 
-The core is the lowest point of the pad; loop and arch have the sizes below (assumed). A measured
-print is a map of heights instead.
+The core is the lowest point of the pad; loop and arch have the sizes below (assumed).
 """
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ class HeightMap:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """What it is made of, as a scene file can hold it."""
+        """Its data as a scene file holds them."""
         return {"x": self.x.tolist(), "z": self.z.tolist(), "height": self.height.tolist()}
 
     def depth(self, x: Floats, z: Floats) -> Floats:
@@ -124,9 +123,7 @@ def _between(grid: Floats, places: Floats) -> tuple[Any, Floats]:
 
 
 def faded(depth: Floats, share: Floats) -> Floats:
-    """Depths that come to nothing towards the edge of the fine rectangle; `share` (..., 2) is the
-    place between its middle, 0, and its edges, 1.
-    """
+    """Depths fading to the fine rectangle's edge; `share` (..., 2): 0 in its middle, 1 at its edges."""
     fade = quintic((1.0 - np.abs(share)) / (1.0 - FULL))
     return np.asarray(depth * fade[..., 0] * fade[..., 1])
 

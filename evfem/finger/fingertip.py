@@ -46,9 +46,7 @@ SMALLEST_SHAPE, THICKEST = 0.02, 0.7
 
 @dataclass(frozen=True)
 class TipDivisions:
-    """How finely to divide, in quadratic cells: columns of a smooth pad across and along, cells on
-    each side of the rectangle of `evfem.finger.solid`, columns per parallel and per curved ridge.
-    """
+    """How finely to divide, in quadratic cells: columns, sides of the rectangle, columns per ridge."""
 
     across: int
     along: int
@@ -114,9 +112,7 @@ class Fingertip(LayeredFinger):
         "pattern of the fingerprint ridges, or a measured print",
     ] = "along"
     resolution: Annotated[
-        str,
-        one_of(*TIP_RESOLUTIONS),
-        "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more",
+        str, one_of(*TIP_RESOLUTIONS), "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more"
     ] = "medium"
     length: Annotated[float, between(16.0, 32.0, "mm"), "full length of the ellipsoid"] = 22.5
     bone_length: Annotated[float, between(6.0, 28.0, "mm"), "full length of the bone"] = 17.0
@@ -192,9 +188,7 @@ class Fingertip(LayeredFinger):
         return Ridges(self.ridge_height, self.ridge_width, *shape, full=0.0, end=1.0)
 
     def _grid(self, outer: Ellipsoid) -> Grid:
-        """Columns of the rectangle: fine where ridges cross them, with lines on crests and grooves
-        of parallel ones.
-        """
+        """Columns of the rectangle: fine under ridges, with lines on crests and grooves of parallel ones."""
         divisions = TIP_RESOLUTIONS[self.resolution]
         fine = self.ridges not in ("across", "none"), self.ridges not in ("along", "none")
         (across, *x), (along, *z) = (
@@ -212,9 +206,7 @@ class Fingertip(LayeredFinger):
         return 0.0 if self.ridges == "none" else self.cells_per_ridge or by_resolution
 
     def _lines(self, axis: float, parallel: bool, plain: int) -> tuple[int, float, float]:
-        """Columns of the rectangle at the bone over an axis (mm), and its two ends over the axis:
-        `plain` of them, or nine times as many at the surface as ridges need.
-        """
+        """Columns of the rectangle at the bone (mm) and its ends: `plain`, or nine times that for ridges."""
         if plain:
             return plain, -RECTANGLE, RECTANGLE
         step = 18.0 * self.ridge_width / self.ridge_cells

@@ -42,8 +42,7 @@ def ring(splits: Ints, rows: int, transitions: tuple[int, ...], order: int) -> L
     """The closed ring with `splits` (1, 3 or 9 columns per base column) and `rows` rows, numbered
     from outside.
 
-    In the rows `transitions` base columns of nine become columns of three, then those of three
-    become one.
+    In the rows `transitions` base columns of nine become columns of three, then those of three become one.
 
     >>> mesh = ring(np.array([1, 3, 3, 1]), 3, (1,), 1)
     >>> len(mesh.u), np.bincount(mesh.row).tolist()
@@ -72,9 +71,7 @@ def ring(splits: Ints, rows: int, transitions: tuple[int, ...], order: int) -> L
 
 
 class _Line:
-    """The nodes of one line of the open ring: `u`, and the number of the first node of each base
-    column.
-    """
+    """The nodes of one line of the open ring: `u`, and the number of the first node of each base column."""
 
     def __init__(self, split: Ints, start: int) -> None:
         column = np.repeat(np.arange(len(split)), split)

@@ -1,8 +1,7 @@
 """The layers of the finger pad: one row each, from the outline to the bone, and the nail.
 
-A row has all that the package knows about a layer. A layer more is a row at its place in `LAYERS`,
-and its thickness a parameter of `LayeredFinger`: the field `NAME_thickness`, with the default
-`thickness_of("NAME")`.
+A row has all that the package knows about a layer. A layer more is a row at its place in `LAYERS`, and its
+thickness a parameter of `LayeredFinger`: the field `NAME_thickness`, with the default `thickness_of("NAME")`.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ class Moduli(NamedTuple):
 
 
 class Thickness(NamedTuple):
-    """What a layer's thickness (mm) is by default, and what it may be."""
+    """Default and range of a layer's thickness (mm)."""
 
     default: float
     lowest: float

@@ -1,6 +1,4 @@
-"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its
-lower side.
-"""
+"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its lower side."""
 
 from __future__ import annotations
 
@@ -13,9 +11,7 @@ from evfem.common.arrays import Floats
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x
-    axis.
-    """
+    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x axis."""
 
     a: float
     b: float
@@ -36,15 +32,13 @@ class Ellipse:
         return n / np.hypot(n[:, 0], n[:, 1])[:, None]
 
     def towards(self, points: Floats) -> Floats:
-        """Where the lines from the centre to `points` (N, 2) cross the ellipse, (N, 2)."""
+        """Intersections of the ellipse with the lines from its centre to `points` (N, 2), (N, 2)."""
         centre = np.array([0.0, self.centre])
         away = points - centre
         return centre + away / np.hypot(away[:, 0] / self.a, away[:, 1] / self.b)[:, None]
 
     def evenly(self, start: float, end: float, count: int) -> Floats:
-        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between
-        them.
-        """
+        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between them."""
         fine = np.linspace(start, end, 2001)
         middle = 0.5 * (fine[1:] + fine[:-1])
         speed = np.hypot(self.a * np.sin(middle), self.b * np.cos(middle))
@@ -54,13 +48,12 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Ridges:
-    """Profile of the ridges over the abscissa x of the ellipse (mm): how deep a point lies below
-    the crest line.
+    """Depth below the crest line over the abscissa x of the ellipse (mm).
 
     t = |x - crest| / (pitch/2) runs from 0 at a crest to 1 in a groove; crests at x = (k + phase) pitch.
-    Rounded (`crest` = 0): depth = height * t**exponent. Flat-topped (`crest` > 0): crest and groove are
-    flat over these fractions of the pitch, and depth = height (1 - cos(pi s)) / 2 on the walls, s from 0 to
-    1. The depth is multiplied by a fade: 1 up to |x| = `full`, a quintic step down to 0 at |x| = `end`.
+    Rounded (`crest` = 0): depth = height * t**exponent. Flat-topped: crest and groove are flat over these
+    fractions of the pitch, depth = height (1 - cos(pi s)) / 2 on the walls. Faded from |x| = `full` to `end`
+    by a quintic step.
     """
 
     height: float

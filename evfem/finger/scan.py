@@ -1,12 +1,10 @@
 """Fingerprint ridges as they were scanned: a relief or an outline in a file, and how deep it lies
 below the crest line.
 
-A scan with heights has the form of the finger removed already: x is the abscissa of the smooth
-ellipse, and its highest point lies on the ellipse. A scan with y is the outline itself, x = 0 in
-the middle of the finger and y upwards: each point is projected onto the ellipse along its normal
-(Newton's method on the eccentric angle), and the whole scan is shifted in y until its highest
-crest touches the ellipse from inside. What is left between the two, ridges and whatever the
-ellipse does not follow, is the depth.
+A scan with heights has the form of the finger removed: x is the abscissa of the smooth ellipse, its highest
+point lies on it. A scan with y is the outline itself, x = 0 in the middle, y upwards: points are projected
+onto the ellipse along its normal (Newton's method on the eccentric angle), the highest crest touching it from
+inside.
 """
 
 from __future__ import annotations
@@ -126,9 +124,7 @@ class RidgeScan:
 
 
 def _projected(outer: Ellipse, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Abscissa of the foot of each point on the lower half of the ellipse, depth below it, and the
-    downward part of the normal there.
-    """
+    """Foot of each point on the ellipse's lower half, depth below it, downward part of the normal there."""
     angle = -np.arccos(np.clip(x / outer.a, -1.0, 1.0))
     for _ in range(ITERATIONS):
         cos, sin = np.cos(angle), np.sin(angle)

@@ -33,10 +33,9 @@ TRANSITION = 2.4
 class Divisions:
     """How finely to divide, in quadratic cells (twice as many linear ones).
 
-    `per_ridge`: columns per ridge in the finest zone (a third of it beyond, a ninth in the depth);
-    `transitions`: the rows in which columns merge, as (name of the layer, row in it), negative
-    from its end; base columns: `side` from the zone's end to the widest point, `upper` from there
-    to the nail's edge, `nail` along the nail. The rows of the layers stand in `LAYERS`.
+    `per_ridge`: columns per ridge in the finest zone; `transitions`: rows in which columns merge, as (layer,
+    row in it); base columns: `side` from the zone's end to the widest point, `upper` to the nail's edge,
+    `nail` along it.
     """
 
     per_ridge: int
@@ -123,9 +122,7 @@ class Section:
 
 
 def _heights(n: int, total: float, first: float, fixed: Mapping[int, float]) -> Floats:
-    """Heights of `n` rows: `fixed` ones (row -> height), the others in geometric progression from
-    `first`.
-    """
+    """Heights of `n` rows: `fixed` ones (row -> height), the others in geometric progression from `first`."""
     heights = np.zeros(n)
     for row, height in fixed.items():
         heights[row] = np.clip(height, 0.4 * total / n, max(1.3 / n, 0.35) * total)
@@ -177,9 +174,7 @@ class Columns:
         self.splits[middle - fine : middle + fine] = 9
 
     def _angles(self, base: int, around: list[int]) -> tuple[Floats, list[int]]:
-        """Eccentric angles of the base columns' borders, and the number of columns of each
-        stretch.
-        """
+        """Eccentric angles of the base columns' borders, and the number of columns of each stretch."""
         outer, edge = self.section.outer, self._edge
         x = self.first_x + self.step * np.arange(base + 1)
         pad = -np.arccos(x / outer.a)

@@ -1,4 +1,4 @@
-"""What a cross-section and a whole pad share: sizes with ranges and meanings, and what fits together."""
+"""Common to a cross-section and a whole pad: sizes with ranges and meanings, and their consistency."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class LayeredFinger:
         return sizes
 
     def __repr__(self) -> str:
-        """What differs from Table 2."""
+        """Differences from Table 2."""
         return called(type(self).__name__, self._own())
 
     def _repr_html_(self) -> str:
@@ -161,9 +161,7 @@ class LayeredFinger:
         return table(type(self).__name__, [*(facts | own).items()])
 
     def mesh(self, order: int = 2) -> Mesh:
-        """The mesh: linear cells of order 1, or half as many divisions of quadratic cells of order 2, whose
-        mid-nodes lie on the true surfaces; both have about the same number of nodes.
-        """
+        """The mesh: linear cells of order 1, or half as many divisions of quadratic ones of order 2."""
         if order not in (1, 2):
             raise InputError("order", quoted(order), "1 or 2")
         mesh: Mesh = self._shape.mesh(order)
@@ -218,9 +216,7 @@ def check_skin(skin: float, radius: float, factor: float) -> None:
 
 
 def check_profile(ridges: Ridges, steeper: float = 1.0) -> None:
-    """Refuse ridges whose flat parts leave no walls, or whose walls are too steep on an outline that
-    makes them so many times steeper.
-    """
+    """Refuse ridges whose flat parts leave no walls, or whose walls are too steep on the outline."""
     check_at_most("ridge_crest", ridges.crest + ridges.groove, 0.9, "together with finger.ridge_groove", "")
     slope, limit = ridges.steepest * steeper, STEEPEST_FLAT if ridges.crest > 0.0 else STEEPEST
     if slope > limit:
@@ -250,9 +246,7 @@ def check_cells(cells: int | None, ridged: bool) -> None:
 
 
 def check_bone(name: str, from_bone: Floats, axes: tuple[float, ...]) -> None:
-    """Refuse a bone that the dermis has no room around: points (N, d) of its inner side from the
-    bone's centre, the bone's half axes (d,).
-    """
+    """Refuse a bone without room in the dermis: inner points (N, d) from its centre, its half axes (d,)."""
     clear = (1.0 - 1.0 / np.linalg.norm(from_bone / axes, axis=1)) * np.linalg.norm(from_bone, axis=1)
     if not clear.min() >= CLEARANCE:
         given = f"a bone that leaves {clear.min():.3g} mm to the dermis"

@@ -74,9 +74,8 @@ class Relief(Protocol):
 class Grid:
     """How the disc is divided, in quadratic cells (twice as many linear ones).
 
-    `columns` of the rectangle across and along, as they are at the bone; in the rows `merging[0]`
-    three columns across become one, in `merging[1]` along. `sides`: cells from the rectangle to
-    the rim. The rectangle lies between `low` and `high`, each (p, q).
+    `columns` of the rectangle at the bone; rows in which three columns merge across, `merging[0]`, and along,
+    `merging[1]`; `sides`: cells from the rectangle, between `low` and `high`, each (p, q), to the rim.
     """
 
     columns: tuple[int, int]
@@ -105,9 +104,7 @@ class Solid:
     posture: float = 0.0
 
     def mesh(self, order: int) -> Mesh:
-        """Hexahedra of `order` 1 or 2, the latter with half the divisions and mid-nodes on the
-        true surfaces.
-        """
+        """Hexahedra of `order` 1, or 2 with half the divisions and mid-nodes on the true surfaces."""
         per_cell = 3 - order
         rows = [n * per_cell for n in self.rows]
         places, cells, row = self._joined(sum(rows), per_cell, order)
@@ -128,9 +125,7 @@ class Solid:
         return Mesh(points, _right_handed(points, cells), kind, region, names, sets)
 
     def _joined(self, rows: int, per_cell: int, order: int) -> tuple[Floats, Ints, Ints]:
-        """The five patches with their common nodes once: places (N, 4) as (unit vector, row),
-        cells, and the row of each cell.
-        """
+        """The five patches, common nodes once: places (N, 4) as (unit vector, row), cells, rows of cells."""
         grid = self.grid
         across, along = (n * per_cell for n in grid.columns)
         sides = grid.sides * per_cell
@@ -156,9 +151,7 @@ class Solid:
         return np.column_stack([p, -np.sqrt(1.0 - p * p - q * q), q])
 
     def _side(self, parameters: Floats, axis: int, end: int) -> Floats:
-        """Unit vectors (N, 3) of the patch beyond the rectangle's edge at the `end` (0 low, 1
-        high) of an `axis` (0 x, 1 z): v goes from that edge to the rim along great circles.
-        """
+        """Unit vectors (N, 3) of the patch beyond the `end` (0 or 1) of an `axis` (0 x, 1 z), v outwards."""
         u, v = parameters[:, 0], parameters[:, 1]
         on_edge = np.full((len(u), 2), float(end))
         on_edge[:, 1 - axis] = u

@@ -1,10 +1,9 @@
 """A user's mesh in, any finger mesh out: names, encoding and checks.
 
-Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ...
-(nonzero: belongs). Files written here also carry the names of the regions as field data
-(`region:NAME` = number), so that no table is needed to read them back. Encoding of `.msh` files:
-physical groups of surfaces (regions) and of lines or points (sets of nodes), or of volumes and
-surfaces.
+Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ... (nonzero: belongs).
+Files written here also carry the names of the regions as field data (`region:NAME` = number), so that no
+table is needed to read them back. Encoding of `.msh` files: physical groups of surfaces (regions) and of
+lines or points (sets of nodes), or of volumes and surfaces.
 
 Files are read by meshio, which knows no limits: `parts` bounds the file's size and turns all it
 raises into one reason. A small file that was made to fill the memory still may: see
@@ -53,8 +52,7 @@ _Names = dict[tuple[int, int], str]
 
 
 def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
-    """The checked mesh, in mm, of a file of at most 128 MB that meshio reads: `.vtu`, `.msh` and
-    others.
+    """The checked mesh, in mm, of a file of at most 128 MB that meshio reads: `.vtu`, `.msh` and others.
 
     `regions` maps a name to its number in the cell data `region`; it is not needed for physical
     groups of gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are
@@ -163,16 +161,12 @@ def _body(raw: meshio.Mesh) -> int:
 
 
 def _dimension(kind: str, body: int) -> int:
-    """Of a kind of cell; kinds that only meshio knows count as parts of the body, and are refused
-    there.
-    """
+    """Of a kind of cell; kinds that only meshio knows count as parts of the body, and are refused there."""
     return CELLS[kind].dimension if kind in CELLS else body
 
 
 def _plane(path: Path, points: np.ndarray) -> np.ndarray:
-    """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is
-    refused.
-    """
+    """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is refused."""
     points = np.asarray(points, dtype=float)
     if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > 1e-9:
         given = f"{path} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
@@ -205,9 +199,7 @@ def _group_sets(raw: meshio.Mesh, names: _Names, body: int) -> dict[str, Ints]:
 
 
 def _tags(raw: meshio.Mesh) -> list[Ints]:
-    """Numbers of physical groups, 0 for none; Gmsh gives negative ones to curves that run
-    backwards.
-    """
+    """Numbers of physical groups, 0 for none; Gmsh gives negative ones to curves that run backwards."""
     tags = raw.cell_data.get(PHYSICAL)
     return [np.abs(tag) for tag in tags] if tags else [np.zeros(len(one), dtype=int) for one in raw.cells]
 
@@ -259,9 +251,7 @@ def _checked_names(path: Path, region: Ints, regions: Mapping[str, int]) -> dict
 
 
 def _point_sets(path: Path, raw: meshio.Mesh) -> dict[str, Ints]:
-    """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and
-    1.
-    """
+    """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and 1."""
     sets = {}
     for name, values in raw.point_data.items():
         values = np.asarray(values)
@@ -279,11 +269,9 @@ def _point_sets(path: Path, raw: meshio.Mesh) -> dict[str, Ints]:
 
 
 def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:
-    """Write `.vtu` (binary, uncompressed) or `.msh` (2.2, named physical groups), the whole file
-    or nothing.
+    """Write `.vtu` (binary, uncompressed) or `.msh` (2.2, named physical groups), the whole file or nothing.
 
-    Raises `InputError` for a format that cannot carry the names, `StorageError` if the file cannot
-    be made.
+    Raises `InputError` for a format that cannot carry the names, `StorageError` if the file cannot be made.
     """
     path = Path(path)
     writer = WRITERS.get(path.suffix.lower())
@@ -324,8 +312,7 @@ def _write_vtu(mesh: Mesh, path: Path) -> None:
 
 
 def add_region_names(path: Path, mesh: Mesh) -> None:
-    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` =
-    number.
+    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` = number.
 
     The bytes are patched because meshio reads field data of this format but does not write them.
     """

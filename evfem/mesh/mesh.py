@@ -90,9 +90,7 @@ class Mesh:
 
     @property
     def centres(self) -> Floats:
-        """The point in the middle of each cell (E, dim) in mm, of its own coordinates where it is
-        bent.
-        """
+        """The point in the middle of each cell (E, dim) in mm, of its own coordinates where it is bent."""
         if self.kind in ("quad9", "hexahedron27"):
             return self.points[self.cells[:, -1]]
         corners, middles = np.split(self.points[self.cells], [self.corners], axis=1)
@@ -139,9 +137,7 @@ class Mesh:
 
     @cached_property
     def edges(self) -> tuple[Ints, Ints]:
-        """All edges once, (K, 2) corner nodes in rising order, and the edges of each cell, (E,
-        corners).
-        """
+        """All edges once, (K, 2) corner nodes in rising order, and the edges of each cell, (E, corners)."""
         ends = np.sort(self.cell_edges[..., :2], axis=2).reshape(-1, 2)
         code, inverse = np.unique(ends[:, 0] * len(self.points) + ends[:, 1], return_inverse=True)
         return np.column_stack(np.divmod(code, len(self.points))), inverse.reshape(-1, self.corners)
@@ -247,9 +243,7 @@ def _with_middles(nodes: Ints, edges: Ints, outer: np.ndarray, first: int) -> In
 
 
 def interface_of(mesh: Mesh, region: str) -> Ints:
-    """Nodes (K, ...) of every side (edge, or face of hexahedra) that a cell of `region` shares with
-    a cell of another region. Raises `InputError` if there is no such region or side.
-    """
+    """Nodes (K, ...) of every side that cells of two given regions share; raises `InputError` without one."""
     if region not in mesh.region_names:
         raise InputError("region", quoted(region), " | ".join(mesh.region_names))
     inside = mesh.region == mesh.region_names[region]

@@ -1,4 +1,4 @@
-"""What a mesh must fulfil before anything is computed on it.
+"""Checks of a mesh before anything is computed on it.
 
 `check` asks one question after the other, in the order of the file, and every fault becomes one
 sentence; what it asks of hexahedra alone is in `evfem.mesh.solids`. The shape of cells is their
@@ -30,9 +30,8 @@ def check(mesh: Mesh, source: str = "mesh") -> Mesh:
     """The same mesh, its cells counter-clockwise (hexahedra right-handed) and its set `pad` reduced
     to the outline or surface.
 
-    `source` names the mesh in messages. Raises `InputError` (key `finger.mesh`) for the first
-    fault found: values, numbers of nodes, units, names, double and unused nodes, orientation,
-    connection, overlap.
+    `source` names the mesh in messages. Raises `InputError` (key `finger.mesh`) for the first fault found:
+    values, numbers of nodes, units, names, double and unused nodes, orientation, connection, overlap.
     """
 
     def refuse(fault: str, allowed: str) -> None:
@@ -151,9 +150,7 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _parts(of_cell: Ints, edges: int) -> int:
-    """Number of parts that hang together, from the edges (E, corners) of each cell: a cell takes the
-    smallest number among its neighbours, which is looked up in turn, until all of a part have one.
-    """
+    """Number of connected parts, from the edges (E, corners) of each cell, by smallest neighbours."""
     part = np.arange(len(of_cell))
     while True:
         smallest = np.full(edges, len(of_cell))
@@ -218,9 +215,7 @@ def _pairs_within(points: Floats, reach: float) -> Ints | None:
 
 
 def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Ends of the segments b (K, 2, 2) across and along the segments a, in lengths of a, (K, 2)
-    each.
-    """
+    """Ends of the segments b (K, 2, 2) across and along the segments a, in lengths of a, (K, 2) each."""
     direction = a[:, 1] - a[:, 0]
     away = b - a[:, :1]
     square = (direction**2).sum(axis=1)[:, None]

@@ -1,9 +1,8 @@
 """What a mesh of hexahedra must fulfil, in the order in which `evfem.mesh.quality` asks; every fault
 becomes one sentence.
 
-Whether two bodies overlap is found where a node of the surface lies on another cell's face (which
-also finds nodes that hang on a larger neighbour); bodies that run through each other elsewhere are not
-found.
+Whether two bodies overlap is found where a node of the surface lies on another cell's face (which also finds
+nodes that hang on a larger neighbour); bodies that run through each other elsewhere are not found.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What a scene needs, decided before anything is solved, and what is hardly meant by it."""
+"""The plan of a scene, made before anything is solved, and warnings about implausible input."""

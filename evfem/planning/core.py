@@ -23,7 +23,7 @@ from evfem.electrostatics.laws import traction_derivative
 from evfem.electrostatics.roughness import Cored, roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import way
+from evfem.planning.resolution import path_points
 from evfem.scene.electrics import Electrics
 from evfem.scene.scene import Scene
 from evfem.tissue.splitlaw import plane_modulus, split
@@ -58,7 +58,7 @@ class Core:
 
     @property
     def told(self) -> dict[str, float]:
-        """What a result's provenance says of it."""
+        """Its entry in the provenance of a result."""
         return {"length": self.length, "slope": self.ratio * RESOLVED, "edge": EDGE * self.distance}
 
     def __str__(self) -> str:
@@ -77,7 +77,7 @@ class Core:
 
 
 def electrics_of(scene: Scene, mesh: Mesh) -> Electrics:
-    """What acts between the nodes of the pad and the electrode."""
+    """The attraction between the nodes of the pad and the electrode."""
     nodes = np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
     return scene.electrics.above(scene.finger.electrical, mesh, nodes)
 
@@ -172,7 +172,7 @@ def unseen(scene: Scene, mesh: Mesh) -> str | None:
     core, surface = core_of(scene, mesh), scene.ground
     if core is None or not core.fits or surface.is_flat:
         return None
-    depth = float(np.ptp(surface.height(way(scene, mesh, core.distance))))
+    depth = float(np.ptp(surface.height(path_points(scene, mesh, core.distance))))
     if core.length <= SEEN * depth or depth == 0.0:
         return None
     return (

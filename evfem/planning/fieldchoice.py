@@ -26,9 +26,7 @@ class FieldChoice:
 
 
 def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
-    """The choice of a scene whose `field` is not `local`, from the bounds at first touch, unless the
-    finger only hovers, and at every height of the bone above it, the worst of which counts.
-    """
+    """The choice of a scene whose `field` is not `local`, by the worst of the bounds where motions end."""
     if mesh.dim == 3:
         if scene.field == "full":
             raise InputError("electrostatics.field", "full with a solid", "local or auto: the plane has it")

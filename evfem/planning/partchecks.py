@@ -1,4 +1,4 @@
-"""How a user's functions are tried before a run, and what contact asks of a user's parts.
+"""Tests of a user's functions before a run, and the requirements of contact on a user's parts.
 
 `evaluated` and its like say in a sentence what is wrong with a function; `check_surface`,
 `check_friction_law` and `check_roughness` try a surface at a dozen places of the way, and laws at
@@ -61,9 +61,7 @@ def evaluated(key: str, what: str, function: Callable[[Array], Any], at: Array) 
 
 
 def check_arguments(key: str, method: Any, called: tuple[str, ...], *, by_name: bool = False) -> None:
-    """Whether a user's method takes the arguments of `called`, its name and theirs; those `by_name`
-    have these names, in this order.
-    """
+    """Whether a user's method takes the arguments of `called`, those `by_name` under these names."""
     name, *arguments = called
     try:
         own = signature(method)
@@ -86,9 +84,7 @@ def check_shape(key: str, what: str, found: Array, at: Array, *, one: bool = Fal
 
 
 def check_surface(scene: Scene) -> None:
-    """Whether a user's surface has a finite value everywhere on the way, and slopes that are those
-    of its height.
-    """
+    """Whether a user's surface is finite everywhere on the way, with the slopes of its height."""
     key, own, x = "surface", scene.surface, _places(scene)
     for name in ("height", "slope", "curvature", "friction_coefficient"):
         method = getattr(own, name, None)
@@ -138,9 +134,7 @@ def _pad_of(scene: Scene) -> Floats:
 
 
 def check_friction_law(scene: Scene) -> None:
-    """Whether a user's bound is finite, not negative, in MPa, and a value for every node, at rest and
-    at the speeds of the slides.
-    """
+    """Whether a user's bound is finite, not negative, in MPa, one value a node, at rest and all speeds."""
     key, law, names = "surface.friction_law", scene.friction_law, ("pressure", "mu", "speed", "age")
     check_arguments(key, law.bound, ("bound", *names), by_name=True)
     speeds = np.array(sorted({0.0, *(course.speed or 0.0 for course in scene.courses)}))

@@ -56,9 +56,7 @@ HIGHEST_VOLTAGE = 5e5
 
 
 def check_parts(scene: Scene, dim: int) -> None:
-    """Raise InputError for a part of the user's that no run in `dim` dimensions could use, and for a
-    voltage out of all reason.
-    """
+    """InputError for a user's part that no run in `dim` dimensions can use, or a voltage out of reason."""
     with_terms = {term.on.name for term in scene.forms}
     for name, law in scene.finger.materials.items():
         key = f"finger.materials.{name}"
@@ -191,9 +189,7 @@ def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:
 
 
 def _check_traction(key: str, traction: Array, rigid: Any) -> None:
-    """Whether a user's traction attracts, does not grow with the gap, and is in MPa, compared with
-    that of `rigid` plates.
-    """
+    """Whether a user's traction attracts, does not grow with the gap, and is in MPa, by `rigid` plates."""
     if (traction < 0.0).any():
         raise InputError(key, f"a traction of {traction.min():.3g} MPa", "positive values, which attract")
     if (np.diff(traction) > 0.0).all():

@@ -1,5 +1,4 @@
-"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its
-reason.
+"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its reason.
 
 `make_model` builds what the plan says, so the printout and the run cannot disagree.
 """
@@ -20,22 +19,22 @@ from evfem.errors import InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
 from evfem.planning.core import core_of, unseen
-from evfem.planning.drift import drifting
+from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
+from evfem.planning.pathdependence import steps_line
+from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
 from evfem.planning.resolution import oscillating, too_fast, unresolved
-from evfem.planning.sense import doubts, locking, touching_traction, weakens
 from evfem.planning.timescales import left_out, time_scales
-from evfem.planning.way import said
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
 from evfem.tissue.dynamics import DYNAMICS
-from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
+from evfem.tissue.space import elements_of_order
 from evfem.tissue.splitlaw import nearly_incompressible
 from evfem.tissue.userforms import Trial, tried
 
@@ -104,9 +103,25 @@ def _wrapped(begin: str, text: str) -> list[str]:
 
 
 def plan(scene: Scene | str | PathLike[str]) -> Plan:
-    """Which terms, unknowns and solver a scene needs (`Scene`, or the path of a scene file), and why;
-    builds the mesh, solves nothing.
+    """Terms, unknowns and solver of a scene, with reasons; builds the mesh, solves nothing.
 
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file.
+
+    Returns
+    -------
+    Plan
+        It prints as a page; `terms`, `solver` and `warnings` are its parts.
+
+    Raises
+    ------
+    InputError
+        The scene cannot be run.
+
+    Examples
+    --------
     >>> from evfem import Flat, FingerPad, Press, Scene
     >>> smooth = FingerPad(ridges=False, resolution="coarse")
     >>> needed = plan(Scene(smooth, Flat(friction=0.0), motion=[Press(indentation=0.5)]))
@@ -129,9 +144,7 @@ def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
 
 
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
-    """The plan of a scene whose mesh is already there; raises InputError for parts that no run
-    could use.
-    """
+    """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
     check_parts(scene, mesh.dim)
     check_space(scene, mesh)
     for name in ("pad", "bone"):
@@ -171,7 +184,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, mesh, terms),
-        warnings=(*doubts(scene, mesh, moduli), *locked, *filter(None, others)),
+        warnings=(*implausible(scene, mesh, moduli), *locked, *filter(None, others)),
     )
 
 
@@ -223,7 +236,7 @@ def _electricity(scene: Scene, mesh: Mesh) -> Term:
 
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
-    """What bounds say of the full field, where a scene asks for it or leaves the choice."""
+    """Bounds of the full field, if a scene requests it or leaves the choice."""
     if scene.field == "local" or not scene.electrics.acts:
         return ()
     from evfem.planning.fieldchoice import chosen_field
@@ -233,7 +246,7 @@ def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
 
 
 def _roughness(scene: Scene) -> str:
-    """What rough faces add to the gap, in words; nothing without them."""
+    """Additional gap of rough faces, in words; empty without them."""
     rough = roughness_of(scene.roughness_gap)
     if rough is None:
         return ""
@@ -284,7 +297,7 @@ def _forms(scene: Scene, mesh: Mesh) -> Term:
 
 
 def _caveat(trial: Trial) -> str:
-    """What to expect of a form whose tangent is not symmetric."""
+    """Consequences of a form with an unsymmetric tangent."""
     return "" if trial.has_potential else " (no potential: only the symmetric part of its tangent is used)"
 
 
@@ -318,7 +331,7 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
             f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
             "so the tissue's matrix stays symmetric"
         )
-    steps = said(scene)
+    steps = steps_line(scene)
     if steps:
         lines.append(steps)
     return (

@@ -36,10 +36,8 @@ PER_PERIOD = 20.0
 def unresolved(scene: Scene, mesh: Mesh) -> str | None:
     """A sentence if the surface is sharper or rougher than the node spacing of the pad, else None.
 
-    Compared are the profile's height in the middle between two nodes with the mean of its heights
-    below them, and its slope there with that from node to node, all along the way. Noise of a scan
-    hardly shows in the heights, but contact acts along the slope: nodes that follow it stick and
-    slip one by one.
+    Compared are height and slope in the middle between two nodes with the mean height below them and the
+    slope from node to node: noise hardly shows in heights, but contact acts along the slope.
     """
     surface: Any = scene.ground
     if surface.is_flat or not len(edges := _pad_edges(mesh)):
@@ -52,7 +50,7 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
             f"{PER_WAVE:g} nodes of the pad each, which are {spacing:.2g} mm apart; use a finer mesh, or a "
             f"shortest wave of {PER_WAVE * spacing:.2g} mm"
         )
-    x = way(scene, mesh, spacing / PER_SPACING)
+    x = path_points(scene, mesh, spacing / PER_SPACING)
     before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
     if missed > MISSED * whole:
@@ -72,9 +70,7 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
 
 
 def _pad_edges(mesh: Mesh) -> Ints:
-    """Ends (K, 2) of the pad's edges; in three dimensions of those of its faces that run more
-    across than along.
-    """
+    """Ends (K, 2) of the pad's edges; in space of its faces' that run more across than along."""
     if mesh.dim == 2:
         return mesh.edges_of("pad")[:, :2]
     faces = mesh.faces_of("pad")[:, :4]
@@ -84,11 +80,8 @@ def _pad_edges(mesh: Mesh) -> Ints:
 
 
 def too_fast(scene: Scene) -> str | None:
-    """A sentence if a motion's steps are too long for the highest frequency of a voltage over
-    time, else None.
-
-    The attraction goes with the square of the voltage, so with up to twice that frequency; what
-    lies above half the rate of the steps appears below it (aliasing).
+    """A sentence if a motion's steps are too long for a voltage over time, else None: the attraction has up
+    to twice its frequency, and what is above half the rate of the steps appears below it (aliasing).
     """
     signal = scene.electrics.voltage
     if not isinstance(signal, TimeSignal) or not signal.highest_frequency > 0.0:
@@ -106,11 +99,8 @@ def too_fast(scene: Scene) -> str | None:
 
 
 def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
-    """A sentence for the hand and for the tissue if a motion's steps are longer than their period.
-
-    The hand's is that of its mass on its spring, the tissue's the slowest of a layer of the softest
-    material between pad and bone in shear, 4 h sqrt(rho / G), about; damped beyond their critical
-    damping neither has one.
+    """A sentence for hand and tissue if a motion's steps are longer than their period: of its mass on its
+    spring; of the softest layer in shear, about 4 h sqrt(rho / G). Overdamped, neither has one.
     """
     longest, step = _longest(scene)
     for what, period in _periods(scene, mesh):
@@ -150,7 +140,7 @@ def _instead(signal: TimeSignal) -> str:
     return ""
 
 
-def way(scene: Scene, mesh: Mesh, step: float) -> Any:
+def path_points(scene: Scene, mesh: Mesh, step: float) -> Any:
     """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
     pad, bone = mesh.points[mesh.node_sets["pad"], 0], scene.reach
     first, last = pad.min() + bone[0], pad.max() + bone[1]

@@ -24,7 +24,7 @@ FOLLOWS = 5.0
 
 
 def time_scales(scene: Scene) -> str:
-    """What the drive of a scene is, which time scales it has, and which of them are resolved."""
+    """The drive of a scene, its time scales, and which of them are resolved."""
     drive = scene.drive
     assert drive is not None
     at = scene.electrics.frequency
@@ -72,7 +72,7 @@ def _constants(layer: Layer, at: float | None) -> tuple[float, tuple[()], float]
 
 
 def _relaxing(stack: Sandwich) -> list[str]:
-    """How many poles the dielectrics of a resolved drive have, and how slow."""
+    """Number and time constants of the Debye poles of a resolved drive."""
     if stack.states == 2:
         return []
     times = np.concatenate([stack.skin.tau, stack.insulator.tau])
@@ -94,9 +94,7 @@ def _mechanics(scene: Scene) -> str:
 
 
 def slowest_swing(scene: Scene) -> float:
-    """Lowest frequency (Hz) at which the attraction swings: twice the voltage's, or that itself where
-    it has a bias, or even harmonics.
-    """
+    """Lowest frequency (Hz) of the attraction: twice the voltage's; once with a bias or even harmonics."""
     at, found = scene.electrics.frequency or 0.0, powers(scene.voltage)
     odd = found is None or not (found[1] % 2.0 == 0.0).any()
     return 2.0 * at if odd else at

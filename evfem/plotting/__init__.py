@@ -1,6 +1,5 @@
-"""Pictures of results, meshes, sweeps and fits with matplotlib: functions that return the Axes they drew
-on, or the axes of several panels; their `figure` is saved by
-`forces(result).figure.savefig("forces.png")`.
+"""Pictures of results, meshes, sweeps and fits with matplotlib: functions that return the Axes they drew on,
+or the axes of several panels; their `figure` is saved by `forces(result).figure.savefig("forces.png")`.
 """
 
 from evfem.plotting.curves import (

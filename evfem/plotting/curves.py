@@ -1,8 +1,7 @@
 """Curves: columns of the history of one result or several, tractions of a frame, residuals of a fit.
 
-A result is drawn per mm of depth, `result.total` over the whole depth: in N, mm² and mJ. `over` is the
-column along the abscissa: any column that grows or falls, by default the one that the motions change
-(`abscissa`).
+A result is drawn per mm of depth, `result.total` over the whole depth: in N, mm² and mJ. `over` is the column
+along the abscissa: any column that grows or falls, by default the one that the motions change (`abscissa`).
 """
 
 from __future__ import annotations
@@ -77,12 +76,7 @@ TWO = 2.0  # standard deviations: the band that residuals of the given sd rarely
 
 
 def abscissa(result: Result) -> str:
-    """The column that a picture is drawn over: what all motions change, the time if the finger
-    waits, else the step.
-
-    Presses are drawn over the indentation, slides over the position (along the finger over
-    `position_z`), voltage ramps over the voltage.
-    """
+    """What a picture is drawn over: what all motions change, the time if the finger waits, or the step."""
     kinds = set(result.motion)
     wished = {"press": "indentation", "voltage": "voltage"}
     name = wished.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"
@@ -102,10 +96,26 @@ def _changes(values: Floats) -> bool:
 def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
 
-    `over` is step, position, time, indentation, voltage or applied_force; None takes what all
-    motions change: the indentation for presses alone, the position for slides, the voltage for
-    ramps; the time if the finger waits, else the step, with the motions marked. A force that is 0
-    throughout is left out.
+    Parameters
+    ----------
+    result
+        A result; a force that is 0 throughout is left out.
+    over
+        step, position, time, indentation, voltage or applied_force. None: the quantity that all
+        motions change (presses: indentation, slides: position, ramps: voltage), the time if the
+        finger waits, else the step, with the motions marked.
+    ax
+        Axes to draw in; None: new ones.
+
+    Returns
+    -------
+    Axes
+        The axes of the curves.
+
+    Raises
+    ------
+    InputError
+        Another `over`.
     """
     return _of_one_kind(ax, result, FORCES, "applied_force", over)
 
@@ -143,9 +153,7 @@ def checked_over(over: str | None, result: Result) -> str:
 
 
 def along(result: Result, name: str, over: str) -> Any:
-    """A column as it is drawn over another one; over the time, of the steps that take none only the
-    last.
-    """
+    """A column as it is drawn over another one; over the time, of the steps that take none only the last."""
     values = values_of(result, name)
     if over != "time" or not len(values):
         return values
@@ -161,9 +169,7 @@ def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
-    """A thin line where a motion ends, and its name above; names that would run into each other
-    stand in rows.
-    """
+    """A thin line where a motion ends, its name above; names that would collide stand in rows."""
     ends = [*np.flatnonzero(np.diff(result.motion_index)).tolist(), len(result.step) - 1]
     letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
     rows: list[float] = []  # where the last name of each row ends
@@ -233,9 +239,7 @@ def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
 
 
 def contact_area(results: Results, ax: Axes | None = None) -> Axes:
-    """Contact width (in total: area) over the applied force of the presses: from edge to edge, and
-    of all that touches.
-    """
+    """Contact width (in total: area) over the applied force of the presses: outer and real."""
     found, lines = named(results), []
     for result, look in styled(found):
         width = "contact_area" if result.mesh.dim == 3 else "contact_width"
@@ -248,8 +252,7 @@ def contact_area(results: Results, ax: Axes | None = None) -> Axes:
 
 
 def friction(results: Results, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Apparent friction coefficient, tangential over normal force on the bone, over `over`
-    (`forces`).
+    """Apparent friction coefficient, tangential over normal force on the bone, over `over` (`forces`).
 
     Steps without a load on the bone are left out.
     """
@@ -333,9 +336,8 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
 def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
     """Computed minus measured for each measured value of a fit, in the order of the data.
 
-    In standard deviations where the data have them, with a band of two on either side; else in
-    percent of the root mean square of the measurement. A good fit scatters about zero without a
-    pattern.
+    In standard deviations where the data have them, with a band of two on either side; else in percent of the
+    root mean square of the measurement. A good fit scatters about zero without a pattern.
     """
     from matplotlib.ticker import MaxNLocator
 

@@ -21,11 +21,42 @@ from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.figures import BOTH_SIGNS, EDGE, ONE_SIGN, STATUS, TISSUE
-from evfem.plotting.ground import Height
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+from collections.abc import Callable
+
+from evfem.errors import EvfemError
+
+Height = Callable[[Floats], Floats]
+
+
+def height_of(result: Result, frame: Frame) -> Height:
+    """Height (mm) of the surface at x (mm) of the laboratory, while the finger is as in `frame`."""
+    known = _from_scene(result)
+    return _from_gaps(result, frame) if known is None else known
+
+
+def _from_scene(result: Result) -> Height | None:
+    from evfem.scene.file import loads
+    from evfem.simulation.model import placed
+
+    try:
+        surface = loads(result.provenance.get("parameters", "")).ground
+        mesh = result.mesh
+        surface, _ = placed(surface, mesh.points[mesh.node_sets["pad"]])
+    except EvfemError:
+        return None
+    return lambda x: surface.y + surface.height(x)
+
+
+def _from_gaps(result: Result, frame: Frame) -> Height:
+    pad = np.flatnonzero(np.isfinite(frame.gap))
+    x, y = (result.mesh.points + frame.displacement)[pad].T
+    order = np.argsort(x)
+    return lambda at: np.interp(at, x[order], (y - frame.gap[pad])[order])
+
 
 STRESSES = tuple(f"cauchy_stress_{c}" for c in ("xx", "yy", "zz", "xy"))
 CELL_FIELDS = ("von_mises", *STRESSES, "J")
@@ -64,9 +95,7 @@ def frame_of(result: Result, number: int) -> Frame:
 
 
 def rounds(mesh: Mesh) -> Ints:
-    """Nodes of each cell once around (E, corners or twice as many), middle nodes between their
-    corners.
-    """
+    """Nodes of each cell once around (E, corners or twice as many), middle nodes between their corners."""
     m = mesh.corners
     if mesh.order == 1:
         return mesh.cells
@@ -85,11 +114,7 @@ def areas(outlines: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Triangles (T, 3) between V vertices: every region has vertices of its own.
-
-    `nodes` (V,) are the mesh nodes of the vertices, `cells` (E, n) the vertices of each cell in the
-    order of the mesh.
-    """
+    """Triangles (T, 3) between V vertices, own ones in each region: mesh `nodes` (V,), `cells` (E, n)."""
 
     nodes: Ints
     triangles: Ints
@@ -154,9 +179,8 @@ class Scale:
 def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float | None = None) -> Scale:
     """The scale of a field for the values that are shown, from their smallest to their largest.
 
-    A wished end takes the place of one of these. A field with a sign has as much of its colours
-    on either side of its middle, unless both ends are wished. Raises InputError unless vmin is
-    below vmax.
+    A wished end takes the place of one of these. A field with a sign has as much of its colours on either
+    side of its middle, unless both ends are wished. Raises InputError unless vmin is below vmax.
 
     >>> scale_of("von_mises", np.array([0.1, 0.4]), vmin=0.0)
     Scale(cmap='viridis', low=0.0, high=0.4, extend='neither')
@@ -186,9 +210,7 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
 
 
 def shown_values(mesh: Mesh, frame: Frame, field: str, window: Window) -> Floats:
-    """Values inside a window (left, right, bottom, top in mm): of the cells whose middle is there,
-    of nodes, of the pad's nodes for a field of the pad.
-    """
+    """Values inside a window (left, right, bottom, top in mm): of cells, nodes, or the pad's nodes."""
     place, values = mesh.points + frame.displacement, values_of(frame, field)
     if field in CELL_FIELDS:
         return values[within(place[mesh.cells].mean(axis=1), window)]
@@ -197,16 +219,14 @@ def shown_values(mesh: Mesh, frame: Frame, field: str, window: Window) -> Floats
 
 
 def within(place: Floats, window: Window) -> Any:
-    """Which of the points (N, 2) are in the window (N,)."""
+    """Points (N, 2) in the window, (N,) bool."""
     left, right, bottom, top = window
     x, y = place.T
     return (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
 
 
 def draw_outline(ax: Axes, mesh: Mesh, frame: Frame, field: str, scale: Scale) -> Any:
-    """The tissue in one pale colour and the pad's outline in the colours of the field (a
-    LineCollection).
-    """
+    """The tissue in one pale colour and the pad's outline in the colours of the field (a LineCollection)."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     points = mesh.points + frame.displacement

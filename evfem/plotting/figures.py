@@ -4,10 +4,9 @@ Colours are told apart with any colour vision, and maps stay in order without co
 colours of Okabe and Ito (2008), fields viridis; a stress or strain with a sign has a map from purple over
 white to orange, with white at zero (ColorBrewer, safe for colour-blind readers).
 
-A figure is made without pyplot, so that nothing stays open and no global state changes. Where
-pyplot has been imported and can show figures, it knows the figure, as it knows one of its own:
-`plt.show()` shows it, a notebook shows it below its cell. Elsewhere the last line of a notebook's
-cell shows it; never both.
+A figure is made without pyplot, so that nothing stays open and no global state changes. Where pyplot has been
+imported and can show figures, it knows the figure, as it knows one of its own: `plt.show()` shows it, a
+notebook shows it below its cell. Elsewhere the last line of a notebook's cell shows it; never both.
 """
 
 from __future__ import annotations
@@ -23,16 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE, YELLOW = (
-    "#000000",
-    "#E69F00",
-    "#56B4E9",
-    "#009E73",
-    "#0072B2",
-    "#D55E00",
-    "#CC79A7",
-    "#F0E442",
-)
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PURPLE, YELLOW = "#0072B2", "#D55E00", "#CC79A7", "#F0E442"
 #: one after the other, for curves that have no colour of their own, with styles that differ in print
 CURVES = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 STYLES = ("-", "--", "-.", ":")
@@ -130,9 +121,7 @@ def _png(figure: Figure) -> bytes | None:
 
 
 class Beside:
-    """Keeps a colour bar exactly as high as the axes beside it, also where these are in true
-    proportions and so smaller than their place.
-    """
+    """Keeps a colour bar as high as the axes beside it, also in true proportions."""
 
     def __init__(self, ax: Axes) -> None:
         self.ax = ax

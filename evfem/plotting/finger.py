@@ -13,6 +13,7 @@ from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.fields import (
     TRACTIONS,
+    Height,
     Scale,
     Window,
     areas,
@@ -20,6 +21,7 @@ from evfem.plotting.fields import (
     draw_arrows,
     draw_outline,
     frame_of,
+    height_of,
     patches,
     rounds,
     scale_of,
@@ -28,7 +30,6 @@ from evfem.plotting.fields import (
     within,
 )
 from evfem.plotting.figures import EDGE, GROUND, STATUS, WIDTH, Panels, add_colorbar, axes_or_new, new_figure
-from evfem.plotting.ground import Height, height_of
 from evfem.plotting.labels import field_label, named
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
@@ -57,15 +58,35 @@ def deformed(
     """The deformed finger of a frame over its surface, coloured by a field (see `FIELDS`), in true
     proportions.
 
-    A field of the tissue (stress, `J`, `displacement`) fills it, with `smooth` colours by nodal
-    averages in each region, or one colour for each cell. A field of the pad (`contact_pressure`,
-    `shear_traction`, `electrostatic_traction`, `gap`, `contact_status`) colours its outline;
-    tractions on the finger are arrows too, the longest where they are largest.
+    Parameters
+    ----------
+    result
+        A result of a plane finger.
+    field
+        A field of the tissue (stress, `J`, `displacement`) fills the finger. A field of the pad
+        (`contact_pressure`, `shear_traction`, `electrostatic_traction`, `gap`, `contact_status`)
+        colours its outline; tractions are arrows too, the longest where they are largest.
+    frame
+        Index in `result.frames`.
+    ax
+        Axes to draw in; None: new ones.
+    near
+        "contact": a close-up of the contact, or of the smallest gap. A window (left, right, bottom,
+        top) in mm. None: the whole finger.
+    vmin, vmax
+        Range of the colours; None: that of the values shown.
+    smooth
+        Nodal averages in each region, or one colour per cell. Thin lines are borders of regions.
 
-    `near="contact"` is a close-up of what touches, or of the smallest gap; a window (left, right,
-    bottom, top) in mm shows that. Colours go from `vmin` to `vmax`, by default over what is shown.
-    Thin lines are borders of regions. Returns the axes; raises InputError for another field or
-    frame.
+    Returns
+    -------
+    Axes
+        The axes of the picture.
+
+    Raises
+    ------
+    InputError
+        Another field or frame, or a finger in three dimensions.
     """
     check_field(field)
     check_plane(result.mesh)
@@ -214,9 +235,7 @@ def _whole(points: Floats, height: Height) -> Window:
 
 
 def _close(points: Floats, frame: Frame, height: Height, flat: float) -> Window:
-    """What touches, or the node with the smallest gap; `flat` is the window's height over its
-    width.
-    """
+    """What touches, or the node with the smallest gap; `flat` is the window's height over its width."""
     touching = frame.contact_status > 0
     if not touching.any():
         touching = frame.gap == np.nanmin(frame.gap)

@@ -46,13 +46,34 @@ def footprint(
     vmin: float | None = None,
     vmax: float | None = None,
 ) -> Axes:
-    """The skin of a finger in three dimensions seen from below, coloured by a field: `gap`,
-    `contact_pressure`, `shear_traction` (its magnitude), `electrostatic_traction` or
-    `contact_status`, in true proportions.
+    """The skin of a finger in three dimensions from below, coloured by a field, in true proportions.
 
-    `near="contact"` is a close-up of what touches, or of the smallest gap; a window (left, right,
-    lower, upper) of x and z in mm shows that. Colours go from `vmin` to `vmax`, by default over what
-    is shown. Returns the axes; raises InputError for another field or frame, and for a plane finger.
+    Parameters
+    ----------
+    result
+        A result of a finger in three dimensions.
+    field
+        `gap`, `contact_pressure`, `shear_traction` (its magnitude), `electrostatic_traction` or
+        `contact_status`.
+    frame
+        Index in `result.frames`.
+    ax
+        Axes to draw in; None: new ones.
+    near
+        "contact": a close-up of the contact, or of the smallest gap. A window (left, right, lower,
+        upper) of x and z in mm. None: the whole skin.
+    vmin, vmax
+        Range of the colours; None: that of the values shown.
+
+    Returns
+    -------
+    Axes
+        The axes of the picture.
+
+    Raises
+    ------
+    InputError
+        Another field or frame, or a plane finger.
     """
     if field not in POINT_FIELDS:
         raise InputError("field", quoted(field), " | ".join(POINT_FIELDS))
@@ -63,9 +84,7 @@ def footprint(
 
 @dataclass(frozen=True, eq=False)
 class SkinView:
-    """A frame of a result in three dimensions, and the field that its skin is coloured by; with the
-    methods of `evfem.plotting.finger.View`.
-    """
+    """A frame of a result in space and the field on its skin; methods as `evfem.plotting.finger.View`."""
 
     result: Result
     frame: Frame
@@ -155,9 +174,4 @@ def _around(place: Floats, margin: float) -> Window:
     """A window around points (n, 2), with so much of their width beyond them."""
     low, high = place.min(axis=0), place.max(axis=0)
     wide = margin * max(float(np.max(high - low)), 1e-3)
-    return (
-        float(low[0] - wide),
-        float(high[0] + wide),
-        float(low[1] - wide),
-        float(high[1] + wide),
-    )
+    return (float(low[0] - wide), float(high[0] + wide), float(low[1] - wide), float(high[1] + wide))

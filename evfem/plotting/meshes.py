@@ -1,6 +1,4 @@
-"""The regions of a mesh: its cells in the plane; of a solid the half behind its middle, so that the
-layers are seen, from below and in front.
-"""
+"""The regions of a mesh; of a solid the half behind its middle, seen from below and in front."""
 
 from __future__ import annotations
 
@@ -24,9 +22,7 @@ AROUND = {4: (0, 1, 2, 3), 9: (0, 4, 1, 5, 2, 6, 3, 7)}
 
 
 def regions(mesh: Mesh, ax: Axes | None = None) -> Axes:
-    """The cells of an undeformed mesh, each region in a colour of its own:
-    `regions(finger.mesh())`.
-    """
+    """The cells of an undeformed mesh, each region in a colour of its own: `regions(finger.mesh())`."""
     own, ax = ax is None, axes_or_new(ax)
     if own:  # a legend beside axes in true proportions is cut off otherwise
         whole_figure(ax).set_layout_engine("compressed")
@@ -78,9 +74,7 @@ def _draw_solid(mesh: Mesh, ax: Axes) -> None:
 
 
 def cut_open(mesh: Mesh) -> tuple[Ints, Ints]:
-    """Outer faces (K, 4 or 9), and their regions (K,), of the cells behind the middle of a solid's
-    length.
-    """
+    """Outer faces (K, 4 or 9), and their regions (K,), of the cells behind the middle of a solid's length."""
     middle = 0.5 * (mesh.points[:, 2].min() + mesh.points[:, 2].max())
     kept = mesh.points[mesh.cells[:, :8], 2].mean(axis=1) < middle
     _, of_cell = mesh.faces

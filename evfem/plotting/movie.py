@@ -46,8 +46,7 @@ def animate(
     fps: int = 10,
     progress: bool = True,
 ) -> Path:
-    """Write the frames of a result as a moving picture, `path` ending in .gif or .mp4, and return
-    the path.
+    """Write the frames of a result as a moving picture, `path` ending in .gif or .mp4, and return the path.
 
     In a notebook the path shows itself as the picture.
 
@@ -121,9 +120,7 @@ def _write_gif(path: Path, reel: Reel, fps: int, update: Any) -> None:
 
 
 def _palette(scale: Scale, pixels: Any) -> Floats:
-    """256 colours (256, 3) from 0 to 255: those of the scale, of the curves and grey lines on
-    white, and the most frequent others of a picture.
-    """
+    """256 colours (256, 3), 0 to 255: the scale's, curves and greys on white, a picture's most frequent."""
     from matplotlib.colors import to_rgb
     from PIL import Image
 

@@ -31,9 +31,7 @@ SKIN = 0.4
 
 @dataclass(frozen=True)
 class Electrics:
-    """Law, drive, the scene's own voltage and that of its ramps (V), and the solid layers: the stratum
-    corneum, with a usual thickness where only the mesh knows it (`above`), and the insulator.
-    """
+    """Law, drive, voltages (V) and solid layers; the skin has a usual thickness until `above` a mesh."""
 
     law: Any
     drive: Drive | None
@@ -73,8 +71,8 @@ class Electrics:
 
     @cached_property
     def voltage(self) -> Any:
-        """The voltage as the run follows it: the scene's own, or where its drive is resolved that of
-        the moment, or of a signal that repeats the effective one for its mean over the cycle.
+        """The scene's voltage in the run: constant, instantaneous (resolved drive) or rms (mean over the
+        cycle of a periodic signal).
         """
         drive = self.drive
         if drive is not None and not drive.resolved and (found := powers(self.given)) is not None:
@@ -114,9 +112,7 @@ class Electrics:
 
     @cached_property
     def attraction(self) -> tuple[Any, Layers]:
-        """The law and the layers of the attraction: of the mean over the cycle, or where the drive is
-        resolved without what conducts, which moves the charges instead.
-        """
+        """Law and layers of the attraction: over the cycle, or, resolved, without what conducts."""
         solids = (self.skin, self.insulator)
         if self.drive is None:
             return self.law, Layers.of(*solids)
@@ -146,9 +142,7 @@ class Electrics:
 
     @property
     def permittivities(self) -> list[tuple[float, complex, complex, complex]]:
-        """Of each harmonic of a drive its share of the squared effective voltage, and the complex relative
-        permittivities of insulator, gap and skin at its frequency; for voltages without a direct part.
-        """
+        """Of a drive's harmonics: share of the squared voltage, complex eps_r of insulator, gap, skin."""
         drive, at, found = self.drive, self.frequency, []
         assert drive is not None
         assert at is not None

@@ -1,9 +1,8 @@
-"""Scene files: TOML to `Scene` and back; every mistake is one sentence that names the key in the
-file.
+"""Scene files: TOML to `Scene` and back; every mistake is one sentence that names the key in the file.
 
 Relative paths in a file are relative to the file. Limits: a scene of 4 MB and one million steps,
 csv files of 64 MB and one million rows, meshes of 128 MB (`evfem.mesh.file`). What is written
-(`dump`) is in `evfem.scene.written`, which needs none of this.
+(`dump`) is in `evfem.scene.serialiser`, which needs none of this.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from evfem.scene.format import (
 from evfem.scene.keys import VERSION, at, check_size, kind_of, read, read_kind, shown
 from evfem.scene.motion import MOTIONS, Motion
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
-from evfem.scene.written import dump
+from evfem.scene.serialiser import dump
 from evfem.solver.hand import Hand
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.surface.surfaces import Display

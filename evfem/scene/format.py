@@ -68,9 +68,7 @@ class SceneTable:
         Table, _table("surface", f" with a kind: {' | '.join(textures.SURFACES)}"), "what the finger touches"
     ]
     electrostatics: Annotated[
-        Table | None,
-        _table("electrostatics"),
-        "insulator, voltage and force law; without it no attraction",
+        Table | None, _table("electrostatics"), "insulator, voltage and force law; without it no attraction"
     ] = None
     hand: Annotated[
         Table | None, _table("hand"), "between drive and bone; without it the drive moves the bone itself"
@@ -141,9 +139,7 @@ class SampledTable:
     """[electrostatics.signal] of the kind sampled."""
 
     file: Annotated[
-        str | None,
-        _path("the path of a csv file with the header time,voltage, or of a .wav"),
-        "the samples",
+        str | None, _path("the path of a csv file with the header time,voltage, or of a .wav"), "the samples"
     ] = None
     full_scale: Annotated[
         float | None, number("the voltage of the largest sample of a .wav, in V", Within(), "V"), "of a .wav"

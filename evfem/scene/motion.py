@@ -1,6 +1,4 @@
-"""What the finger does: press, slide, hover, wait, and voltage ramps; frozen and validated (mm,
-N/mm, V, s). A run and its plan know no kind: each motion gives its `Course`.
-"""
+"""What the finger does (mm, N/mm, V, s); a run knows no kind, each motion gives its `Course`."""
 
 from __future__ import annotations
 
@@ -58,7 +56,7 @@ class Course:
 
     @property
     def direction(self) -> tuple[float, float]:
-        """Where its angle points, x and z of a unit vector; quarter turns are exact."""
+        """Direction of its angle, x and z of a unit vector; quarter turns are exact."""
         quarters, rest = divmod(self.angle, 90.0)
         x, z = math.cos(math.radians(rest)), math.sin(math.radians(rest))
         for _ in range(int(quarters) % 4):
@@ -67,7 +65,7 @@ class Course:
 
     @property
     def travel(self) -> tuple[float, float]:
-        """How far it goes along x and along z, in mm."""
+        """Displacement along x and along z, in mm."""
         x, z = self.direction
         return self.distance * x + 0.0, self.distance * z + 0.0
 
@@ -158,7 +156,7 @@ class Slide(Motion, kind="slide"):
     """Slide over the surface in equal parts.
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
-    which the load drifts (`evfem.planning.drift`). A finger that touches nothing and is not attracted has
+    which the load drifts (`evfem.planning.loaddrift`). A finger that touches nothing and is not attracted has
     no force at any height: in every motion with `hold` it stays where it is, and gives way to what
     touches it. `speed` sets how much time passes.
 

@@ -1,4 +1,4 @@
-"""How a scene is solved, and which fields are kept."""
+"""Options of the solver and of the output."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from evfem.common.checks import GONE, Checked, Within, among, check_fields, numb
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
 from evfem.tissue.dynamics import DYNAMICS
-from evfem.tissue.elements import ELEMENTS, elements_on
+from evfem.tissue.space import ELEMENTS, elements_on
 
 CONTACTS = ("exact", "penalty")
 PRECISIONS = ("single", "double")
@@ -110,9 +110,7 @@ class Solver:
 
 @dataclass(frozen=True)
 class Output(Checked):
-    """Which fields are kept. What is left open `evfem run` chooses so that its files of fields stay small
-    (`evfem.export.FieldFiles`).
-    """
+    """Which fields are kept; left open, `evfem run` keeps their files small (`evfem.export.FieldFiles`)."""
 
     every: Annotated[
         int | None,

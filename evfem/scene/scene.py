@@ -1,5 +1,4 @@
-"""What is simulated: a finger, a surface, a voltage and motions; frozen, validated, nothing
-computed.
+"""What is simulated: a finger, a surface, a voltage and motions; frozen, validated, nothing computed.
 
 Units mm, N, MPa, V, s; forces of the plane model are per mm of depth (N/mm). The bone translates
 by (`position`, -(`indentation` + g0)), g0 being the smallest vertical gap of the undeformed
@@ -14,15 +13,7 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Annotated, Any, Protocol, runtime_checkable
 
-from evfem.common.checks import (
-    Within,
-    check_fields,
-    number,
-    one_of,
-    real,
-    set_frozen,
-    yes_or_no,
-)
+from evfem.common.checks import Within, check_fields, number, one_of, real, set_frozen, yes_or_no
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.electrostatics.drive import Drive
@@ -37,7 +28,7 @@ from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
 from evfem.surface.friction import Coulomb
-from evfem.surface.own import completed
+from evfem.surface.usersurface import completed
 from evfem.tissue.forms import Form
 
 DIRECTIONS = ("vertical", "normal")
@@ -91,15 +82,13 @@ class Motions:
 class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
-    `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
-    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it
-    alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
-    surface. Only where the field is full may the finger be not `grounded`: without a charge, above electrodes
-    of different voltages. `friction_law` says what the surface's coefficient of
-    friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
-    `AgeingFriction` or one's own). A `hand` is between drive and bone: motions then say where the
-    drive goes. `depth` (mm) is how deep the plane finger is meant to be; it changes no number but
-    adds `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
+    `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the position of the
+    bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it alternate, or leak. `law`
+    None and `voltage` 0: no electrostatics. Only where the field is full may the finger be not `grounded`:
+    without a charge, above electrodes of different voltages. `friction_law` says what the surface's
+    coefficient means (`Coulomb`, ... or one's own). A `hand` is between drive and bone: motions then say
+    where the drive goes. `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. Raises InputError
+    for anything that does not fit together.
     """
 
     finger: Finger
@@ -175,7 +164,7 @@ class Scene:
 
     @property
     def courses(self) -> tuple[Course, ...]:
-        """What each of the motions does."""
+        """The course of each motion."""
         return tuple(motion.course for motion in self.motion)
 
     @property
@@ -195,9 +184,7 @@ class Scene:
         return sum(motion.steps for motion in self.motion)
 
     def with_term(self, form: Form, on: Region | Boundary) -> Scene:
-        """A copy of the scene with `form` added to the internal residual over the region or
-        boundary `on`.
-        """
+        """A copy of the scene with `form` added to the internal residual over the region or boundary `on`."""
         if not isinstance(form, Form):
             raise InputError("form", quoted(form), "a function marked with @evfem.form")
         if not isinstance(on, (Region, Boundary)):
@@ -273,7 +260,7 @@ def _check_hand(scene: Scene) -> None:
     if not isinstance(hand, Hand):
         raise InputError("hand", quoted(hand), "a Hand, or None")
     if isinstance(scene.voltage, FollowForce):
-        raise InputError("hand", "a hand beside a wished friction force", "one of the two")
+        raise InputError("hand", "a hand together with a target friction force", "one of the two")
     if hand.timed:
         _check_speeds(scene, "a hand that has a damping or a mass")
 

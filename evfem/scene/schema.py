@@ -37,9 +37,7 @@ Schema = dict[str, Any]
 
 @dataclass(frozen=True)
 class Entry:
-    """A key of a file: `default` as it would stand there, "" for none; `schema` is its JSON
-    schema.
-    """
+    """A key of a file: `default` as it would stand there, "" for none; `schema` is its JSON schema."""
 
     name: str
     type: str
@@ -72,9 +70,7 @@ class Section:
 
 
 def section(name: str, *classes: Any, kind: str = "", tag: tuple[str, str] | None = None) -> Section:
-    """The keys of a table from the dataclasses that it describes; a `tag` is the key that says its kind, and
-    what the kind is.
-    """
+    """The keys of a table from its dataclasses; a `tag` is the key that says its kind, and the kind."""
     own = [*{key.name: _entry(key) for cls in classes for key in keys_of(cls)}.values()]
     if tag is not None:
         key, meaning = tag

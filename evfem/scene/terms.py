@@ -1,4 +1,4 @@
-"""Where in the mesh a user's weak form is integrated."""
+"""Domain of integration of a user's weak form."""
 
 from __future__ import annotations
 

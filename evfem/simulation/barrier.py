@@ -5,12 +5,11 @@ A part leads from u_0 to u_1. With the loads of its END held it has the potentia
 .. math:: \Phi(u) = \psi(u) - W_e(u_0 \to u;\,U_1) - r_1\cdot(b - b_0) + D_f(\lambda_1)
           + \tfrac{1}{2} D_v(u - u_0) + \tfrac{1}{2}\,|u - u_0 - h v_0|^2_M / h^2 ,
 
-of which u_1 is a stationary point: tissue and springs, attraction, the reaction on the bone, friction
-under the contact forces of the end, and of a step in time its viscosity, drag and inertia, as backward
-Euler has them. Where it is convex it falls all along the straight way from u_0 to u_1, however long the
-part, whatever slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations have
-come to u_1 over it, the body never would. The reverse does not hold: of several equilibria some may all
-lie downhill.
+of which u_1 is a stationary point: tissue and springs, attraction, the reaction on the bone, friction under
+the contact forces of the end, and of a step in time its viscosity, drag and inertia, as backward Euler has
+them. Where it is convex it falls all along the straight way from u_0 to u_1, however long the part, whatever
+slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations have come to u_1 over it,
+the body never would. The reverse does not hold: of several equilibria some may all lie downhill.
 
 A bone that is held and not loaded has its place at the end already: nodes that do not touch at both ends
 begin where it carries them. Nodes that touch at both ends follow the surface, not the chord; to first
@@ -57,9 +56,7 @@ def rise(part: Part, target: Target) -> float:
 
 
 def _carried(part: Part, target: Target) -> Floats:
-    """How far the bone carries the pad's nodes (P, dim), where it is held and not loaded: all but those that
-    touch at both ends.
-    """
+    """How far the bone, if not loaded, carries the pad's nodes (P, dim); 0 where they keep touching."""
     travel = part.new.bone - part.old.bone
     if target.height.free:
         travel[1] = 0.0
@@ -69,9 +66,7 @@ def _carried(part: Part, target: Target) -> Floats:
 
 
 def _pulled(part: Part, carried: Floats) -> Floats:
-    """Work of the attraction up to `PLACES` under the voltage, or the charges, of the end, from where the
-    bone has carried the nodes to.
-    """
+    """Work of the attraction up to `PLACES` under the end's voltage or charges, after `carried`."""
     attraction, old, new = part.model.attraction, part.old, part.new
     if attraction is None or not attraction.acts(new.voltage):
         return np.zeros_like(PLACES)
@@ -107,9 +102,7 @@ def _lifted(part: Part) -> Floats:
 
 
 def _in_time(part: Part) -> Floats:
-    """Drag, viscosity and inertia as potentials of an implicit step; drag counts from where the body was
-    let go.
-    """
+    """Drag, viscosity and inertia as potentials of an implicit step; drag counts from the release."""
     body, old, new = part.model.body, part.old, part.new
     way, dynamics = new.u - old.u, part.model.body.dynamics
     held = np.array([0.5 * body.drag_dissipation(old.u + s * way) for s in PLACES])

@@ -1,11 +1,9 @@
-"""From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would
-have done.
+"""From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would have done.
 
-Beside the state a run carries over from step to step: the contact candidates, the substep that
-worked last, the works so far with the forces that they go on from, and a factorisation made some
-steps ago. Of the last one the checkpoint keeps where it was made; a resumed run makes it there
-again, and the iterations that follow are the same to the last bit (with one thread, on the same
-machine and backend).
+Beside the state a run carries over from step to step: the contact candidates, the substep that worked last,
+the works so far with the forces that they go on from, and a factorisation made some steps ago. Of the last
+one the checkpoint keeps where it was made; a resumed run makes it there again, and the iterations that follow
+are the same to the last bit (with one thread, on the same machine and backend).
 """
 
 from __future__ import annotations
@@ -28,7 +26,7 @@ from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
-from evfem.solver.state import NO_PRESSURE, Reusable, State, TangentPoint
+from evfem.solver.state import Reusable, State, TangentPoint
 
 CHECKPOINT_FORMAT = "evfem-checkpoint-5"
 ANOTHER = "a run of another scene"
@@ -44,39 +42,23 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
-    """What a solver takes with it to the next step; of the same shapes with and without a
-    factorisation.
-    """
-    at, nowhere = carried.tangent_point, np.zeros_like(state.u)
-    return {
-        "candidates": carried.candidates,
-        "factorised": np.array(at is not None),
-        "factor_u": nowhere if at is None else at.u,
-        "factor_begin": nowhere if at is None else at.begin,
-        "factor_voltage": np.array(0.0 if at is None else at.voltage),
-        "factor_duration": np.array(0.0 if at is None else at.duration),
-        "factor_frozen": np.array(False if at is None else at.frozen),
-        "factor_touching": np.zeros(state.status.size, dtype=bool) if at is None else at.touching,
-        "factor_status": np.zeros_like(state.status) if at is None else at.status,
-        "factor_pressure": NO_PRESSURE if at is None else at.pressure,
-        "duration": np.array(carried.duration),
+    """What a solver takes with it to the next step; of the same shapes with and without a factorisation."""
+    at, status = carried.tangent_point, state.status
+    begun = np.zeros_like(state.u)
+    nowhere = TangentPoint(begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status))
+    made_at = {
+        f"factor_{spec.name}": np.asarray(getattr(at or nowhere, spec.name)) for spec in fields(nowhere)
     }
+    own = {"candidates": carried.candidates, "duration": np.array(carried.duration)}
+    return {**own, "factorised": np.array(at is not None), **made_at}
 
 
 def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
-    """What the solver had taken with it, from the arrays of a checkpoint."""
+    """The reusable data of the solver, from the arrays of a checkpoint."""
     at = None
     if arrays["factorised"]:
-        at = TangentPoint(
-            u=arrays["factor_u"],
-            voltage=float(arrays["factor_voltage"]),
-            touching=arrays["factor_touching"],
-            frozen=bool(arrays["factor_frozen"]),
-            begin=arrays["factor_begin"],
-            duration=float(arrays["factor_duration"]),
-            status=arrays["factor_status"].astype(np.int64),
-            pressure=arrays["factor_pressure"],
-        )
+        parts: dict[str, Any] = {spec.name: arrays[f"factor_{spec.name}"] for spec in fields(TangentPoint)}
+        at = TangentPoint(**{name: plain(part) for name, part in parts.items()})
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
 
@@ -148,9 +130,7 @@ class Checkpoint:
     _texts: list[tuple[Row, str]] = field(default_factory=list, repr=False, compare=False)
 
     def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
-        """Store the state in one step; the file before stays as it is if the disk refuses
-        (StorageError).
-        """
+        """Store the state in one step; the file before stays as it is if the disk refuses (StorageError)."""
         header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
         header["version"] = np.array(evfem.__version__)
         header["rows"] = np.array(self._text_of(rows))
@@ -165,9 +145,7 @@ class Checkpoint:
         return f"[{', '.join(text for _, text in self._texts[: len(rows)])}]"
 
     def read(self, scene_digest: str) -> Saved:
-        """The state of the same scene. Raises InputError for another scene's, another version's or
-        a damaged file.
-        """
+        """The state of the same scene. InputError for another scene's, another version's, a damaged file."""
         allowed = "a checkpoint of the same scene and version"
         arrays = load_arrays(self.path, "checkpoint", CHECKPOINT_FORMAT)
         try:

@@ -1,4 +1,4 @@
-"""What a run shows that may make its numbers mean something else, a sentence each: `Result.warnings`."""
+"""Warnings of a run about its numbers, one sentence each: `Result.warnings`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What is said of a step that failed: which force wins and where, if no equilibrium is near, and
-what may be tried.
-"""
+"""What is said of a failed step: which force wins and where, if no equilibrium is near, what to try."""
 
 from __future__ import annotations
 
@@ -9,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from evfem.common.constants import VERGE, VERGE_LOST
+from evfem.common.constants import CRITICAL, SOFTENED
 from evfem.errors import InputError
-from evfem.planning.sense import weakens
+from evfem.planning.plausibility import weakens
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.solver.control import Target
@@ -34,17 +32,17 @@ def _lost(model: Model, failed: StepFailed) -> str:
     state, target = failed.last
     try:
         with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite
-            verge = model.equilibrium.verge(state, target)
+            margin = model.equilibrium.stability_ratio(state, target)
     except StepFailed:  # the tangent there is singular
         return ""
     # a trial far from equilibrium may give way too: alone that shows nothing
-    if verge is None or verge.share < (VERGE_LOST if failed.unstable else VERGE):
+    if margin is None or margin.ratio < (SOFTENED if failed.unstable else CRITICAL):
         return ""
     passing = model.body.dynamics is not None and target.duration > 0.0
     rest = "within a time step as short as this" if passing else "at rest"
     released = ", and released there it does not come to rest" if failed.released else ""
     return (
-        f"there is no equilibrium {rest} near here: {verge.cause}, {verge.share:.3g} times as hard as its "
+        f"there is no equilibrium {rest} near here: {margin.cause}, {margin.ratio:.3g} times as hard as its "
         f"tissue holds it at {_place(model, state)}, and harder beyond{released}"
     )
 
@@ -54,12 +52,12 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
 
     In three dimensions the last two `rows` tell: the voltage falls as the gap closes.
     """
-    verge = model.equilibrium.verge(state, Target.held(state.bone, state.voltage))
-    if verge is None and len(rows) > 1:
+    margin = model.equilibrium.stability_ratio(state, Target.held(state.bone, state.voltage))
+    if margin is None and len(rows) > 1:
         ways = [rows[-1][name] - rows[-2][name] for name in ("voltage", "min_gap")]
         lost = abs(rows[-2]["voltage"]) > 0.0 and ways[0] * np.sign(state.voltage) * ways[1] > 0.0
     else:
-        lost = verge is not None and verge.share > 1.0
+        lost = margin is not None and margin.ratio > 1.0
     if not lost:
         return ""
     return (
@@ -69,7 +67,7 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
 
 
 def _place(model: Model, state: State) -> str:
-    """Where the bone stood, its load and the voltage."""
+    """Position of the bone, its load and the voltage."""
     position, indentation = state.bone[0] + 0.0, model.indentation(state.bone) + 0.0
     load, voltage = -state.reaction[1] + 0.0, state.voltage + 0.0
     return (
@@ -89,7 +87,7 @@ def _may_have_an_energy(scene: Scene) -> bool:
 
 
 def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
-    """What may help a scene of its kind; of what it has not nothing is said."""
+    """Advice for a scene of its kind."""
     pulled = scene.electrics.acts
     finer = "less friction or a finer mesh" if scene.has_friction else "a finer mesh"
     if isinstance(failed, LiftedOff):

@@ -111,9 +111,7 @@ class History:
         return getattr(self, name)
 
     def table(self) -> Any:
-        """The history with a row for each step: a `pandas.DataFrame`, or where pandas is not
-        installed a numpy record array of the same columns; `table["normal_force"]` is one.
-        """
+        """The history with a row for each step: a `pandas.DataFrame`, without pandas a record array."""
         return frame({name: np.asarray(self[name]) for name in self.columns})
 
     def to_csv(self, path: str | Path) -> None:
@@ -154,9 +152,7 @@ NEEDED, SHOWN = (
 
 
 def columns_of(names: Iterable[str]) -> tuple[str, ...]:
-    """The columns, in their order, if these are all their names: those of the plane, or of three
-    dimensions too; else nothing.
-    """
+    """The columns in their order if these are all their names, of the plane or of space; else nothing."""
     found = set(names)
     return next((columns for columns in (COLUMNS, (*COLUMNS, *SPATIAL)) if set(columns) == found), ())
 

@@ -1,6 +1,4 @@
-"""What is reported of a run: one row per requested step, works and energies summed over its parts
-(`evfem.simulation.works`), and the fields.
-"""
+"""What is reported of a run: a row per requested step, works and energies (`works`), fields."""
 
 from __future__ import annotations
 
@@ -22,9 +20,7 @@ from evfem.surface.pad import Pad, reach, surface_state
 
 @dataclass
 class Ledger:
-    """Running sums of a run, by the names of the history's columns, and the books at the end of
-    its last part.
-    """
+    """Running sums of a run by the history's columns, and the books at the end of its last part."""
 
     model: Model
     sums: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SUMS, 0.0))
@@ -41,7 +37,7 @@ class Ledger:
         return works["snap_dissipation"] > 0.0
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
-        """Where sums and books stand."""
+        """Present sums and energy balance."""
         return self.sums.copy(), self.end
 
     def back(self, mark: tuple[dict[str, float], Books | None]) -> None:
@@ -104,9 +100,7 @@ class Ledger:
 
 
 def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
-    """How much of the pad touches, in mm or mm2, and the columns that say so; in three dimensions
-    those along z with them.
-    """
+    """How much of the pad touches, mm or mm2, and the columns that say so, in space those along z too."""
     pressure = state.contact_force[:, 0] / shares(model, position)
     gap = surface_state(model.surface, position).normal_gap
     at = reach(gap, pressure, model.pad.spacing_at(position), model.shear_modulus)
@@ -127,9 +121,7 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
 
 
 def shares(model: Model, position: Floats) -> Floats:
-    """Current tributary lengths or areas of the pad nodes (P,) in mm or mm2; infinite where there
-    is none.
-    """
+    """Current tributary lengths or areas of the pad nodes (P,) in mm or mm2; infinite where there is none."""
     return _positive(model.pad.tributary(position))
 
 

@@ -1,6 +1,4 @@
-"""From a scene to exactly the parts it needs: mesh, body, pad, surface in place, attraction,
-equilibrium solver.
-"""
+"""From a scene to the parts it needs: mesh, body, pad, placed surface, attraction, equilibrium."""
 
 from __future__ import annotations
 
@@ -41,8 +39,8 @@ from evfem.tissue.weakform import check_laws
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest vertical gap
-    at the start, and `trapped` says whether nodes of the pad snap one by one, for want of a core.
+    """The parts of a scene; `surface` is placed, `first_gap` (mm) is the smallest vertical gap at the start,
+    and `trapped` says whether nodes of the pad snap one by one, for want of a core.
     """
 
     scene: Scene
@@ -119,7 +117,7 @@ def make_model(scene: Scene) -> Model:
 
 
 def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:
-    """What joins pad and surface: exact contact or penalties."""
+    """The contact interface: exact or penalty."""
     solver = scene.solver
     if solver.contact == "exact":
         return Interface(pad, mesh.points, surface, solver.tolerance)

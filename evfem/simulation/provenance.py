@@ -1,4 +1,4 @@
-"""How numbers came about: versions, date, the scene, its mesh and the solver's own record."""
+"""Provenance of a result: versions, date, scene, mesh and the solver's record."""
 
 from __future__ import annotations
 
@@ -36,13 +36,11 @@ def origin() -> dict[str, Any]:
 
 
 def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
-    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for
-    JSON.
+    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for JSON.
 
-    `parameters` is the scene as TOML, or its representation where it holds a law or form of the
-    user's own.
+    `parameters` is the scene as TOML, or its representation where it holds a law or form of the user's own.
     """
-    from evfem.scene.written import dump
+    from evfem.scene.serialiser import dump
 
     try:
         parameters = dump(scene)

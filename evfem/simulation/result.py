@@ -1,5 +1,4 @@
-"""What a run leaves behind: a history with one row per step, fields of some steps, and how it came
-about.
+"""What a run leaves behind: a history with one row per step, fields of some steps, and how it came about.
 
 Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth); N, mm2 and mJ in `Result.total`.
 Files are .npz without pickled objects.
@@ -52,11 +51,10 @@ RESULT_FORMAT = "evfem-result-1"
 class Frame:
     """Fields of one step on N nodes and E cells; tractions in MPa, lengths in mm.
 
-    `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip.
-    `cauchy_stress` holds the components xx, yy, zz, xy of the cell means, in three dimensions yz and
-    xz too; `J` is the volume ratio. There `shear_traction` is the magnitude of the shear. Tractions are
-    nodal forces over the lengths, or areas, that these were made with: the current shares of the pad,
-    for `electrostatic_traction` of the full field those of its columns.
+    `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip. `cauchy_stress`
+    holds xx, yy, zz, xy of the cell means, in three dimensions yz and xz too, where `shear_traction` is a
+    magnitude; `J` is the volume ratio. Tractions are nodal forces over the current shares of the pad, of the
+    full field over those of its columns.
     """
 
     step: int
@@ -73,7 +71,7 @@ class Frame:
     J: Floats = field(metadata={"shape": ("E",)})
 
     def __repr__(self) -> str:
-        """Which step it is, where, and its size."""
+        """Number of the step, position and size."""
         size = f"{len(self.displacement)} nodes, {len(self.J)} cells"
         return f"Frame of step {self.step} at {plus(self.position):.4g} mm, {plus(self.time):.4g} s: {size}"
 
@@ -98,13 +96,11 @@ def _component(name: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Result(History):
-    """Every column of the history as an array over the steps, the frames kept, the mesh and the
-    provenance.
+    """Every column of the history as an array over the steps, the frames kept, the mesh and the provenance.
 
     Forces are per mm of depth; `total` has them in N where the scene says how deep the finger is.
-    `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are
-    the sums of the contact forces on the finger, +y and -x components; `electrostatic_force` is
-    the downward attraction.
+    `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are the sums of
+    the contact forces on the finger, +y and -x components; `electrostatic_force` is the downward attraction.
 
     Of a finger in three dimensions forces are in N, and `in_space` has its further columns
     (`SPATIAL`): `position_z`, components of the tangential forces, and the contact areas. There
@@ -121,9 +117,7 @@ class Result(History):
     def from_rows(
         cls, rows: Sequence[Row], frames: Sequence[Frame], mesh: Mesh, provenance: dict[str, Any]
     ) -> Result:
-        """A result from rows as the solver reports them; each row has exactly the keys of
-        `COLUMNS`.
-        """
+        """A result from rows as the solver reports them; each row has exactly the keys of `COLUMNS`."""
         for row in rows:
             if not columns_of(row):
                 odd = sorted(set(row) ^ set(COLUMNS))
@@ -176,23 +170,17 @@ class Result(History):
 
     @property
     def load_drift(self) -> float:
-        """Largest relative change of the load where the indentation was held after a press; 0 where
-        the load was.
-        """
+        """Largest relative change of the load at held indentation after a press; 0 if it was held."""
         return load_drift(self.rows)
 
     @property
     def contact_area(self) -> Floats:
-        """Gross contact area (mm2): `contact_width` over the depth. Raises InputError without one,
-        unless the finger is one in three dimensions.
-        """
+        """Gross contact area (mm2): in the plane `contact_width` times depth; InputError without a depth."""
         return self.in_space["contact_area"] if self.in_space else self.total.contact_width
 
     @property
     def real_contact_area(self) -> Floats:
-        """Real contact area (mm2): `real_contact_width` over the depth. Raises InputError without
-        one, unless the finger is one in three dimensions.
-        """
+        """Real contact area (mm2): in the plane `real_contact_width` times depth, or InputError."""
         return self.in_space["real_contact_area"] if self.in_space else self.total.real_contact_width
 
     @property
@@ -204,7 +192,7 @@ class Result(History):
 
     @property
     def warnings(self) -> list[str]:
-        """What a run found that may make its numbers mean something else, a sentence each."""
+        """Warnings of the run about its numbers, one sentence each."""
         return list(self.provenance.get("warnings", []))
 
     def summary(self) -> dict[str, Any]:
@@ -247,7 +235,7 @@ class Result(History):
         return found
 
     def __repr__(self) -> str:
-        """How far the run came, where it ended and with what forces."""
+        """Number of steps, end position and end forces of the run."""
         last = self._last
         parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
         lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
@@ -296,9 +284,7 @@ class Result(History):
         return found
 
     def save(self, path: str | Path) -> None:
-        """Write everything to one .npz file, in one step. Raises StorageError when the disk
-        refuses, and InputError for the ending of another format.
-        """
+        """Write one .npz file, in one step. Raises StorageError, and InputError for another ending."""
         check_ending(path, ".npz", "to_csv writes the history, export.paraview the fields")
         arrays: dict[str, np.ndarray] = {"format": np.array(RESULT_FORMAT)}
         arrays |= {f"history/{name}": np.array(self[name]) for name in self.columns}

@@ -20,7 +20,7 @@ from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
-from evfem.planning.way import allowed_error
+from evfem.planning.pathdependence import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
 from evfem.scene.scene import Scene
@@ -48,8 +48,8 @@ from evfem.solver.control import (
     HeightControl,
     Indentation,
     KeptCharge,
-    Loose,
     Target,
+    Unsupported,
     VoltageControl,
 )
 from evfem.solver.hand import AT_REST, Grip
@@ -67,9 +67,7 @@ NANO = 1e-6
 
 @dataclass(frozen=True)
 class Request:
-    """One requested step: its number in the run, its motion, and the path from the state before to
-    its exact target.
-    """
+    """One requested step: its number in the run, its motion, and the path to its exact target."""
 
     step: int
     motion_index: int
@@ -85,18 +83,34 @@ def simulate(
     observers: Sequence[Observer] = (),
     resume: Saved | None = None,
 ) -> Result:
-    """Press, slide and attract as the scene says (`Scene`, or the path of a scene file); returns the
-    history, the fields of every n-th step and how they came about.
+    """Run all motions of a scene.
 
-    `observers` are objects with any of `started(mesh, scene, total_steps)`,
-    `step(row, frame, checkpoint)` after every converged step (`frame` is None on steps without
-    fields, `checkpoint()` gives the arrays to resume from) and `finished(result)`, see
-    `evfem.protocols`. One that raises `StopRun` in `step` ends the run after that step: the result
-    so far, with the fields of its last step, is returned, and has the reason in its provenance
-    under `stopped`. `resume` continues from such arrays and rows, to the same numbers as without
-    the interruption; the result then has all rows, but fields only of the steps since. Raises
-    `NotConverged`, with the result so far, and leaves everything up to the last good step with the
-    observers.
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file.
+    progress
+        Show a progress bar.
+    observers
+        Objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)` after
+        every converged step and `finished(result)`, see `evfem.protocols`. `frame` is None on steps
+        without fields; `checkpoint()` gives the arrays to resume from. If `step` raises `StopRun`, the
+        run ends after that step with the reason in the provenance under `stopped`.
+    resume
+        Arrays and rows to continue from, to the same numbers as without the interruption. The result
+        has all rows, but fields only of the steps since.
+
+    Returns
+    -------
+    Result
+        The history, the fields of every n-th step and the provenance.
+
+    Raises
+    ------
+    NotConverged
+        A step has no solution. The error has the result so far; observers keep all good steps.
+    InputError
+        The scene cannot be run.
     """
     if not isinstance(scene, Scene):
         from evfem.scene.file import scene_at
@@ -184,9 +198,7 @@ class Run:
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
     def _kept(self, time: float, begin: float) -> KeptCharge | None:
-        """What prescribes the electrode's charge at `time` (s) in a step that begins at `begin`, if
-        anything does.
-        """
+        """What prescribes the electrode's charge at `time` (s) in a step from `begin`, if anything does."""
         voltage = self.scene.electrics.voltage
         if isinstance(voltage, ChargeControl):
             return KeptCharge(NANO * voltage.charge_at(time) / eps_0)
@@ -223,9 +235,7 @@ class Run:
                 yield Request(first + k, index, motion.kind, path, seconds)
 
     def _start_of(self, rows_before: int) -> dict[str, float]:
-        """Bone position, indentation, force and voltage at which a motion starts, and whether the finger
-        is loose: touches nothing and is not attracted.
-        """
+        """Where a motion starts: bone, indentation, force, voltage, and whether the finger is loose."""
         start = dict.fromkeys(START, 0.0)
         if rows_before == 0:
             return start | {"voltage": self.voltage_at(0.0, 0.0)}
@@ -262,7 +272,7 @@ class Run:
             height = Force(towards("applied_force", course.force))
         elif course.hold == "force":
             loose = self._loose(course, start, voltage, time)
-            height = Loose(float(bone[1])) if loose else Force(start["applied_force"])
+            height = Unsupported(float(bone[1])) if loose else Force(start["applied_force"])
         drive: VoltageControl = GivenVoltage(voltage)
         if course.gap is not None:
             drive = GivenGap(towards("min_gap", course.gap))
@@ -272,9 +282,7 @@ class Run:
         return Target(position, height, drive, z=along, hand=self._grip)
 
     def _loose(self, course: Course, start: dict[str, float], voltage: float, time: float) -> bool:
-        """Whether a force is held that the finger has at any height: it is loose, and nothing is to
-        attract it at `time` (s).
-        """
+        """Whether a held force is that of any height: the finger is loose, not attracted at `time` (s)."""
         if isinstance(self.voltage, FollowForce) or course.gap is not None:
             return False
         if isinstance(self.voltage, ChargeControl):
@@ -290,9 +298,7 @@ class Run:
         return FollowFriction(float(wish(position)), wish.largest_voltage)
 
     def _path(self, start: Target, end: Target, begin: float, seconds: float) -> Path:
-        """Straight from one target, at the time `begin`, to the next; a voltage profile, signal or
-        wished force is followed on the way.
-        """
+        """Straight from one target, at time `begin`, to the next, with profile, signal or wished force."""
 
         def target(done: float, fraction: float) -> Target:
             duration = (fraction - done) * seconds
@@ -324,9 +330,7 @@ class Run:
     # -- one requested step
 
     def advance(self, request: Request) -> Frame | None:
-        """Reach a request's target exactly, record its row, and return its fields if they are
-        wanted.
-        """
+        """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         released, snapped = self.stepper.relaxations, self.stepper.snaps
         try:

@@ -59,10 +59,27 @@ def spectrum(
 ) -> Spectrum:
     """Frequencies and one-sided amplitudes of a column of the history.
 
-    Used are the rows later than `start` and not later than `stop` (s); without `start` those of
-    the last motion. `window` is none or hann, see the head of `evfem.simulation.spectrum`. Raises
-    InputError for fewer than two rows, and for rows that are not evenly spaced in time: motions
-    with steps of different lengths, or none.
+    Parameters
+    ----------
+    result
+        A result with time.
+    column
+        Name of a column of the history.
+    start, stop
+        Rows later than `start` and not later than `stop` (s) are used; without `start` those of the
+        last motion.
+    window
+        none or hann, see the head of `evfem.simulation.spectrum`.
+
+    Returns
+    -------
+    Spectrum
+        Frequencies (Hz) and amplitudes in the unit of the column.
+
+    Raises
+    ------
+    InputError
+        Fewer than two rows, or rows that are not evenly spaced in time.
     """
     if column not in result.columns or column == "motion":
         allowed = ", ".join(name for name in result.columns if name != "motion")
@@ -93,7 +110,7 @@ def amplitudes(values: Floats, window: str) -> Floats:
 
 
 def _rows(result: Result, start: float | None, stop: float | None) -> tuple[Any, float]:
-    """Which rows are used, and the time of the row before them."""
+    """Rows in use, and the time of the row before them."""
     if not len(result.step):
         raise InputError("result", "no steps", "a result with steps in time")
     slack = ROUNDING * float(result.time[-1])

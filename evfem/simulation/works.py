@@ -25,22 +25,20 @@ The history has
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
 - ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
 
-What separates them is found term by term, without the work of the bone, and so closes the books
-only where the forces of the accepted states balance:
+Their difference is computed term by term without the work of the bone, so the balance is a check
+that the forces of the accepted states are in equilibrium:
 
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
           + (W_e - \bar f_e\cdot\Delta u) + W_t .
 
-First what tissue and backward Euler lose on the way, of the mass :math:`|\Delta v|_M^2/2` and a
-share that telescopes; then the work of nodes that land, leave or begin to slip; then what the way
-adds to the attraction's work. Over a motion the sum falls with the square of the step, in time
-with the step, and is ``integrator_dissipation``.
+What tissue and backward Euler lose on the way, the work of nodes that land, leave or begin to slip, and what
+the way adds to the attraction's work. Over a motion the sum falls with the square of the step, in time with
+the step, and is ``integrator_dissipation``.
 
-A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous
-stresses are, where time stops), and the end is far away however small the part. Then L does not
-fall with the step. It is the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and
-either the body, the loads at their final values, moves along forces that grow faster than the
-tissue's,
+A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
+where time stops), and the end is far away however small the part. Then L does not fall with the step. It is
+the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and either the body, the loads at their
+final values, moves along forces that grow faster than the tissue's,
 
 .. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
           w = \Delta u - \Delta b,
@@ -65,13 +63,9 @@ the tributary lengths A, :math:`\int w\,dA` with its energy w per area, which a 
 leaves out. This holds for Strong and Troxel's law, which is the pressure of that field, and lacks the
 work on a roughness gap that changes with the load.
 
-Under another law these four columns are 0, for there is no balance to tell. A pressure
-:math:`p = \varepsilon_0 V^2 f(g)/2` is the work of a source whose charge per area is
-:math:`-\partial\Pi/\partial V = \varepsilon_0 V L(g)`, L' = -f. Kaczmarek's law has
-:math:`L = \ln[(g + D)/(g + s)]/(D - s)` instead of 1/(g + s), with which the balance closes as long as
-no charge crosses a layer. But then skin and insulator hold the voltage s L V, and a closed gap keeps
-the rest, (1 - s L) V, across no thickness: the field there, and with it the current of a leak, is
-infinite. So no displacement is both that of the law and that of layers that conduct.
+Under another law these columns are 0. Kaczmarek's is the work of a source with the charge per area
+eps_0 V ln[(g + D)/(g + s)]/(D - s), but leaves a closed gap a voltage across no thickness: with a leak no
+displacement is both that of the law and that of layers that conduct.
 
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
@@ -107,9 +101,7 @@ def _gauss(points: int) -> tuple[Floats, Floats]:
 
 
 def _along(ends: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Places and weights on the way, eight between each pair of `ends`, dense at its begin and end,
-    where the attraction changes fastest; the weights contain the derivative of the places.
-    """
+    """Places and weights (with their derivative), eight between `ends`, dense where attraction changes."""
     at, weight = _gauss(8)
     begin, length = np.array(ends[:-1])[:, None], np.diff(ends)[:, None]
     at, weight = (begin + length * at).ravel(), (length * weight).ravel()
@@ -132,10 +124,7 @@ SLIDE, PART = _gauss(4)
 
 @dataclass(frozen=True, eq=False)
 class Books:
-    """What the books know of an accepted state: internal forces (N, dim) of tissue and time, those
-    of the user's forms, stored energy of the tissue, that of the interface's springs, kinetic
-    energy.
-    """
+    """Of an accepted state: internal and users' forces (N, dim), energies of tissue, springs, motion."""
 
     forces: Floats
     given: Floats
@@ -173,7 +162,7 @@ class Part:
     new: State
 
     def end(self) -> Books:
-        """What is held of the part's end."""
+        """Energies at the end of the part, its loads held."""
         body, new = self.model.body, self.new
         given = body.given_forces(new.u)
         kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
@@ -183,7 +172,7 @@ class Part:
         return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
-        """What the part adds to each of `SUMS`, N mm per mm of depth."""
+        """Contributions of the part to `SUMS`, N mm per mm of depth."""
         old, new, body = self.old, self.new, self.model.body
         moved = new.u - old.u
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
@@ -252,9 +241,7 @@ class Part:
         return float(SHARE @ values)
 
     def _work_of_charged(self, charging: Charging, moved: Floats) -> float:
-        """Work of the attraction while the pad moves (P, dim) with the charges and the voltage
-        that it had.
-        """
+        """Work of the attraction while the pad moves (P, dim) with its old charges and voltage."""
         begin, seconds = charging.old, charging.seconds
         charging.begin(begin, 0.0)
         work = self._on_the_way(moved, (begin.voltage, begin.voltage))
@@ -355,9 +342,7 @@ class Part:
 
     @cached_property
     def _slip(self) -> Floats:
-        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they
-        left.
-        """
+        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they left."""
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
         stretch = [interface.surface_at(state).stretch for state in (old, new)]
         slip = 0.5 * (stretch[0] + stretch[1]) * (self.x[1] - self.x[0])
@@ -370,7 +355,7 @@ class Part:
 
     @cached_property
     def slip_length(self) -> Floats:
-        """How far the pad nodes (P,) slip, in mm."""
+        """Slip of the pad nodes (P,), in mm."""
         interface = self.model.equilibrium.interface
         if interface.dim == 3:
             return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))
@@ -402,9 +387,7 @@ class Part:
         return lost > 0.5 * SNAP * abs(work) or work < self._pulled_along(along[self.model.pad.nodes])
 
     def _pulled_along(self, along: Floats) -> float:
-        """Work of the change of attraction and friction on the way `along` (P, dim) that the bone
-        does not go, the loads at their final values.
-        """
+        """Work of attraction and friction on the way `along` (P, dim) without the bone, under end loads."""
         model, old, new = self.model, self.old, self.new
         carried = replace(old, u=old.u + (new.bone - old.bone))
         work = 0.0

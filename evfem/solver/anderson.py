@@ -25,9 +25,7 @@ from evfem.solver.state import State
 
 
 class Anderson:
-    """Remembers the last iterations of a step, as long as they used the same map: the changes of
-    their steps and images, and the products of the former.
-    """
+    """Remembers a step's last iterations under one map: changes of steps and images, and products."""
 
     def __init__(self) -> None:
         self.reset()
@@ -39,9 +37,7 @@ class Anderson:
         self._products = np.zeros((0, 0))
 
     def next_iterate(self, before: State, after: State) -> State:
-        """A better iterate than `after`, to which the map has taken `before`; `after` itself while
-        nothing is known of the map, or where a node has changed its status.
-        """
+        """A better iterate than `after`, the image of `before`; `after` itself while the map is unknown."""
         if not np.array_equal(before.status, after.status):
             self.reset()
             return after

@@ -47,9 +47,7 @@ class Condensation(Protocol):
     schur: Floats
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
-        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side
-        (m,)).
-        """
+        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side (m,))."""
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
         """Solution (n,) once the kept unknowns (m,) are known."""
@@ -57,9 +55,7 @@ class Condensation(Protocol):
 
 @cache
 def pardiso_library() -> Any:
-    """pypardiso's handle of the library; told where it is, as it would search the whole prefix for
-    it.
-    """
+    """pypardiso's handle of the library; told where it is, as it would search the whole prefix for it."""
     if PLACE not in os.environ and (place := mkl_library()) is not None:
         os.environ[PLACE] = place
     from pypardiso.pardiso_wrapper import PyPardisoSolver
@@ -68,7 +64,7 @@ def pardiso_library() -> Any:
 
 
 def mkl_library() -> str | None:
-    """Where the package `mkl` has put its runtime library, or None."""
+    """Path of the runtime library of the package `mkl`, or None."""
     try:
         files = metadata.files("mkl") or []
     except metadata.PackageNotFoundError:
@@ -78,16 +74,12 @@ def mkl_library() -> str | None:
 
 
 def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> Floats:
-    """Numbers (m,) added to the diagonal of S while it is computed, as a bone that is free to move
-    leaves S singular: the diagonal of K, so that no row is lost in the rounding of a stiffer one.
-    """
+    """Numbers (m,) added to the diagonal of S while computed: K's, as a free bone leaves it singular."""
     return np.abs(upper[pattern.diagonal[kept]])
 
 
 class Pardiso:
-    """Condensation by MKL PARDISO through pypardiso's library handle; one symbolic analysis, many
-    factorisations.
-    """
+    """Condensation by MKL PARDISO (pypardiso's handle): one symbolic analysis, many factorisations."""
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
         self.pattern, self.kept = pattern, kept
@@ -125,9 +117,7 @@ class Pardiso:
         return self._error.value
 
     def _arguments(self) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
-        """What every call has in common: the handle, what stands before the matrix's values, and
-        what stands behind them. Made once, for on small pads it takes as long as a solve.
-        """
+        """What every call has in common, made once: the handle, what is before and behind the values."""
 
         def number(value: int) -> Any:
             return ctypes.byref(ctypes.c_int32(value))
@@ -143,9 +133,7 @@ class Pardiso:
         return handle, kind, (*matrix, *control)
 
     def factorise(self, upper: Floats) -> None:
-        """Factorise new values of the pattern; raises `Singular` if even the indefinite
-        factorisation fails.
-        """
+        """Factorise new values; raises `Singular` if even the indefinite factorisation fails."""
         shift = shift_of_kept(self.pattern, self.kept, upper)
         self._values = upper.copy()
         self._values[self.pattern.diagonal[self.kept]] += shift
@@ -185,9 +173,8 @@ class Pardiso:
     def close(self) -> None:
         """Give the library's memory back.
 
-        No ufunc is asked: garbage may be collected within the end of an `np.errstate`, and CPython's
-        context variable that holds numpy's error state, read just then, goes on to point to what is
-        freed next.
+        No ufunc is asked: garbage may be collected within the end of an `np.errstate`, and CPython's context
+        variable that holds numpy's error state, read just then, goes on to point to what is freed next.
         """
         if self._open:
             self._call(-1, self._values, self._values)

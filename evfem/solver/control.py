@@ -1,5 +1,4 @@
-r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction
-force.
+r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction force.
 
 A control says which part of the step is known; where a force is prescribed instead, it gives the
 extra unknown with the equation that settles it (`evfem.contact.condensed.ExtraUnknown`), its share
@@ -10,17 +9,16 @@ control             known                        unknown                       e
 ==================  ===========================  ============================  ====================
 `Indentation`       height of the bone                                         none
 `Force`                                          travel of the bone            F_y = -force
-`Loose`             height of the bone           travel of the bone            F_y = 0, if touched
+`Unsupported`             height of the bone           travel of the bone            F_y = 0, if touched
 `GivenVoltage`      voltage                                                    none
 `KeptCharge`        charge of the electrode      voltage                       Q = charge
 `GivenGap`          smallest gap of the pad      squared voltage               g = gap
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
 ==================  ===========================  ============================  ====================
 
-Without charges between the layers attraction is proportional to the squared voltage, so that this
-unknown enters linearly. A control
-of one's own (a spring behind the bone, a prescribed charge) is a class with the methods of
-`HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
+Without charges between the layers attraction is proportional to the squared voltage, so that this unknown
+enters linearly. A control of one's own (a spring behind the bone, a prescribed charge) is a class with the
+methods of `HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
 """
 
 from __future__ import annotations
@@ -33,13 +31,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
-from evfem.contact.condensed import (
-    CondensedTangent,
-    Condition,
-    ExtraUnknown,
-    LinearContactStep,
-    StepSolution,
-)
+from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
 from evfem.electrostatics.signals import Reading, Seen, electrode_charge, smallest_gap
 from evfem.solver.hand import Grip
@@ -54,9 +46,7 @@ AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
 
 class HeightControl:
-    """How high the bone stands: prescribed, or settled by an equation; here by nothing. `free`: whether it is
-    an unknown of the step.
-    """
+    """How the bone's height is settled: prescribed, here, or by an equation. `free`: it is an unknown."""
 
     free = False
 
@@ -105,18 +95,17 @@ class Force(HeightControl):
         return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
 
     def towards(self, end: HeightControl, fraction: float) -> Force:
-        if isinstance(end, Loose):
+        if isinstance(end, Unsupported):
             return self
         assert isinstance(end, Force)
         return Force(self.force + fraction * (end.force - self.force))
 
 
-class Loose(Indentation):
+class Unsupported(Indentation):
     """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
-    begins; touched on the way, by a crest or by tissue that recovers, it gives way
-    (`Equilibrium.step`).
+    begins; touched on the way, by a crest or by tissue that recovers, it gives way (`Equilibrium.step`).
 
-    >>> Loose(0.3).towards(Force(0.0), 0.5)
+    >>> Unsupported(0.3).towards(Force(0.0), 0.5)
     Force(force=0.0)
     """
 
@@ -126,11 +115,10 @@ class Loose(Indentation):
 
 @dataclass(frozen=True)
 class VoltageProblem:
-    """What a voltage control may ask for in one iteration: the present squared voltage (kV^2), a
-    solved contact problem, and what one kV^2 more does: the state for the backward solve and the
-    condensed forces. The same of any forces on the pad nodes (P, dim), `pushed`; of a number with a
-    gradient (P, dim) by their positions, `measured`, the condensed row and what the number gains while
-    the candidates stay, by the step's residual and by forces with such a state; and what is `seen`.
+    """What a voltage control may ask for: the present squared voltage (kV^2), a solved contact problem, state
+    for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
+    `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
+    the residual and by forces with such a state; what is `seen`.
     """
 
     squared: float
@@ -143,9 +131,7 @@ class VoltageProblem:
 
 @dataclass(frozen=True)
 class DrivenStep:
-    """A solved contact step, the change of the unknown of the voltage in it (kV^2 or kV), and the state
-    for the backward solve per unit of it where it has changed.
-    """
+    """A solved step, the change of the voltage's unknown (kV^2 or kV), the state for the backward solve."""
 
     solution: StepSolution
     change: float = 0.0
@@ -153,9 +139,7 @@ class DrivenStep:
 
 
 class VoltageControl:
-    """What the voltage is: prescribed, or settled by an equation between bounds; here `voltage` (V), else the
-    largest allowed one. Whether friction `follows` from it, and whether it is an unknown now, `free`.
-    """
+    """How the voltage is settled: here `voltage` (V), prescribed or the largest; `free` if unknown."""
 
     follows: Any = False
     free: Any = False
@@ -248,9 +232,7 @@ class Met(VoltageControl):
 
 @dataclass(frozen=True)
 class KeptCharge(Met):
-    """The electrode has the `charge` over eps_0 (V, in space V mm), or None keeps the one that it had. The
-    unknown is the voltage in kV, for the charge is linear in it.
-    """
+    """The electrode has `charge` over eps_0 (V, in space V mm), None: as before. Unknown: voltage in kV."""
 
     charge: float | None = None
 
@@ -333,9 +315,7 @@ class FollowFriction(VoltageControl):
         return DrivenStep(found, change, unit)
 
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
-        """At a bound the force may miss the wish in the direction that the bound forbids to
-        correct; else the voltage becomes an unknown again.
-        """
+        """At a bound the force may miss the wish as the bound forbids, else the voltage is unknown again."""
         if self.free:
             return True
         lacking = forward * (self.force - reaction[0])
@@ -386,7 +366,7 @@ class Target:
         return np.array([x, self.height.known(float(present[1])), *along])
 
     def way(self, present: Floats) -> Floats:
-        """How far the bone is likely to go from its `present` translation (dim,)."""
+        """Expected displacement of the bone from its `present` translation (dim,)."""
         way = self.bone(present) - present
         if self.hand is not None:
             way[0] = self.hand.way

@@ -28,21 +28,12 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.contact.stability import Verge
+from evfem.contact.stability import StabilityRatio
 from evfem.electrostatics.signals import Seen
-from evfem.solver.control import Force, GivenVoltage, Indentation, Loose, Target, sticks
+from evfem.solver.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface
-from evfem.solver.state import (
-    NO_AGE,
-    NO_CHARGES,
-    Balance,
-    Folded,
-    Limits,
-    Reusable,
-    State,
-    StepFailed,
-)
+from evfem.solver.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
 from evfem.solver.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
@@ -52,16 +43,10 @@ FOLDED = "there is no equilibrium near here without the outline folding over its
 
 
 class Equilibrium:
-    """Finds equilibria of a body on a surface, with or without attraction, one step after the
-    other.
-    """
+    """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
 
     def __init__(
-        self,
-        body: FactorisedBody,
-        interface: Interface,
-        attraction: Attraction | None,
-        limits: Limits,
+        self, body: FactorisedBody, interface: Interface, attraction: Attraction | None, limits: Limits
     ) -> None:
         self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record
@@ -97,9 +82,7 @@ class Equilibrium:
         return self.interface.contact_forces(state)
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
-        """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken
-        from `old`, the last converged state.
-        """
+        """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
         return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
@@ -116,7 +99,7 @@ class Equilibrium:
         of the current one if given; iterations begin at `start` (default `old`). A loose finger that
         is touched gives way. Raises `StepFailed`.
         """
-        if not isinstance(target.height, Loose):
+        if not isinstance(target.height, Unsupported):
             return self._followed(old, target, frozen, start)
         held = replace(target, height=Indentation(float(old.bone[1])))
         found = self._followed(old, held, frozen, start)
@@ -152,12 +135,12 @@ class Equilibrium:
             raise StepFailed("the wished friction force was not found", self.record.residuals)
         return held
 
-    def verge(self, state: State, target: Target) -> Verge | None:
-        """Which force takes the equilibrium `state` its stability."""
-        return self.body.verge(state, target)
+    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
+        """Stability ratio of the equilibrium `state`."""
+        return self.body.stability_ratio(state, target)
 
     def reusable(self) -> Reusable:
-        """What the solver takes with it to the next step."""
+        """Data of the solver that the next step reuses."""
         return self.body.reusable()
 
     def resume(self, state: State, carried: Reusable) -> None:
@@ -205,14 +188,12 @@ class Equilibrium:
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 
     def _accepted(self, old: State, state: State, target: Target) -> State:
-        """The balanced state with what body, friction and hand remember of it; raises where its outline
-        crosses itself or it is not stable.
-        """
+        """The balanced state with memories of body, friction, hand; raises where crossed or not stable."""
         place = self.interface.fold(state)
         if place is not None:
             raise Folded(FOLDED.format(place), self.record.residuals)
-        if (verge := self.body.leaves(old, state, target)) is not None:
-            raise Unstable(NOT_STABLE.format(verge.cause, verge.share))
+        if (margin := self.body.leaves(old, state, target)) is not None:
+            raise Unstable(NOT_STABLE.format(margin.cause, margin.ratio))
         state = self.interface.aged(old, self.body.accepted(old, state))
         return state if target.hand is None else target.hand.settled(state)
 
@@ -224,9 +205,7 @@ class Equilibrium:
         return target.drive.accepts(forward, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:
-        """Whether contact and friction hold at the present positions; a node that penetrates
-        becomes a candidate.
-        """
+        """Whether contact and friction hold here; a node that penetrates becomes a candidate."""
         penetration = self.interface.shallowest_penetration(state)
         if penetration is not None:
             self.body.admit(state, penetration)

@@ -1,14 +1,7 @@
 r"""The finger's finite elements in an equilibrium step (`evfem.solver.equilibrium`): factorise, solve
 contact, move.
 
-With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and
-the bone b,
-
-.. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta u_b = g_c + \lambda^+ - \lambda + \Delta f, \qquad
-          S_{bc}\,\Delta u_c + S_{bb}\,\Delta u_b = g_b + F_b .
-
-The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the new forces
-(`evfem.contact.condensed`). Algorithm (`FactorisedBody.advance`), one outer iteration::
+Algorithm (`FactorisedBody.advance`), one outer iteration::
 
     factorise at the iterate if the factorisation at hand has become too old
     g <- forward elimination of -R
@@ -43,7 +36,7 @@ from evfem.common.constants import (
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
-from evfem.contact.stability import SLOPES, Verge, verge
+from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import Seen
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Target, VoltageProblem
@@ -58,9 +51,7 @@ from evfem.tissue.body import Body
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """What a linear step changes: the solved contact, the bone (2,) and the displacements (N, 2)
-    in mm, the unknown of the voltage; and the fraction of it that may be taken.
-    """
+    """A linear step's changes: contact, bone (2,), displacements (N, 2) in mm, voltage; the usable part."""
 
     contact: StepSolution
     bone: Floats
@@ -73,11 +64,7 @@ class FactorisedBody:
     """The finger's finite elements: contact is solved on their condensed tangent."""
 
     def __init__(
-        self,
-        body: Body,
-        interface: Interface,
-        attraction: Attraction | None,
-        limits: Limits,
+        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.size, self.pad = body.space.size, interface.pad
@@ -105,9 +92,7 @@ class FactorisedBody:
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
-        """Where iterations begin: the present state moved on along its last increment, or with the
-        bone if nothing touches.
-        """
+        """Where iterations begin: the last increment once more, or moved with the bone if nothing touches."""
         state = replace(state, voltage=target.drive.guess(state.voltage))
         if state.touching.any():
             return self._extrapolated(state, target)
@@ -115,9 +100,7 @@ class FactorisedBody:
         return replace(state, u=state.u + (bone - state.bone), bone=bone)
 
     def _extrapolated(self, state: State, target: Target) -> State:
-        """As far along the last increment of the displacements as the bone's next one is along its
-        last.
-        """
+        """As far along the last increment of the displacements as the bone's next one is along its last."""
         node = self.body.space.mesh.node_sets["bone"][0]
         last, way = state.last_increment[node], target.way(state.bone)
         axis = int(np.argmax(np.abs(way)))
@@ -165,9 +148,7 @@ class FactorisedBody:
         return max(float(free / largest), target.drive.lacking(self._seen(state)))
 
     def _rounding(self, state: State) -> float:
-        """Forces (N/mm) below which the balance is rounding: of displacements that contain the
-        bone's travel, of the stresses of the stiffest cells, and of the attraction.
-        """
+        """Forces (N/mm) below which the balance is rounding: of displacements, stresses and attraction."""
         epsilon = float(np.finfo(float).eps)
         travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
         rounding = epsilon * self.linearisation.stiffest * travel
@@ -198,9 +179,7 @@ class FactorisedBody:
         return self._mixed(state, after, target)
 
     def _mixed(self, state: State, after: State, target: Target) -> State:
-        """Anderson's combination of `after` with the iterates before; `after` itself if that goes too far.
-        Prescribed values are copied exactly.
-        """
+        """Anderson's combination of `after` with iterates before; `after` if too far. Prescribed: exact."""
         mixed = self._anderson.next_iterate(state, after)
         if mixed is not after and self._goes_too_far(state, mixed, target):
             self._anderson.reset()
@@ -213,16 +192,12 @@ class FactorisedBody:
         return replace(mixed, bone=bone, voltage=voltage)
 
     def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
-        """Whether a combination of iterates turns cells inside out, or the bone leaves: where nothing holds
-        it, all steps are equally long, and combined they lead anywhere.
-        """
+        """Whether a combination turns cells inside out, or takes away a bone that nothing holds."""
         travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
         return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J
 
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
-        """The next iterate, where candidates follow the contact: nodes that have sunk in on the way join
-        them, and where they are many, the way is gone again with them.
-        """
+        """The next iterate; nodes that sank in become candidates, many of them start the way again."""
         if not self.interface.follows:
             return after
         for _ in range(GROWING):
@@ -333,9 +308,9 @@ class FactorisedBody:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
 
-    def verge(self, state: State, target: Target) -> Verge | None:
-        """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
-        where the way leads to, for the curvature of a profile may jump. None in three dimensions.
+    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
+        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as
+        the curvature of a profile may jump. None in three dimensions.
         """
         if state.bone.size == 3:
             return None
@@ -346,12 +321,12 @@ class FactorisedBody:
         for place in (state, ahead):
             step = self._contact_step(state, place, target, still)
             also = target.drive.unknowns(step, self._problem(none, place))
-            found.append(verge(replace(step, unknowns=(*step.unknowns, *also))))
-        return max(found, key=lambda one: one.share)
+            found.append(stability_ratio(replace(step, unknowns=(*step.unknowns, *also))))
+        return max(found, key=lambda one: one.ratio)
 
     # -- a step ends
 
-    def leaves(self, old: State, state: State, target: Target) -> Verge | None:
+    def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
         """How crests push the finger out of the equilibrium `state` faster than it is held, by the
         tangent at hand and by the one there: iterations may come to such a one from afar. Not asked of
         tissue in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue
@@ -370,15 +345,15 @@ class FactorisedBody:
             found = self._pushed_out(old, state, target)
         return found
 
-    def _pushed_out(self, old: State, state: State, target: Target) -> Verge | None:
-        """By how much slopes win by the tangent at hand, without the attraction; None if they do not."""
+    def _pushed_out(self, old: State, state: State, target: Target) -> StabilityRatio | None:
+        """Stability ratio by the present tangent without attraction, if slopes exceed 1; else None."""
         step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
-        still = np.zeros(step.candidates.status.size)
+        unattracted = replace(step.candidates, negative_stiffness=np.zeros(step.candidates.status.size))
         try:
-            found = verge(replace(step, candidates=replace(step.candidates, negative_stiffness=still)))
+            found = stability_ratio(replace(step, candidates=unattracted))
         except np.linalg.LinAlgError:
             return None
-        return found if found.cause == SLOPES and found.share > 1.0 else None
+        return found if found.cause == SLOPES and found.ratio > 1.0 else None
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity and its increment."""

@@ -1,6 +1,4 @@
-"""How an iterate looks that is no equilibrium, in one line: what a person needs to see why a step
-failed.
-"""
+"""How an iterate looks that is no equilibrium, in one line: what a person needs to see why a step failed."""
 
 from __future__ import annotations
 
@@ -14,9 +12,7 @@ from evfem.tissue.body import Body
 
 
 def findings(body: Body, state: State, balance: Balance) -> str:
-    """The largest out-of-balance forces and where they sit (current positions), the state of
-    contact, and the smallest volume ratio of a cell.
-    """
+    """Largest out-of-balance forces and their current places, the contact, the smallest volume ratio."""
     nodal = np.linalg.norm(_free(body, balance.forces), axis=1)
     worst = np.argsort(nodal)[::-1][:NAMED]
     places = (body.space.mesh.points + state.u)[worst]

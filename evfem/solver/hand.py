@@ -52,8 +52,8 @@ class Hand:
 
     @classmethod
     def of_finger(cls, speed: float, depth: float = 10.0) -> Hand:
-        """That of a finger that slides with `speed` (mm/s) and is `depth` mm deep: what grows with the
-        speed, times the speed, as what is left at none is not in the source's summary.
+        """The hand of a finger that slides with `speed` (mm/s) and is `depth` mm deep. Spring and mass are
+        proportional to the speed; the source gives no offset.
 
         The damper is our reading: a spring k and a damper c are a first-order system whose cut-off
         frequency is k / (2 pi c), so it is the same at every speed. InputError for a speed or a depth
@@ -82,12 +82,12 @@ class Hand:
         return 0.5 * self.mass * float(state.hand[1]) ** 2
 
     def given(self, old: State, new: State) -> float:
-        """What the drive does beyond the work on the bone, between two states, in N mm."""
+        """Work of the actuator beyond that on the bone, between two states, in N mm."""
         drive = 0.5 * (old.hand[2] + new.hand[2]) * (new.hand[0] - old.hand[0])
         return float(drive - 0.5 * (old.reaction[0] + new.reaction[0]) * (new.bone[0] - old.bone[0]))
 
     def dissipation(self, old: State, new: State, duration: float) -> float:
-        """What the damper dissipates in so many seconds, in N mm."""
+        """Dissipation of the damper in so many seconds, in N mm."""
         if duration == 0.0:
             return 0.0
         stretched = (new.hand[0] - old.hand[0]) - (new.bone[0] - old.bone[0])
@@ -100,9 +100,7 @@ AT_REST: Floats = np.zeros(3)
 
 @dataclass(frozen=True)
 class Grip:
-    """A hand in one step: the drive's x at its end, its seconds, and before it x of drive and bone
-    (mm) and the bone's velocity (mm/s).
-    """
+    """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s)."""
 
     hand: Hand
     drive: float = 0.0
@@ -116,7 +114,7 @@ class Grip:
 
     @property
     def stiffness(self) -> float:
-        """How fast the force on the bone falls with its travel, N/mm per mm."""
+        """Stiffness of the hand at the bone, N/mm per mm."""
         if self.duration == 0.0:
             return self.hand.stiffness
         rate = 1.0 / self.duration
@@ -124,11 +122,11 @@ class Grip:
 
     @property
     def way(self) -> float:
-        """How far the bone goes if nothing changes (mm)."""
+        """Displacement of the bone if nothing changes (mm)."""
         return self.before[2] * self.duration
 
     def velocity(self, x: float) -> float:
-        """Of the bone at the end of the step, in mm/s."""
+        """Velocity of the bone at the end of the step, in mm/s."""
         return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0
 
     def driving(self, x: float) -> float:
@@ -151,9 +149,7 @@ class Grip:
         return float(self.force(x) - reaction[0])
 
     def unbalanced(self, x: float, reaction: Floats) -> float:
-        """The force that is `missing` beyond rounding, not negative: in a short time a hand with a
-        mass is stiff. Each of the four places has a rounding of its own, half an epsilon.
-        """
+        """The force `missing` beyond rounding, not negative: each of the four places rounds by itself."""
         largest = max(abs(place) for place in (x, self.drive, *self.before[:2]))
         rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
         return max(abs(self.missing(x, reaction)) - rounding, 0.0)

@@ -33,9 +33,7 @@ MOST, LEAST, FALL, STUCK = 1e4, 1e-3, 4.0, 1.05
 
 @dataclass
 class Hold:
-    """Holds `body`; `reach(old, target, start)` finds the equilibrium at a target, drag included, from a
-    start, and raises `StepFailed` where it lies behind a barrier; `first` is the first rate of the drag.
-    """
+    """Holds `body`: `reach(old, target, start)` raises `StepFailed` behind a barrier; `first` drag rate."""
 
     body: Body
     reach: Callable[[State, Target, State], State]

@@ -19,8 +19,8 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     CHANGES,
-    HAIR,
     NEIGHBOURS,
+    PIN_OFFSET,
     SHORT_RAMP,
     SHORTEST_LENGTH,
     SMALLEST_FORCE,
@@ -38,13 +38,11 @@ from evfem.surface.skin import Skin
 class Pins:
     """Nodes that a jump of friction holds back during one step; `x` (P,) is nan for free nodes.
 
-    A node slides up to a jump to higher friction and stays there, its shear force growing from the
-    lower to the higher limit, before it slides on. Taken at the node's own x the coefficient then
-    has no consistent value on either side: the iterations put the node before the jump, behind it,
-    before it again. Such a node is pinned to the jump, a hair inside the rougher side, where it
-    sticks with the higher coefficient. It is released when its shear force falls below the lower
-    limit. A node that began the step on the rougher side is not held: it leaves it and slides on, or
-    it stays there.
+    A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
+    to the higher limit. By its own x the coefficient has no consistent value: iterations put it before the
+    jump, behind it, before it again. It is pinned a hair inside the rougher side, sticking with the higher
+    coefficient, and released below the lower limit. A node that began the step on the rougher side is not
+    held.
     """
 
     def __init__(self, jumps: Floats, size: int) -> None:
@@ -63,7 +61,7 @@ class Pins:
 
     @property
     def held(self) -> Any:
-        """Which nodes are pinned (P,) bool."""
+        """Pinned nodes, (P,) bool."""
         return np.isfinite(self.x)
 
     def watch(self, x: Floats, touching: Any) -> None:
@@ -75,7 +73,7 @@ class Pins:
         self._changes += moved
         new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
         place, before, behind = self.jumps[np.maximum(side, self._side)[new] - 1].T
-        inside = np.where(behind > before, HAIR, -HAIR)
+        inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
         from_smoother = (place - self._begin[new]) * inside > 0.0
         new = new[from_smoother]
         self.x[new] = (place + inside)[from_smoother]
@@ -83,9 +81,7 @@ class Pins:
         self._side = side
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
-        """Let go of nodes whose shear force is below the lower `limit` (P,); says whether there were
-        any.
-        """
+        """Let go of nodes whose shear force is below the lower `limit` (P,); says whether there were any."""
         return self.let_go(self.held & (np.abs(shear) < limit - weak))
 
     def let_go(self, loose: Any) -> bool:
@@ -113,7 +109,7 @@ Restored = Callable[[float], tuple[Floats, Floats] | None]
 
 
 def nothing_restored(voltage: float) -> None:
-    """Of an attraction without a core."""
+    """From an attraction without a core."""
 
 
 class Interface:
@@ -153,9 +149,7 @@ class Interface:
         return self.points + u[self.pad.nodes]
 
     def surface_at(self, state: State) -> SurfaceState:
-        """The surface below the pad nodes; that of the last two states is kept, for the balance, the
-        contact problem, the acceptance and the ledger all ask for it.
-        """
+        """The surface below the pad nodes, kept for the last two states, which many ask for."""
         for u, found in self._seen:
             if u is state.u:
                 return found
@@ -164,9 +158,7 @@ class Interface:
         return found
 
     def resting(self, state: State) -> Floats:
-        """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface:
-        below a thin insulator the rounding of their gaps would be a force.
-        """
+        """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""
         position = self.positions(state.u)
         touching = state.status != OPEN
         position[touching, 1] -= self.surface_at(state).gap[touching]
@@ -191,9 +183,7 @@ class Interface:
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
-        """What the contact problem has to know of the candidates c (numbers of pad nodes); of
-        every pad node the attraction's `negative_stiffness` (P,) and `gain_on_closing` (P,).
-        """
+        """What the contact problem has to know of candidates c; of all nodes their attraction's change."""
         position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
@@ -214,10 +204,9 @@ class Interface:
     def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
         """The candidates c under a law of friction other than Coulomb's.
 
-        Where the interface yields by C, a node that slips under the largest shear F(s) and is displaced
-        by dx slips by ds = dx - C dF: with K = dF/ds friction grows by K dx / (1 + K C), law and
-        interface in series. The contact problem knows the part of F that does not grow with dx; seen
-        with that, slip and yielding are (1 + K C) times as large.
+        Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
+        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem knows the part of F
+        that does not grow with dx; seen with that, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])
@@ -253,9 +242,7 @@ class Interface:
         return seen if found is None else replace(seen, withheld=found[0][nodes], left=found[1][nodes])
 
     def withheld(self, state: State) -> Floats:
-        """What a core of the attraction withholds of the pull on the closed pad nodes, and of what presses
-        them (P,) in N/mm.
-        """
+        """What a core of the attraction withholds of pull and pressing force of closed nodes (P,), N/mm."""
         found = self.restored(state.voltage)
         if found is None:
             return np.zeros(len(self.points))
@@ -264,9 +251,7 @@ class Interface:
         return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
 
     def lengths(self, position: Floats) -> Floats:
-        """What of the pad its nodes at positions (P, dim) stand for (P,): lengths in the plane, mm, areas in
-        three dimensions, mm2; nowhere quite nothing.
-        """
+        """What the pad's nodes at positions (P, dim) stand for (P,): mm, in space mm2; never quite 0."""
         least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
         return np.maximum(self.pad.tributary(position), least)
 
@@ -275,16 +260,14 @@ class Interface:
         return self.lengths(self.positions(state.u))
 
     def shares_at(self, part: tuple[State, State], x: Floats) -> Floats:
-        """The same where the nodes are at x (P,), on a part of a run between two states; in three
-        dimensions its mean over the part.
-        """
+        """The same at x (P,), on a part between two states; in space its mean over the part."""
         if self.dim == 2:
             return self.lengths(x[:, None])
         old, new = part
         return 0.5 * (self.shares(old) + self.shares(new))
 
     def age(self, old: State) -> Floats:
-        """How long every pad node has touched at the end of the step from `old` (P,) in s."""
+        """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
         return np.where(old.touching, old.age + self.duration, 0.0)
 
     def aged(self, old: State, state: State) -> State:
@@ -294,9 +277,7 @@ class Interface:
         return replace(state, age=self.age(old))
 
     def resistance(self, part: tuple[State, State], x: Floats, normal: Floats, slip: Floats) -> Floats:
-        """Largest shear forces of the pad nodes (P,) at x (P,) under contact forces (P,), on a part of a
-        run between two states in which they slip by (P,).
-        """
+        """Largest shear forces of the pad nodes (P,) at x under contact forces (P,), slipping by (P,)."""
         old, new = part
         mu = self.friction(old, np.arange(x.size), x)
         if self.law is None:
@@ -305,15 +286,11 @@ class Interface:
         return replace(seen, normal=normal, length=self.shares_at(part, x)).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
-        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds
-        a node.
-        """
+        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
         return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
 
     def compliance(self, old: State) -> Floats:
-        """Compliance of the interface (P, dim) along normal and tangent in mm per N/mm: 0, contact
-        is exact.
-        """
+        """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
         return np.zeros_like(old.contact_force)
 
     def friction(self, old: State, nodes: Ints, x: Floats) -> Floats:
@@ -334,9 +311,7 @@ class Interface:
         return float(gap[sunk].max()) if sunk.any() else None
 
     def _strayed(self, old: State, state: State, x: Floats) -> Any:
-        """Pinned nodes (P,) that have slipped away to where the coefficient is another one, or whose
-        interface has yielded to where it does not hold them.
-        """
+        """Pinned nodes (P,) that slipped to another coefficient, or whose interface no longer holds them."""
         nodes = np.arange(x.size)
         pinned = self.friction(old, nodes, np.where(self.pins.held, self.pins.x, x))
         here, slips = self.friction(old, nodes, x), state.status >= FORWARD
@@ -386,16 +361,12 @@ class Interface:
 
 
 class PenaltyInterface(Interface):
-    """An interface that yields: 1 / (penalty x tributary length) of compliance per node;
-    `penalties` in N/mm3 along normal and tangent.
-    """
+    """An interface that yields by 1 / (penalty x tributary length) per node; N/mm3, normal and tangent."""
 
     penalties: tuple[float, float] = (np.inf, np.inf)
 
     def compliance(self, old: State) -> Floats:
-        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last
-        step.
-        """
+        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
         return 1.0 / np.outer(self.shares(old), self.penalties)
 
 

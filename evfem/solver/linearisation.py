@@ -22,7 +22,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
-    FAINT,
     FAR,
     FIRST,
     HELD,
@@ -30,16 +29,16 @@ from evfem.common.constants import (
     LONGER,
     SHORTER,
     SLOW,
+    SMALLEST_STIFFENING,
     SPARE,
     STABLE,
     STALLED,
     STEEP,
     TAKEN,
 )
-from evfem.contact.attracted import Roughness
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
-from evfem.contact.signorini import OPEN, STICK
+from evfem.contact.signorini import OPEN, STICK, Roughness
 from evfem.solver.condensation import Singular, make_condensation
 from evfem.solver.interface import Interface
 from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
@@ -74,16 +73,10 @@ def steadied(gain: Floats) -> Floats:
 
 
 class Linearisation:
-    """Candidates, factorisation and condensed tangent of a body, and the attraction's part in
-    them.
-    """
+    """Candidates, factorisation and condensed tangent of a body under an attraction."""
 
     def __init__(
-        self,
-        body: Body,
-        interface: Interface,
-        attraction: Attraction | None,
-        limits: Limits,
+        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.pad = interface.pad
@@ -115,9 +108,7 @@ class Linearisation:
             self.fringes, self._made_at = False, None
 
     def start_clock(self, old: State, duration: float) -> None:
-        """Start the clock of a step; a factorisation made for a much longer or shorter one is of
-        no use.
-        """
+        """Start the clock of a step; a factorisation for a much different duration is outdated."""
         dynamics = self.body.dynamics
         self._outdated |= self.body.drag_rate != self._drag_rate
         if dynamics is None:
@@ -129,9 +120,7 @@ class Linearisation:
         dynamics.begin(old.u, old.velocity, duration)
 
     def choose_candidates(self, state: State, reach: float) -> None:
-        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously
-        if the present set does not do, and at once those that the scene's deepest press may reach.
-        """
+        """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
         position = self.interface.positions(state.u)
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
@@ -144,6 +133,7 @@ class Linearisation:
             needed[np.argmin(gap)] = True
         if needed[self.candidates].sum() == needed.sum():
             return
+        # gap below which `SPARE` times as many nodes lie: a new choice costs an analysis of the matrix
         enough = np.sort(gap)[min(int(SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
         wider = (gap <= max(enough, self.interface.neighbourhood)) | (SPARE * weakening > steep)
         wider = self.pad.free & (wider | self._deep) | needed
@@ -151,9 +141,7 @@ class Linearisation:
         self.factor = None
 
     def _follow(self, state: State, gap: Floats, steep: Any) -> None:
-        """Let the candidates follow the contact: what touches, has sunk in or is strongly attracted,
-        and half as many others with the smallest gaps (P,). What has left is let go, once in a step.
-        """
+        """Let the candidates follow the contact, and half as many others; what left is let go once a step."""
         needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
         if self.candidates.size and needed[self.candidates].sum() == needed.sum():
             return
@@ -170,9 +158,7 @@ class Linearisation:
         self.factor = None
 
     def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
-        """Factorise at the present state where there is no factorisation, the old one stalls, or a
-        new one saves iterations; says whether it did.
-        """
+        """Factorise if there is no factorisation, it stalls, or a new one saves; says whether it did."""
         same, self._status = np.array_equal(self._status, state.status), state.status
         if self._has_fringes(state) and in_vain(history, same):
             self._outdated |= not self.fringes
@@ -184,7 +170,7 @@ class Linearisation:
 
     @property
     def refused(self) -> bool:
-        """Whether there is no factorisation, or one of other candidates, another drag or time step."""
+        """No factorisation, or one of other candidates, another drag or time step."""
         return self.factor is None or self._outdated
 
     def _has_fringes(self, state: State) -> bool:
@@ -197,6 +183,7 @@ class Linearisation:
         self._outdated, self._drag_rate = False, self.body.drag_rate
         if self.factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
+            # static condensation keeps candidates and bone
             kept = np.concatenate([unknowns, self.body.bone])
             self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
             self.record.backend = type(self.factor).__name__
@@ -218,9 +205,7 @@ class Linearisation:
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
-        """Subtract the negative attraction stiffness of open nodes that are no candidates, limited so
-        that the matrix stays positive definite: a body bears more than its shear modulus over its height.
-        """
+        """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
         most = HELD * self.softest * self.pad.tributary(self.interface.positions(state.u))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
@@ -234,9 +219,7 @@ class Linearisation:
 
     @property
     def reusable(self) -> TangentPoint | None:
-        """Where the factorisation was made that the next step may use, if there is one: that of the
-        field's own stiffness serves one step alone.
-        """
+        """Point of the factorisation that the next step may use; none with the field's own stiffness."""
         return None if self.factor is None or self.fringes else self._made_at
 
     def restore(self, state: State, at: TangentPoint) -> None:
@@ -252,6 +235,7 @@ class Linearisation:
         before, now = history[-2:]
         if now > STALLED or now > SLOW * before:
             return True
+        # iterations left at the last rate of convergence, against the strategy's patience
         tolerance = self.limits.tolerance
         if now <= tolerance:
             return False
@@ -260,17 +244,18 @@ class Linearisation:
     # -- the attraction's part
 
     def negative_stiffness(self, state: State) -> Floats:
-        """How fast the attraction of every pad node weakens with its gap (P,) in N/mm per mm."""
+        """Negative stiffness of the attraction of every pad node, (P,) in N/mm per mm."""
         if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
 
     def gain_on_closing(self, state: State) -> Floats:
-        """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
+        """Increase of the attraction of every pad node when its gap closes, (P,) in N/mm."""
         if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
+        # gaps now, and with every node in contact
         places = [self.interface.resting(s) for s in (state, everywhere)]
         at = (state.voltage, self.touching, state.contact_force[:, 0])
         now, closed = (self.attraction.column_forces(place, *at)[:, 1] for place in places)
@@ -334,7 +319,8 @@ class Linearisation:
         normal = np.zeros((c.size, dim))
         normal[:, :2] = normals(surface_state(self.interface.surface, position[c]))
         own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        # weakening with a node's own gap belongs to the contact problem: not twice
         blocks = inner.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own
         stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
-        return inner if stiffened.max() > FAINT else None
+        return inner if stiffened.max() > SMALLEST_STIFFENING else None

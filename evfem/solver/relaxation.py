@@ -1,31 +1,21 @@
 r"""From a lost equilibrium to the next one: the body is released from where it is, and held back only
 by drag.
 
-Where a quasi-static path loses stability, the equilibrium ends there however small the part: by
-pull-in, where the attraction grows faster than the tissue's force, by friction that falls along the
-path, or by a ridge that jumps from one slope of a texture to the next. The equilibrium after the snap
-may be far away, and iterations of a static problem seldom find it.
 Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of the part held::
 
     rate <- 1
     repeat, at most `DRAG_STEPS` times
-        solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state
+        solve one equilibrium with drag of this rate (`evfem.tissue.body`) from the last state
         if it failed: raise the rate, by twice the last factor; give up beyond `DRAG_MOST`
         else: accept; give up if a finger that is pulled has lost the surface
             if the body slows down and the rate is small: solve the equilibrium without drag; if it is
                 found, it is the end
             lower the rate, or raise it if the speed grows; give up below `DRAG_LEAST`
 
-*Drag, not inertia*: a release ends at rest only if something dissipates the energy, and a finger that
-swings may jump over the next equilibrium, so the path would depend on a density and a time step; with
-drag the stored energy, less the work of the loads, can only fall. *Both kinds of drag*: viscosity damps
-relative motion only; a mass that is at rest at the beginning of each step damps rigid motion. *No
-parameter*: only the ratio s of relaxation time and pseudo-time step enters, which is chosen as steps
-succeed; the path is that of a tissue with one relaxation time everywhere at low speed. The steps are
-equilibria of contact,
-friction and attraction like any other, in the scene's own coupling and to its tolerance; friction
-counts from step to step, and what is dissipated is counted by its definitions
-(`evfem.simulation.works`). What comes out at the end is an equilibrium without drag, or nothing.
+Drag, not inertia: with it the stored energy, less the work of the loads, can only fall, and the path depends
+on no density. Viscosity damps relative motion, a mass at rest at the beginning of each step rigid motion.
+Only the ratio s of relaxation time and pseudo-time step enters, chosen as steps succeed. Each step is an
+equilibrium of contact, friction and attraction to the scene's tolerance.
 
 In the first step of a release a hand with a mass or a damper moves on in its time, and charge flows in
 its own. Then the bone stays at that x, and each node keeps its charge, while the tissue comes to rest.
@@ -33,9 +23,8 @@ its own. Then the bone stays at that x, and each node keeps its charge, while th
 A symmetric finger on the middle of a crest has an equilibrium there which the least push makes it leave.
 The first step of a release therefore begins `IMPERFECTION` aside.
 
-An attraction with an energy lets the body come to rest. The vertical attraction of the paper has none: a
-node that moves changes what its neighbours carry without work (`evfem.contact.attraction`), and a finger
-without friction on slopes may go round in circles until the steps are used up.
+An attraction with an energy lets the body come to rest. The paper's vertical one has none: a finger without
+friction on slopes may go round in circles until the steps are used up.
 
 A prescribed friction force is not followed during a release, where drag would be part of it: the
 voltage stays as it is until the end.
@@ -77,18 +66,14 @@ LIFTED = (
 
 @dataclass
 class Relaxation:
-    """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included; `charged`
-    where charge flows.
-    """
+    """Releases `body`; `solve` finds an equilibrium with drag from a state; `charged`: charge flows."""
 
     body: Body
     solve: Callable[[State, Target], State]
     charged: bool = False
 
     def applies(self, target: Target) -> bool:
-        """Whether the tissue takes no time on its way to `target`, so that nothing but an equilibrium is
-        asked for.
-        """
+        """Whether the tissue takes no time on its way to `target`: only an equilibrium is asked for."""
         return target.duration == 0.0 or self.body.dynamics is None
 
     def follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
@@ -134,9 +119,7 @@ class Relaxation:
         return target if timed else replace(target, duration=0.0)
 
     def _dragged(self, state: State, target: Target, begin: Floats, pace: Pace) -> State | None:
-        """The equilibrium with drag that holds the body at `begin` (N, dim); None, and a slower pace, where
-        it failed.
-        """
+        """The equilibrium with drag that holds the body at `begin` (N, dim); None, and slower, if failed."""
         self.body.release(begin, pace.rate)
         try:
             return self.solve(state, target)
@@ -150,9 +133,7 @@ class Relaxation:
 
     @property
     def _imperfection(self) -> Floats:
-        """A shear (N, dim) by `IMPERFECTION` along x that leaves the top where it is, larger on the right, so
-        that it has a part of symmetric motions and of antisymmetric ones.
-        """
+        """A shear (N, dim) by `IMPERFECTION` along x, fixed on top, larger on the right: without symmetry."""
         points = self.body.space.mesh.points
         height, shear = float(np.ptp(points[:, 1])), np.zeros_like(points)
         depth = (points[:, 1].max() - points[:, 1]) / height

@@ -24,13 +24,12 @@ HALVINGS = 60
 class Returned:
     """Nodes that have slipped and stick again, or whose speed goes to and fro: `nodes` (P,) bool.
 
-    Extrapolated to zero speed, the tangent of a law that rises steeply from rest and levels off
-    overestimates static friction: the node would slip and stick by turns. At a kink the tangent of
-    either side may lead to the other one. Such a node is placed at the speed at which the law gives its
-    present force, with the tangent there; if it sticks under more than static friction, with the chord
-    from rest to there. If no speed up to the highest that the node has had gives that force, a slipping
-    node takes the steepest of the law's chord from rest, its tangent and the slope of the last
-    iteration, once near the end the tangent; a sticking one the slope of the last iteration.
+    The tangent of a law that rises steeply from rest and levels off overestimates static friction: the node
+    would slip and stick by turns, and at a kink either side may lead to the other. It is placed at the speed
+    at which the law gives its present force, with the tangent there; sticking under more than static
+    friction, with the chord from rest. If no speed so far gives that force, a slipping node takes the
+    steepest of chord, tangent and the slope of the last iteration, near the end the tangent; a sticking one
+    the last slope.
     """
 
     def __init__(self, size: int) -> None:
@@ -75,9 +74,7 @@ class Returned:
         self._change[c] = np.nan_to_num(change)
 
     def slopes(self, c: Ints, slip: Floats, tangent: Floats, chord: Floats) -> Floats:
-        """With which of these slopes (k,) by the speed the friction of the nodes c (k,) grows, at an
-        iterate with slips (k,), 0 where they stick.
-        """
+        """With which slopes (k,) friction of nodes c (k,) grows, at slips (k,); 0 where they stick."""
         near = np.abs(slip - self._slip[c]) < NEAR * np.abs(slip)
         steepest = np.maximum(np.maximum(chord, tangent), self._slope[c])
         slope = np.where(self.nodes[c] & ~near, steepest, tangent)
@@ -88,9 +85,7 @@ class Returned:
 
 
 def speed_under(law: FrictionLaw, seen: Slipping, force: Floats, fastest: Floats) -> Floats:
-    """Speeds (k,) in mm/s, up to `fastest` (k,), at which the friction of nodes is `force` (k,) in N/mm,
-    by bisection; 0 where rest bears it or no such speed does.
-    """
+    """Speeds (k,) in mm/s, up to `fastest` (k,), of friction `force` (k,) in N/mm, by bisection; else 0."""
     low, high = np.zeros_like(force), np.array(fastest)
     within = (replace(seen, speed=low).bound(law) < force) & (replace(seen, speed=high).bound(law) >= force)
     for _ in range(HALVINGS if within.any() else 0):

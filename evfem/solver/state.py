@@ -47,15 +47,12 @@ class LiftedOff(StepFailed):
 class State:
     """A configuration of a body with N nodes, P of them on the pad.
 
-    Displacements u (N, 2) in mm, contact forces on the pad nodes along the profile's normal and
-    tangent (P, 2) in N/mm and their statuses (P,), the bone's translation (2,), the voltage in V,
-    the attraction on the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in
-    mm/s, and the increment of the displacements in the step that led here (N, 2). While an
-    equilibrium of nearly incompressible tissue is sought, the pressure (E, Q) in MPa is an unknown
-    too (`evfem.solver.pressure`). With a law of friction other than Coulomb's: how long the pad
-    nodes have touched, `age` (P,) in s. With a hand: x of the drive, velocity of the bone and force
-    of the drive, `hand` (3,) in mm, mm/s and N/mm. Under a voltage resolved in time each pad node
-    has charges over eps_0 (M, P) in V/mm, two where nothing relaxes (`evfem.contact.charging`).
+    Displacements u (N, 2) in mm, contact forces along normal and tangent (P, 2) in N/mm and statuses (P,),
+    the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
+    velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
+    pressure as an unknown, that (E, Q) in MPa (`evfem.solver.pressure`). With a law of friction other than
+    Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
+    (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm.
     """
 
     u: Floats
@@ -74,16 +71,15 @@ class State:
 
     @property
     def touching(self) -> Any:
-        """Which pad nodes touch (P,) bool."""
+        """Pad nodes in contact, (P,) bool."""
         return self.status != OPEN
 
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,)
-    when the step began, whether the attraction was frozen, the time step's displacements at its
-    beginning (N, dim) and its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if
-    that is an unknown.
+    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,) when the
+    step began, whether the attraction was frozen, the time step's displacements at its beginning (N, dim) and
+    its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if that is an unknown.
     """
 
     u: Floats
@@ -98,8 +94,8 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What a solver takes with it from step to step: the contact candidates (numbers of pad
-    nodes), where its factorisation was made if it has one, and the seconds of the last time step.
+    """Data that the next step reuses: contact candidates (numbers of pad nodes), the point of the
+    factorisation if there is one, and the last time step (s).
     """
 
     candidates: Ints
@@ -119,9 +115,7 @@ class Limits:
 
 @dataclass
 class Record:
-    """Work done: iterations, factorisations and dense contact solves, counted since the start; and
-    the residuals of the last step.
-    """
+    """Numbers of iterations, factorisations and dense contact solves, and the residuals of the last step."""
 
     iterations: int = 0
     factorisations: int = 0
@@ -144,9 +138,8 @@ class MixedBalance:
 
 @dataclass(frozen=True)
 class Balance:
-    """How far an iterate is from equilibrium: its out-of-balance forces (n,) of the reduced
-    unknowns in N/mm, the largest of them relative to the reaction, and the attraction (P, 2) at
-    its positions; and what the iterations have left to do where the pressure is an unknown.
+    """Residual of an iterate: out-of-balance forces (n,) of the reduced unknowns in N/mm, the largest
+    relative to the reaction, the attraction (P, 2), and the mixed problem's residual if it is solved.
     """
 
     forces: Floats

@@ -61,10 +61,10 @@ class Accounts(Protocol):
         """A part was accepted, from `old` to `new`; says whether stability was lost in it."""
 
     def mark(self) -> Any:
-        """Where the accounts stand."""
+        """Present state of the accounts."""
 
     def back(self, mark: Any) -> None:
-        """What was accepted since `mark` led nowhere."""
+        """Discards the substeps accepted since `mark`."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,11 @@ class Release:
 
 @dataclass
 class Stepper:
-    """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
-    that worked last. `body` is what is released where no equilibrium is near; without it such a
-    step fails. `snaps`: parts in which stability was lost without a release; `unsettled`: parts
-    solved monolithically because staggered rounds did not settle; `together`: whether the rest of
-    this step is. Where the error of the path of a part is limited it is at most `allowed`, and
-    `path_error` the largest accepted.
+    """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step, that worked
+    last. `body` is what is released where no equilibrium is near; without it such a step fails. `snaps`:
+    parts in which stability was lost without a release; `unsettled`: parts solved monolithically because
+    staggered rounds did not settle; `together`: whether the rest of this step is. Where the error of the path
+    of a part is limited it is at most `allowed`, and `path_error` the largest accepted.
     """
 
     equilibrium: Equilibrium
@@ -123,8 +122,7 @@ class Stepper:
         """From `state` to the end of `path`; the accounts see every converged substep. Returns the end
         and the number of substeps.
 
-        Raises `StepFailed` when the smallest substep fails; what was accepted before stays
-        accepted.
+        Raises `StepFailed` when the smallest substep fails; what was accepted before stays accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
         self.together, self._release = False, Release(max(RELEASED, strategy.smallest_part), self.substep)
@@ -177,9 +175,7 @@ class Stepper:
         return rest
 
     def _least(self, target: Target) -> float:
-        """The smallest part of what is left of a step: a smaller one where it takes time, for tissue
-        with viscosity or inertia is the stiffer, the shorter the part.
-        """
+        """The smallest part of what is left of a step: larger where it takes time, which stiffens tissue."""
         least = self.equilibrium.strategy.smallest_part
         timed = self.body is not None and not self._relaxation(self.body).applies(target)
         return least**2 if timed else least
@@ -194,18 +190,14 @@ class Stepper:
         return False
 
     def _set_length(self, error: float, part: float) -> None:
-        """The next part's length after an accepted one; a part shortened to hit the end of a step does
-        not shorten the next.
-        """
+        """The next part's length; a part shortened to hit the end of a step does not shorten it."""
         assert self.allowed is not None
         cut = part < (1.0 - 1e-9) * self.substep
         wanted = max(longer(error / self.allowed) * part, self.equilibrium.strategy.smallest_part)
         self.substep = min(1.0, max(wanted, self.substep) if cut else wanted)
 
     def _part(self, state: State, path: Path, done: float, fraction: float) -> tuple[Parts, float]:
-        """The equilibria of a part to accept, and the error of its path: two halves where that is
-        limited.
-        """
+        """The equilibria of a part to accept, and the error of its path: two halves where that is limited."""
         whole = path(done, fraction)
         if self.allowed is None:
             return [(whole, self.solve(state, whole))], 0.0
@@ -216,22 +208,18 @@ class Stepper:
         return [(first, half), (second, end)], apart(self.solve(state, whole, start=end), end)
 
     def _restart(self, old: State, target: Target) -> None:
-        """Start the clocks of the step from `old` to `target` again: others were tried since, and works
-        are booked by the last one.
-        """
+        """Start the clocks from `old` to `target` again: others were tried, works are booked by the last."""
         self.equilibrium.interface.begin(old, target.duration)
         if self.body is not None and self.body.dynamics is not None:
             self.body.dynamics.begin(old.u, old.velocity, target.duration)
 
     def _relaxation(self, body: Body) -> Relaxation:
-        """How `body` is released."""
+        """The release of `body`."""
         attraction = self.equilibrium.attraction
         return Relaxation(body, self.solve, attraction is not None and attraction.charging is not None)
 
     def _released(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
-        """The equilibrium to which the body snaps from `state`, None where it comes to none; raises
-        `Folded` or `LiftedOff` where there can be none.
-        """
+        """Equilibrium that the body snaps to from `state`, or None; `Folded` or `LiftedOff` if impossible."""
         self.substep, failed.last = 1.0, (state, target)
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return None
@@ -255,9 +243,7 @@ class Stepper:
         return rest
 
     def _refuse_flight(self, state: State, target: Target, failed: StepFailed) -> None:
-        """Raise `LiftedOff` where tissue that is viscous, but has no mass, was pulled off: in the air nothing
-        limits how fast it leaves, and no part of the step is short enough.
-        """
+        """Raise `LiftedOff` where viscous tissue without mass was pulled off: in the air nothing slows it."""
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return
         relaxation = self._relaxation(self.body)
@@ -296,9 +282,7 @@ class Stepper:
         return new
 
     def _climbs(self, target: Target, old: State, new: State) -> bool:
-        """Whether a barrier lies between two states; without attraction there is none to come over, and where
-        a voltage is found it is no load whose potential could rise.
-        """
+        """Whether a barrier lies between two states; none without attraction, or with a sought voltage."""
         attraction = self.equilibrium.attraction
         if self.rise is None or attraction is None or not attraction.acts(new.voltage):
             return False

@@ -42,9 +42,7 @@ class Strategy:
     ] = 40
     patience: Annotated[float, _PATIENCE, "iterations with an old factorisation before it is renewed"] = 8.0
     smallest_part: Annotated[
-        float,
-        _PART,
-        "of what is left of a step before it counts as not converged; its square if time passes",
+        float, _PART, "of what is left of a step before it counts as not converged; its square if time passes"
     ] = 1.0 / 1024.0
     easy: Annotated[int, _COUNT, "iterations of a part after which the next one may be longer"] = 8
     growth: Annotated[float, _GROWTH, "by which factor"] = 1.25

@@ -1,6 +1,4 @@
-"""How far the bone travels in one linear step: as far as the contact problem says, but not farther than
-a linear step holds.
-"""
+"""How far the bone travels: as the contact problem says, but not beyond a linear step."""
 
 from __future__ import annotations
 
@@ -20,9 +18,7 @@ from evfem.solver.state import State
 
 @dataclass(frozen=True)
 class Travel:
-    """The bone's increment (dim,) with the solution of the contact problem there: `solve` solves
-    one, `longest` is the longest increment (mm) of a linear step.
-    """
+    """The bone's increment (dim,) and its contact solution by `solve`; `longest` (mm) of a linear step."""
 
     interface: Interface
     solve: Callable[[LinearContactStep], StepSolution]
@@ -31,9 +27,7 @@ class Travel:
     def limited(
         self, step: LinearContactStep, found: StepSolution, state: State, target: Target
     ) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (dim,), shortened where it is too long for a linear
-        step.
-        """
+        """The solution and the bone's increment (dim,), shortened where it is too long for a linear step."""
         if not step.unknowns:
             return found, step.bone
         bone = step.bone.copy()
@@ -52,9 +46,7 @@ class Travel:
         return found, bone
 
     def _drawn(self, step: LinearContactStep, travel: float) -> bool:
-        """Whether this travel of the bone goes against the force that it lacks once the tissue has come to
-        rest, or that has no solution: the attraction grows faster on the way than what holds the body.
-        """
+        """Whether this travel goes against the force that the bone lacks at rest, or has no solution."""
         try:
             found = replace(step, unknowns=()).solve()
         except ContactNotSolved:
@@ -62,9 +54,7 @@ class Travel:
         return travel * step.lacking(found, 0.0) < 0.0
 
     def _longest_flight(self, state: State) -> float:
-        """How far (mm) a body that touches nothing moves in one iteration: to the surface and as
-        far again, at least a small fraction of the largest increment.
-        """
+        """How far (mm) a body that touches nothing moves in one iteration: twice the gap, or a little."""
         gap = float(self.interface.surface_at(state).gap.min())
         least = SHORTEST_FLIGHT * self.longest
         return float(np.clip(2.0 * gap, least, self.longest))

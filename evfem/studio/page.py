@@ -1,4 +1,4 @@
-"""What the page shows of a state: curves with a few hundred points, numbers, and sentences."""
+"""Content of the page for a state: curves of a few hundred points, numbers, and sentences."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def _short(values: Floats) -> list[float]:
 
 
 def file(state: State, kind: str) -> bytes:
-    """What a button gives, as bytes."""
+    """The file of a button, as bytes."""
     if kind not in FILES:
         raise InputError("file", repr(kind), ", ".join(FILES))
     if kind == "toml":
@@ -185,7 +185,7 @@ def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
 
 
 def _number(text: str) -> Any:
-    """What was written into a control; what is no number is refused by who needs one."""
+    """The number in a control, or else its text."""
     try:
         return float(text)
     except ValueError:

@@ -1,9 +1,8 @@
 """A run of the model for the page, in a process of its own that ends when nobody listens any more.
 
-The process sends a line per step, then the friction curve with a picture of the deformed pad, then
-a moving picture; where the exact voltage is asked for, that voltage after the curve. Who asked
-reads them; when the page is closed or the run is cancelled, the next line cannot be sent and the
-process is ended.
+The process sends a line per step, then the friction curve with a picture of the deformed pad, then a moving
+picture; where the exact voltage is asked for, that voltage after the curve. Who asked reads them; when the
+page is closed or the run is cancelled, the next line cannot be sent and the process is ended.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """The server of the studio: http on 127.0.0.1, from the standard library.
 
-Only this machine is served: the socket is bound to 127.0.0.1, a request must name it (`Host`), and
-one that a page of another origin sends (`Origin`, `Sec-Fetch-Site`) is refused, so that a site
-that is open in the same browser can neither read nor start anything. The page loads nothing from
-elsewhere, and its policy forbids it.
+Only this machine is served: the socket is bound to 127.0.0.1, a request must name it (`Host`), and one that a
+page of another origin sends (`Origin`, `Sec-Fetch-Site`) is refused, so that a site that is open in the same
+browser can neither read nor start anything. The page loads nothing from elsewhere, and its policy forbids it.
 """
 
 from __future__ import annotations
@@ -93,7 +92,7 @@ class Handler(BaseHTTPRequestHandler):
         self._answered(self._get)
 
     def do_POST(self) -> None:
-        """What the page asks."""
+        """Requests of the page."""
         self._answered(self._post)
 
     def _answered(self, what: Callable[[], None]) -> None:

@@ -1,4 +1,4 @@
-"""What the page sends: a texture, a finger, a display; checked as strictly as a file.
+"""Requests of the page: a texture, a finger, a display; checked as strictly as a file.
 
 The page keeps all of it, the server nothing: two pages cannot mix, and a link holds what it shows.
 A texture that was drawn or uploaded travels as its rows.

@@ -1,1 +1,1 @@
-"""What the finger touches and what of it touches: profiles, friction, the outline of the pad."""
+"""The two faces in contact: profiles of the surface, friction, the outline of the pad."""

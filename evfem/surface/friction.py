@@ -106,9 +106,7 @@ class AdhesiveFriction(NamedFriction, kind="adhesive"):
         float, _PRESSURE, "shear traction that every place in real contact carries beside mu p"
     ]
     full: Annotated[
-        float | None,
-        _PRESSURE,
-        "contact pressure at which real contact is complete; without it the strength",
+        float | None, _PRESSURE, "contact pressure at which real contact is complete; without it the strength"
     ] = None
     timed = False
 
@@ -169,9 +167,7 @@ KINDS = NamedFriction.kinds
 
 
 def with_core(pressure: Floats, withheld: Values, left: Values) -> Floats:
-    """What a core withholds of the pressure (MPa) of nodes under so much: all of it from the share `FULL` of
-    what it leaves on, so that a node that opens loses it continuously.
-    """
+    """What a core withholds of the pressure (MPa) of nodes under so much, all from the share `FULL` on."""
     return np.asarray(withheld * np.clip(pressure / (FULL * np.asarray(left)), 0.0, 1.0))
 
 
@@ -207,7 +203,7 @@ class Slipping:
         return np.asarray(law.bound(self.pressure, self.mu, self.speed, self.age) * self.length)
 
     def linearised(self, law: FrictionLaw) -> Linearised:
-        """How they depend on contact force, speed and coefficient."""
+        """Derivatives by contact force, speed and coefficient."""
         normal = np.maximum(self.normal, 0.0)
         force = self.bound(law)
         slope = self._derivative(law, "pressure") * self._growth

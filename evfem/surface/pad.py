@@ -20,6 +20,32 @@ from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 
+
+def outline_nodes(mesh: Mesh) -> Ints:
+    """Mesh numbers (P,) of the nodes on `pad` along the outline, in growing x on the side that faces down.
+
+    On quadratic meshes ends and middles of edges alternate. Raises InputError where the pad is not
+    one open line.
+
+    >>> from evfem.finger.fingerpad import FingerPad
+    >>> mesh = FingerPad(resolution="coarse").mesh(order=2)
+    >>> nodes = outline_nodes(mesh)
+    >>> len(nodes) == len(mesh.node_sets["pad"]), bool(mesh.points[nodes[0], 0] < 0)
+    (True, True)
+    """
+    if mesh.dim == 3:
+        raise InputError("finger.mesh", "a finger in three dimensions", "a plane finger")
+    edges = mesh.edges_of("pad")
+    follow = {int(edge[0]): [int(node) for node in (*edge[2:], edge[1])] for edge in edges}
+    starts = set(follow) - {nodes[-1] for nodes in follow.values()}
+    if len(starts) != 1:
+        raise InputError("finger.mesh", f"a pad with {len(starts)} beginnings", "a pad that is one open line")
+    nodes = list(starts)
+    while nodes[-1] in follow:
+        nodes += follow[nodes[-1]]
+    return np.array(nodes, dtype=np.int64)
+
+
 #: modulus of indentation over shear modulus of a body that keeps its volume
 INDENTATION = 4.0
 #: what an edge of contact from the nodes' `reach` is too far out, in spacings of nodes
@@ -29,11 +55,8 @@ SHARES = {2: np.array([0.5, 0.5]), 3: np.array([1.0, 1.0, 4.0]) / 6.0}
 
 @dataclass(frozen=True, eq=False)
 class Pad:
-    """Pad nodes of a mesh, their edges as indices into them, and which of them may touch (those
-    not on the bone).
-
-    `nodes` (P,) mesh numbers; `edges` (K, 2|3) indices into `nodes`: start, end[, middle]; `free`
-    (P,) bool.
+    """Pad nodes of a mesh: mesh numbers `nodes` (P,), `edges` (K, 2|3) as indices into them: start, end[,
+    middle], and which may touch (those not on the bone), `free` (P,) bool.
     """
 
     nodes: Ints
@@ -57,7 +80,7 @@ class Pad:
         return float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
 
     def facing(self, position: Floats) -> Any:
-        """Which segments (S,) look down."""
+        """Segments that face down, (S,) bool."""
         return np.diff(position[self.segments, 0], axis=1)[:, 0] > 0.0
 
     def fold(self, position: Floats, touching: Any, down: Any) -> float | None:
@@ -65,9 +88,7 @@ class Pad:
         return fold(position, self.segments, touching, down)
 
     def length(self, x: Floats) -> Floats:
-        """Tributary length of every node projected on x, where the outline faces down, in mm: (...,
-        P) for x (..., P).
-        """
+        """Tributary length on x where the outline faces down, in mm: (..., P) for x (..., P)."""
         rows = x.reshape(-1, x.shape[-1])
         width = np.maximum(rows[:, self.edges[:, 1]] - rows[:, self.edges[:, 0]], 0.0)
         shared = width[:, :, None] * self.shares
@@ -85,9 +106,7 @@ class Pad:
         return of, 2 * moved, value
 
     def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
-        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node,
-        value).
-        """
+        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node, value)."""
         start, end = self.edges[:, :1], self.edges[:, 1:2]
         facing = (x[end] > x[start]) * self.shares
         of = np.broadcast_to(self.edges, facing.shape).ravel()
@@ -106,11 +125,10 @@ class Pad:
         return np.asarray(np.bincount(ends, lengths, x.size) / np.maximum(sides, 1.0))
 
     def contact_widths(self, position: Floats, reach: Floats) -> tuple[float, float]:
-        """Overall and real contact width (mm) of nodes at (P, 2) with this `reach` (P,): from the first
-        to the last edge of contact, and the sum of what lies between edges.
+        """Overall and real contact width (mm) of nodes at (P, 2) with this `reach` (P,).
 
-        Between a node that touches and one that does not, contact ends where the reach, linear between
-        them, is zero, less `OVERSHOT` of their distance, or of less where little touches beside the node.
+        Between a node that touches and one that does not, contact ends where the linear reach is zero, less
+        `OVERSHOT` of their distance, or of less where little touches beside the node.
         """
         x = position[:, 0]
         a, b = self.segments[x[self.segments[:, 1]] > x[self.segments[:, 0]]].T
@@ -221,9 +239,7 @@ def make_pad(mesh: Mesh) -> Pad:
 
 
 def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
-    """Pad nodes (P,), its edges or faces by their places among them, and which follow no bone (P,);
-    raises InputError where no outer side belongs to the pad.
-    """
+    """Pad nodes (P,), edges or faces among them, and who follow no bone (P,); InputError without a pad."""
     of, side = (mesh.edges_of, "edge") if mesh.dim == 2 else (mesh.faces_of, "face")
     sides = of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
     if not len(sides):
@@ -236,9 +252,7 @@ def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
 
 @dataclass(frozen=True)
 class SurfaceState:
-    """The surface below (or above) the pad nodes: vertical gap, gap along the normal, slope and
-    curvature, all (P,).
-    """
+    """The surface below (or above) the pad nodes: gap, normal gap, slope, curvature, all (P,)."""
 
     gap: Floats
     slope: Floats
@@ -260,9 +274,7 @@ class SurfaceState:
 
 
 def surface_state(surface: Any, position: Floats) -> SurfaceState:
-    """Surface frame at current node positions (P, dim); `surface` has y set, so that h(x) =
-    surface.y + surface.height(x).
-    """
+    """Surface frame at node positions (P, dim); h(x) = surface.y + surface.height(x)."""
     x = position[:, 0]
     if surface.is_flat:
         zero = np.zeros_like(x)

@@ -31,11 +31,8 @@ QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Pad nodes of a mesh of hexahedra, their faces as indices into them, and which of them may
-    touch (those not on the bone).
-
-    `nodes` (P,) mesh numbers; `faces` (K, 4|9) indices into `nodes`, counter-clockwise seen from
-    outside; `free` (P,) bool.
+    """Pad nodes of a mesh of hexahedra: mesh numbers `nodes` (P,), `faces` (K, 4|9) as indices into them,
+    counter-clockwise from outside, and which may touch (those not on the bone), `free` (P,) bool.
     """
 
     nodes: Ints
@@ -57,9 +54,7 @@ class Skin:
         return first, second
 
     def tributary(self, position: Floats) -> Floats:
-        """Tributary area of every node projected on the display, where the skin faces down, in
-        mm2: (..., P) for positions (..., P, 3).
-        """
+        """Tributary area on the display where the skin faces down, mm2: (..., P) for (..., P, 3)."""
         first, second = self._ways(position)
         area = np.maximum(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0], 0.0)
         shared = np.einsum("...kg,gm->...km", area, self._gauss[0])
@@ -69,9 +64,7 @@ class Skin:
         return np.asarray(found.reshape(position.shape[:-1]))
 
     def tributary_gradient(self, position: Floats) -> tuple[Ints, Ints, Floats]:
-        """Derivative of the tributary areas, as triplets (node, moved unknown, value); unknown 3 j
-        + a is component a of node j.
-        """
+        """Derivative of the tributary areas as triplets (node, moved unknown 3 j + a, value)."""
         first, second = self._ways(position)
         facing = first[..., 0] * second[..., 1] > first[..., 1] * second[..., 0]
         value, slope = self._gauss
@@ -109,21 +102,17 @@ class Skin:
         return np.stack([first, about, opposite])[:, found]
 
     def spacing_at(self, position: Floats) -> Floats:
-        """How far the nodes are from their neighbours (P,) in mm, projected on the display: the shorter
-        way of the two, which crosses the ridges of a pad.
-        """
+        """Distance of nodes from their neighbours (P,) in mm on the display: the shorter of the two ways."""
         before, node, after = self._rows
         flat, found = position[:, [0, 2]], np.full(self.nodes.size, self.spacing(position))
         np.minimum.at(found, node, 0.5 * np.linalg.norm(flat[after] - flat[before], axis=1))
         return found
 
     def areas(self, position: Floats, reach: Floats) -> tuple[float, float]:
-        """Gross and real contact area (mm2) of nodes at (P, 3) with this `reach` (P,): that of the
-        convex hull of what touches, and of all that touches.
+        """Gross (convex hull) and real contact area (mm2) of nodes at (P, 3) with this `reach` (P,).
 
-        Every face between four nodes consists of four triangles around its middle; contact ends on a
-        line across those in which the linear reach changes its sign, less `OVERSHOT` of the nodes' distance
-        across that line, or of less where little touches around the face.
+        Every face between four nodes is four triangles around its middle; contact ends where the linear reach
+        changes sign, less `OVERSHOT` of the distance across, or of less where little touches around.
         """
         reach = widened(reach, self._rows)
         corners = np.stack([position[:, 0], position[:, 2], reach], axis=1)[self._quarters]
@@ -152,7 +141,7 @@ class Skin:
         return float(np.median(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)))
 
     def facing(self, position: Floats) -> Any:
-        """Which faces (K,) look down at their centre."""
+        """Faces that face down at their centre, (K,) bool."""
         _, slope = shape_functions(self.faces.shape[1], np.zeros((1, 2)))
         flat = position[self.faces][..., [0, 2]]
         first, second = (np.einsum("kma,m->ka", flat, slope[0, :, i]) for i in (0, 1))

@@ -1,5 +1,4 @@
-"""Rigid counter-surfaces: height, slope and curvature of the outline, friction coefficient,
-insulator.
+"""Rigid counter-surfaces: height, slope and curvature of the outline, friction coefficient, insulator.
 
 A surface is a function height(x) in mm; the finger is above it. The methods give the UNSHIFTED
 profile: the scene adds `y` (mm), and where `y` is None chooses it so that the smallest vertical
@@ -64,9 +63,7 @@ Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None",
 
 
 class RigidSurface(Checked):
-    """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`,
-    `insulator`.
-    """
+    """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`, `insulator`."""
 
     friction: float | Rows
     y: float | None
@@ -104,8 +101,7 @@ class RigidSurface(Checked):
 
     @property
     def friction_jumps(self) -> Array:
-        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from
-        there on.
+        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on.
 
         >>> Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.0, 0.6]]).friction_jumps.tolist()
         [[2.0, 0.5, 0.6]]
@@ -177,8 +173,7 @@ class Flat(_Level):
 
 @dataclass(frozen=True)
 class Display(_Level):
-    """A level display: an insulator over an electrode, by default the film of Table 2 (0.09 mm,
-    eps_r 3.35).
+    """A level display: an insulator over an electrode, by default the film of Table 2 (0.09 mm, eps_r 3.35).
 
     `electrodes` are rows [from, to, share] of electrodes that end, in mm, from left to right with gaps
     between them, each at its share (-1 to 1) of the scene's voltage; None is one without end.
@@ -254,8 +249,7 @@ class Sinusoid(RigidSurface):
 
 @dataclass(frozen=True, eq=False, init=False)
 class Profile(RigidSurface):
-    """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond
-    the ends.
+    """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond the ends.
 
     x must increase; at least two points (kept as `x` and `samples`). Between two samples the
     height stays between their heights, its slope is continuous, its curvature jumps at samples.
@@ -293,9 +287,7 @@ class Profile(RigidSurface):
         y: float | None = None,
         insulator: Layer | None = None,
     ) -> Profile:
-        """The profile in a file with the header `x,height` and one point (mm) in each further
-        line.
-        """
+        """The profile in a file with the header `x,height` and one point (mm) in each further line."""
         x, height = read_columns(Path(path), ["x", "height"], "surface.file")
         return cls(x, height, friction, y, insulator)
 
@@ -307,9 +299,7 @@ class Profile(RigidSurface):
 
     @cached_property
     def _cubics(self) -> Array:
-        """Coefficients (4, pieces) of the powers 3, 2, 1, 0 of the distance from a piece's left
-        end.
-        """
+        """Coefficients (4, pieces) of the powers 3, 2, 1, 0 of the distance from a piece's left end."""
         from scipy.interpolate import PchipInterpolator
 
         with np.errstate(over="ignore"):  # slopes next to nothing have infinite inverses, and so vanish

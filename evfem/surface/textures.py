@@ -100,9 +100,7 @@ class Grating(RigidSurface):
         set_frozen(self, groove_width=groove, wall_width=wall)
 
     def _wall(self, x: Array) -> tuple[Array, Array, Array]:
-        """Place s (...) on the wall, 0 on ridges and 1 in grooves, whether it is on a wall, and
-        the sign (...) of ds/dx.
-        """
+        """Place s (...) on the wall, 0 on ridges, 1 in grooves; whether on a wall; sign (...) of ds/dx."""
         assert self.groove_width is not None
         assert self.wall_width is not None
         from_ridge = x - self.period * (np.round(np.real(x) / self.period - self.phase) + self.phase)
@@ -171,7 +169,7 @@ class SelfAffine(RigidSurface):
 
     @property
     def _waves(self) -> range:
-        """How many times each wave fits into the period."""
+        """Number of periods of each wave in the period of the surface."""
         assert self.longest is not None
         tiny = 1e-9  # a period of 10 mm has 50 waves of 0.2 mm, whatever the rounding
         first = int(np.ceil(self.period / self.longest * (1.0 - tiny)))

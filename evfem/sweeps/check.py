@@ -30,7 +30,7 @@ from evfem.solver.condensation import other_solver
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
 AGREE = 1e-3
 #: first rates of drag beside a scene's own, as shares of it, and by how much an input is changed
-HOLDS, HAIR = (0.25, 4.0), 1e-9
+HOLDS, PERTURBATION = (0.25, 4.0), 1e-9
 #: an indentation (mm) below which differences are no longer relative to it
 SMALL = 0.01
 
@@ -68,11 +68,27 @@ class Checked:
 
 
 def check(scene: Scene | str | Path) -> Checked:
-    """Run a scene, or the scene file at a path, by several ways and compare the ends; takes some five times
-    as long as the scene.
+    """Run a scene in several ways and compare the ends; takes some five times as long as the scene.
 
-    Raises InputError for what is no scene, NotConverged where the scene itself does not come to its end.
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file.
 
+    Returns
+    -------
+    Checked
+        A row per run; `agrees` is true if all ends agree.
+
+    Raises
+    ------
+    InputError
+        The input is no scene.
+    NotConverged
+        The scene itself has no end.
+
+    Examples
+    --------
     >>> import evfem as ev
     >>> pad, press = ev.FingerPad(resolution="coarse"), ev.Press(indentation=0.1, steps=1)
     >>> scene = ev.Scene(pad, ev.Display(), motion=[press])
@@ -112,7 +128,7 @@ def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
         if name:
             yield f"sparse solver {name}", scene
     if (changed := _changed(scene)) is not None:
-        yield f"an input changed by {HAIR:g}", changed
+        yield f"an input changed by {PERTURBATION:g}", changed
 
 
 def _in_twice(motion: Any) -> Any:
@@ -126,7 +142,7 @@ def _changed(scene: Scene) -> Scene | None:
     for i, motion in enumerate(scene.motion):
         for name in ("indentation", "force", "gap", "distance", "voltage"):
             if isinstance(value := getattr(motion, name, None), float | int) and value:
-                other = replace(motion, **{name: value * (1.0 + HAIR)})
+                other = replace(motion, **{name: value * (1.0 + PERTURBATION)})
                 return replace(scene, motion=(*scene.motion[:i], other, *scene.motion[i + 1 :]))
     return None
 

@@ -21,14 +21,50 @@ import tomli_w
 
 from evfem.common.checks import instance, real, set_frozen
 from evfem.errors import InputError, quoted, unknown
+from evfem.scene import schema as scenes
 from evfem.scene.file import read_text, tables_of
 from evfem.scene.format import SceneTable, names
 from evfem.scene.keys import VERSION, at, read, shown
 from evfem.scene.scene import Scene
-from evfem.scene.written import dump
+from evfem.scene.schema import DRAFT, Schema, Section, section
+from evfem.scene.serialiser import dump
 from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import Distribution, Normal, Samples, Uniform
+
+
+def sections() -> list[Section]:
+    """All tables of a sweep file but those of its scene."""
+    return [
+        section("", SweepTable),
+        section("samples", Samples),
+        section("samples.parameters.KEY", DistributionTable),
+    ]
+
+
+def schema() -> Schema:
+    """The JSON schema of a sweep file.
+
+    >>> made = schema()
+    >>> made["required"], sorted(made["properties"]["samples"]["properties"])
+    (['version', 'scene'], ['count', 'method', 'parameters', 'seed'])
+    """
+    top, samples, distribution = sections()
+    scene = scenes.schema()
+    definitions = scene.pop("definitions") | {"distribution": distribution.schema()}
+    tables = {name: table for name, table in scene["properties"].items() if name != "version"}
+    needed = [name for name in scene["required"] if name != "version"]
+    table = {"type": "object", "additionalProperties": False, "properties": tables, "required": needed}
+    # keys of distributions may be dotted, which makes tables in tables
+    told = {key.name: key.meaning for key in (*top.keys, *samples.keys)}
+    parameters = {"type": "object", "description": told["parameters"]}
+    made = top.schema(
+        version={"const": VERSION, "description": told["version"]},
+        scene={"description": told["scene"], "anyOf": [{"type": "string"}, table]},
+        samples={"description": told["samples"], **samples.schema(parameters=parameters)},
+    )
+    return {"$schema": DRAFT, "title": "evfem sweep", **made, "definitions": definitions}
+
 
 #: most points of a sweep
 MOST_POINTS = 100_000
@@ -213,9 +249,7 @@ def put_in(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def check_output(output: Any, motions: int) -> None:
-    """InputError unless `output` is COLUMN.STATISTIC or COLUMN.STATISTIC.N of a scene with so many
-    motions.
-    """
+    """InputError unless `output` is COLUMN.STATISTIC[.N] of a scene with so many motions."""
     words = output.split(".") if isinstance(output, str) else []
     columns = [name for name in (*COLUMNS, *SPATIAL) if name != "motion"]
     allowed = f"COLUMN.STATISTIC, STATISTIC one of {', '.join(STATISTICS)}, and .N for motion N alone"

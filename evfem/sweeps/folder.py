@@ -1,11 +1,10 @@
 """What a sweep leaves on disk: a file per point, one table of all, and how they came about.
 
-A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on,
-or one changed in other points, finds it again. Every file is written whole or not at all. The
-table is `sweep.csv` (and `sweep.parquet` where pyarrow is installed), a row per point;
-`sweep.json` has the provenance, from the start, so that the folder can tell which sweep was its
-last. Only files that a sweep wrote are ever replaced or removed: `.evfem-sweep` lists their names
-(`Listed`), a point's file says so itself.
+A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on, or one
+changed in other points, finds it again. Every file is written whole or not at all. The table is `sweep.csv`
+(and `sweep.parquet` where pyarrow is installed), a row per point; `sweep.json` has the provenance, from the
+start, so that the folder can tell which sweep was its last. Only files that a sweep wrote are ever replaced
+or removed: `.evfem-sweep` lists their names (`Manifest`), a point's file says so itself.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from evfem.common.listed import Listed
+from evfem.common.manifest import Manifest
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.common.tables import csv_text
 from evfem.errors import InputError
@@ -39,10 +38,7 @@ STATUS = ("done", "refused", "not_converged", "failed")
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a point: `status` done, refused (by the scene reader), not_converged or
-    failed, the outputs of a point that is done, and its message: why it is not, or what its result
-    warns of.
-    """
+    """What became of a point: done, refused, not_converged or failed, its outputs and its message."""
 
     status: str
     seconds: float
@@ -51,17 +47,13 @@ class Answer:
 
     @property
     def final(self) -> bool:
-        """Whether computing it again would give the same: not so where a process died or the
-        memory ended.
-        """
+        """Whether computing it again would give the same: not so where a process died or the memory ended."""
         return self.status != "failed"
 
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """A folder of a sweep. `resume` keeps the points of another one in it, `overwrite` removes all
-    points.
-    """
+    """A folder of a sweep. `resume` keeps the points of another one in it, `overwrite` removes all points."""
 
     path: Path
     resume: bool = False
@@ -79,7 +71,7 @@ class SweepFolder:
         """
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
-            listed, points = self._listed, self._points()
+            listed, points = self._manifest, self._points()
             present = [name for name in (TABLE, PARQUET, PROVENANCE, POINTS) if (self.path / name).exists()]
             refuse_others(self.path / MANIFEST, present, "a sweep")
             _refuse_no_points(points)
@@ -96,8 +88,8 @@ class SweepFolder:
                     file.unlink()
 
     @cached_property
-    def _listed(self) -> Listed:
-        return Listed(self.path / MANIFEST, OURS)
+    def _manifest(self) -> Manifest:
+        return Manifest(self.path / MANIFEST, OURS)
 
     def _points(self) -> list[Path]:
         """The files in the folder of the points that have the name of one."""
@@ -134,16 +126,16 @@ class SweepFolder:
 
     def write_table(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
         """The table of all points so far."""
-        with self._listed.writing(self.path / TABLE):
+        with self._manifest.writing(self.path / TABLE):
             write_text(self.path / TABLE, sweep_csv(columns, rows))
         if find_spec("pyarrow") is not None:
             file = self.path / PARQUET
-            with self._listed.writing(file), replacing(file) as temporary:
+            with self._manifest.writing(file), replacing(file) as temporary:
                 _write_parquet(temporary, columns, rows)
 
     def write_provenance(self, provenance: Mapping[str, Any]) -> None:
-        """How the table came about."""
-        with self._listed.writing(self.path / PROVENANCE):
+        """Provenance of the table."""
+        with self._manifest.writing(self.path / PROVENANCE):
             write_text(self.path / PROVENANCE, json.dumps(provenance, indent=1, allow_nan=False) + "\n")
 
 

@@ -1,6 +1,4 @@
-"""Run a sweep: many scenes side by side, each recorded as soon as it is finished, in one table at
-the end.
-"""
+"""Run a sweep: many scenes side by side, each recorded as soon as it is finished, in one table at the end."""
 
 from __future__ import annotations
 
@@ -8,7 +6,7 @@ import math
 import sys
 import time as clock
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,14 +21,65 @@ from evfem.common.notices import LOG
 from evfem.common.pools import Died, Pool, open_pool
 from evfem.common.storage import alone_in, write_text
 from evfem.common.tables import frame
-from evfem.errors import InputError, NotConverged, readable, unknown
+from evfem.errors import InputError, NotConverged, quoted, readable, unknown
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.finger.fingertip import Fingertip
 from evfem.scene.file import loads
+from evfem.scene.scene import Scene
+from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS
 from evfem.simulation.provenance import origin
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder, sweep_csv
-from evfem.sweeps.units import Units, table_units, units_of
+
+Units = Mapping[str, str]
+#: what a plane finger with a depth has of the columns in three dimensions
+AREAS = ("contact_area", "real_contact_area")
+OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name]["unit"] for name in AREAS}}
+
+
+def units_of(scene: Scene) -> Units:
+    """Unit of each column of which a sweep of such scenes can have outputs.
+
+    >>> from evfem.scene.scene import default_scene
+    >>> units_of(default_scene())["normal_force"]
+    'N/mm'
+    """
+    finger = scene.finger
+    if isinstance(finger, Fingertip) or (isinstance(finger, MeshedFinger) and finger.mesh().dim == 3):
+        return SPATIAL_UNITS
+    return UNITS if scene.depth is None else OVER_DEPTH
+
+
+def table_units(
+    outputs: Sequence[str], parameters: Sequence[str], found: Collection[Units]
+) -> dict[str, str]:
+    """Unit of each output, and of forces among the parameters, where `found` are the units of the
+    scenes, each kind once.
+
+    Raises InputError for an output that not every scene has, or whose unit is not that of all.
+
+    >>> table_units(["normal_force.last"], ["motion.0.force"], [OVER_DEPTH])
+    {'normal_force.last': 'N', 'motion.0.force': 'N/mm'}
+    >>> table_units(["contact_area.last"], [], [UNITS])
+    Traceback (most recent call last):
+    evfem.errors.InputError: outputs: given "contact_area.last" of a finger without it; allowed: \
+areas where every finger has a depth or is one in three dimensions
+    """
+    units = {}
+    for output in outputs:
+        kinds = {one.get(output.split(".")[0]) for one in found}
+        if None in kinds:
+            allowed = "areas where every finger has a depth or is one in three dimensions"
+            raise InputError("outputs", f"{quoted(output)} of a finger without it", allowed)
+        if len(kinds) > 1:
+            given = f"{output} in {' and '.join(sorted(map(str, kinds)))}"
+            raise InputError("finger.depth", given, "a depth for every finger in the plane, or for none")
+        units[output] = str(kinds.pop())
+    force = "N" if SPATIAL_UNITS in found else "N/mm"
+    return units | {key: force for key in parameters if key.endswith(".force")}
+
 
 #: the table is written anew after so many seconds
 EVERY = 5.0
@@ -39,9 +88,7 @@ Job = tuple[str, str, tuple[str, ...]]  # scene as text, folder of its paths, ou
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """The table of a sweep: `rows` in the order of the points, with the keys `columns`, and
-    provenance. `units` has those of the outputs: over the depth where the scenes have one.
-    """
+    """The table of a sweep: `rows` in the order of the points, keys `columns`, and provenance."""
 
     columns: tuple[str, ...]
     rows: list[dict[str, Any]]
@@ -58,9 +105,7 @@ class SweepResult:
         return values
 
     def table(self) -> Any:
-        """A row for each point: a `pandas.DataFrame`, or where pandas is not installed a numpy
-        record array.
-        """
+        """A row for each point: a `pandas.DataFrame`, without pandas a numpy record array."""
         return frame({name: self[name] for name in self.columns})
 
     def to_csv(self, path: str | Path) -> None:
@@ -68,7 +113,7 @@ class SweepResult:
         write_text(path, sweep_csv(self.columns, self.rows))
 
     def __repr__(self) -> str:
-        """How many points, and what became of them."""
+        """Numbers of points by status."""
         return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
 
 
@@ -82,19 +127,40 @@ def sweep(
     scheduler: str | None = None,
     progress: bool = False,
 ) -> SweepResult:
-    """Run every point of a sweep (`Sweep`, or the path of a sweep file) and return the table of
-    all.
+    """Run every point of a sweep.
 
-    The folder `out` gets `sweep.csv`, `sweep.parquet` where pyarrow is installed, `sweep.json` and
-    a file per point; what is finished there is not computed again. A folder with points of another
-    sweep is refused, unless `resume` says to keep them or `overwrite` to remove all points.
-    `workers` processes (None: one per core; 1: none but this one) or the Dask cluster at the
-    address `scheduler` ("local" starts one) do the work; the numbers are the same. A point that
-    the scene reader refuses, that does not converge or that fails otherwise is a row with its
-    status and message; the message of one that is done is what its result warns of. Raises
-    InputError if no point at all is a valid scene, StorageError when the disk refuses or another
-    sweep is at work in the folder.
+    Parameters
+    ----------
+    plan
+        A `Sweep`, or the path of a sweep file.
+    out
+        Folder for `sweep.csv`, `sweep.parquet` (with pyarrow), `sweep.json` and a file per point.
+        Points that are finished there are not computed again.
+    resume, overwrite
+        Keep or remove the points of another sweep in the folder, which is refused otherwise.
+    workers
+        Number of processes; None: one per core, 1: this process only.
+    scheduler
+        Address of a Dask cluster in place of the processes; "local" starts one. The numbers are the
+        same.
+    progress
+        Show a progress bar.
 
+    Returns
+    -------
+    SweepResult
+        A row per point. One that is refused, does not converge or fails has its status and message;
+        the message of one that is done has the warnings of its result.
+
+    Raises
+    ------
+    InputError
+        No point is a valid scene.
+    StorageError
+        The folder cannot be written, or another sweep is running in it.
+
+    Examples
+    --------
     >>> from evfem.sweeps.file import loads as read
     >>> text = '''
     ... version = 1
@@ -183,7 +249,7 @@ class _Run:
         return digest((scene.digest(), self.plan.outputs, evfem.__version__))
 
     def waiting(self) -> dict[str, Job]:
-        """What is still to be computed; equal points are computed once."""
+        """Points to compute; equal points are computed once."""
         folder, outputs = str(self.plan.folder), tuple(self.plan.outputs)
         jobs = zip(self.keys, self.points, strict=True)
         return {key: (point.text, folder, outputs) for key, point in jobs if key not in self.answers}
@@ -282,9 +348,7 @@ def answered(text: str, folder: str, ask: Callable[[Result], dict[str, float | N
 
 
 def output(result: Result, name: str) -> float | None:
-    """COLUMN.STATISTIC of a result, or COLUMN.STATISTIC.N over its motion N; None where it is no
-    number.
-    """
+    """COLUMN.STATISTIC of a result, or COLUMN.STATISTIC.N over its motion N; None where it is no number."""
     column, statistic, *motion = name.split(".")
     values = np.asarray(getattr(result, column), dtype=float)
     if motion:

@@ -1,8 +1,7 @@
 """Random parameters: distributions, and samples of them drawn at random or as a latin hypercube.
 
-Every parameter has a random stream of its own, made of the seed and its name: the values of one do
-not change when another is added or moved. Drawn at random, a longer sample begins with the shorter
-one.
+Every parameter has a random stream of its own, made of the seed and its name: the values of one do not change
+when another is added or moved. Drawn at random, a longer sample begins with the shorter one.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ AMPLITUDE = "of the sine with the same root mean square"
 
 @dataclass(frozen=True)
 class Knobs(Checked):
-    """What the generators share; `hurst` and `beta`, None: by the irregularity."""
+    """Common parameters of the generators; `hurst` and `beta`, None: by the irregularity."""
 
     frequency: Annotated[float, between(0.05, 10.0, "1/mm"), "of the first wave, or the lowest"] = 0.5
     amplitude: Annotated[float, number("mm above 0, up to 1", Within(0.0, 1.0, True), "mm"), AMPLITUDE] = 0.02

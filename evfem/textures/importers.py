@@ -65,10 +65,9 @@ def header_of(path: Path) -> list[str]:
 class Image(Heights, kind="image"):
     """A line through a grey image, along its width: white lies `depth` above black.
 
-    Pictures of 8 and 16 bits, and those of floats and longer integers, whose smallest and largest
-    value are then black and white (`evfem.common.pictures`); colours are turned to grey, transparent
-    points are gaps. How deep something is cannot be read off a picture, and the provenance says that
-    `depth` was set.
+    Pictures of 8 and 16 bits, and those of floats and longer integers, whose smallest and largest value are
+    then black and white (`evfem.common.pictures`); colours are turned to grey, transparent points are gaps.
+    How deep something is cannot be read off a picture, and the provenance says that `depth` was set.
     """
 
     pixel: Annotated[float, number("a width above zero", POSITIVE, "mm"), "width of a pixel of an image"]
@@ -126,7 +125,7 @@ class Table(Heights, kind="csv"):
 
 
 def _quantity_of(names: list[str]) -> str | None:
-    """What columns of these names are."""
+    """Kind of columns with these names."""
     usual = [OTHER_NAMES.get(name, name) for name in names]
     return next((quantity for quantity, (header, _) in QUANTITIES.items() if usual == header), None)
 
@@ -145,7 +144,7 @@ def _said(table: Headed, unit: str | None) -> list[str]:
 
 
 def _scale(name: str, own: str | None, unit: str | None) -> float:
-    """What makes mm of the numbers of a column, or 1/mm of a frequency."""
+    """Factor from the numbers of a column to mm, or of a frequency to 1/mm."""
     units = dict.fromkeys(("1/mm", "1", "-", "mm^-1"), 1.0) if name in PURE else LENGTHS
     found = own or (unit if name not in PURE else None) or next(iter(units))
     if found not in units:

@@ -53,7 +53,7 @@ def names() -> list[str]:
 
 
 def about(name: str) -> str:
-    """What a reference texture is, in a few words."""
+    """Description of a reference texture."""
     return (REFERENCES.get(name) or FRICTIONS[name])[0]
 
 

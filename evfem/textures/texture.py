@@ -1,8 +1,8 @@
 """A texture, and its files: a `.json` beside its `.csv`, or a folder with both.
 
 What is known over x is either the height of a surface or its friction coefficient. A recording of
-vibrations gives neither: it is kept as what it is, the spectrum of the friction over the spatial
-frequency, and turned into a friction profile with phases that are drawn and a size that is said.
+vibrations gives neither: it is stored as the spectrum of the friction over the spatial frequency,
+and converted to a friction profile with random phases and a given rms.
 The `.json` has exactly the keys of `KEYS`; the licence is one of them.
 """
 
@@ -100,7 +100,7 @@ class Texture:
 
     @property
     def length(self) -> float:
-        """What the rows cover (mm), one period of a texture that repeats; 0 for a spectrum."""
+        """Length of the rows (mm), one period of a texture that repeats; 0 for a spectrum."""
         if self.quantity == "friction_spectrum":
             return 0.0
         return float(self.x[-1] - self.x[0]) if self.period is None else self.period
@@ -132,7 +132,7 @@ class Texture:
         return x, values, 2.0 * float(self.x[-1] - self.x[0])
 
     def document(self, data: str) -> dict[str, Any]:
-        """What stands in its `.json`, whose rows are in the file `data`."""
+        """Content of its `.json`, whose rows are in the file `data`."""
         header, units = QUANTITIES[self.quantity]
         return {
             "format": FORMAT,
@@ -148,7 +148,7 @@ class Texture:
         }
 
     def rows(self) -> str:
-        """What stands in its `.csv`."""
+        """Content of its `.csv`."""
         header = QUANTITIES[self.quantity][0]
         return csv_text([header, *zip(self.x.tolist(), self.values.tolist(), strict=True)])
 
@@ -157,7 +157,7 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
     """Write a `.json` and its `.csv`, or both into a folder (a path without ending).
 
     The `.json` is written last: without it there is no texture. Returns both paths. Raises InputError
-    where the `.csv` is somebody's and not that of a texture, as of a measurement called the same.
+    if the `.csv` was not written by evfem, such as a measurement of the same name.
 
     >>> wave = Texture("wave", "drawn", [0.0, 1.0], [0.0, 0.01], "CC0-1.0", period=2.0)
     >>> [path.name for path in write(wave, "wave.json")], read("wave.json").period

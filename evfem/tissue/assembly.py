@@ -2,11 +2,10 @@ r"""One engine for every weak form: nodal forces :math:`\sum_q w B^T s`, tangent
 :math:`\sum_q w B^T D B`.
 
 The fluxes s = df/d(v, grad v, theta(v)) of a form are its values at unit test functions
-(`evfem.tissue.fields`); a complex step on each part of (u, grad u, theta) gives their derivatives
-D. The rows B take the displacements of a cell's nodes to the parts. Where theta = Pi ln J is not
-linear in the displacements, the curvature of ln J joins the tangent. Arrays: C cells or facets, n
-nodes each, Q quadrature points, S samples of ln J, K parts, m of them per component; N nodes, E
-cells of the mesh.
+(`evfem.tissue.forms`); a complex step on each part of (u, grad u, theta) gives their derivatives D. The rows
+B take the displacements of a cell's nodes to the parts. Where theta = Pi ln J is not linear in the
+displacements, the curvature of ln J joins the tangent. Arrays: C cells or facets, n nodes each, Q quadrature
+points, S samples of ln J, K parts, m of them per component; N nodes, E cells of the mesh.
 """
 
 from __future__ import annotations
@@ -20,15 +19,13 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.tensor import Array, cofactor, complex_step, det, identity, trace, transpose
-from evfem.tissue.fields import Field, Integrand, Parts, fluxes, fluxes_at_once
+from evfem.tissue.forms import Field, Integrand, Parts, fluxes, fluxes_at_once
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space, scatter
 
 
 def volume_change(H: Array) -> Array:
-    """J - 1 = det(1 + H) - 1 of H (dim, dim, ...), with the digits that J loses where it is nearly
-    1.
-    """
+    """J - 1 = det(1 + H) - 1 of H (dim, dim, ...), with the digits that J loses where it is nearly 1."""
     middle: Array | float = 0.0 if len(H) == 2 else trace(cofactor(H))
     return trace(H) + (middle + det(H))
 
@@ -82,9 +79,7 @@ class VolumeMeasure:
         return self.gradient @ np.ascontiguousarray(self.slope(H).transpose(2, 3, 1, 0))
 
     def pressure_forces(self, H: Floats, q: Floats) -> Floats:
-        """Nodal forces (C, n, dim) of q dtheta(v), with grad u (dim, dim, C, S) at the samples and
-        the weighted q (C, Q).
-        """
+        """Nodal forces (C, n, dim) of q dtheta(v), from grad u (dim, dim, C, S), weighted q (C, Q)."""
         stress = (self.at_samples(q) * transpose(self.slope(H))).transpose(2, 3, 0, 1)
         return np.swapaxes(self.to_gradient, 1, 2) @ stress.reshape(len(q), -1, len(H))
 
@@ -94,9 +89,7 @@ class VolumeMeasure:
         return flat if self.projection is None else self.projection @ flat
 
     def curvature(self, push: Floats, q: Floats) -> Floats:
-        """Second derivative of ln J, -F^-T grad(du)^T F^-T : grad v, weighted with q (C, Q), as
-        (C, n, dim, n, dim).
-        """
+        """Second derivative of ln J, -F^-T grad(du)^T F^-T : grad v, times q (C, Q): (C, n, dim, n, dim)."""
         C, S, n, dim = push.shape
         flat = push.reshape(C, S, n * dim)
         products = np.swapaxes(flat, 1, 2) @ (-self.at_samples(q)[..., None] * flat)
@@ -105,10 +98,9 @@ class VolumeMeasure:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Quadrature points of some cells or facets: `cells` (C,) they lie in, `nodes` (C, n) of
-    those, shape functions `value` (C, Q, n) with `gradient` (C, Q, n, dim), `weight` (C, Q), the
-    place `x` (dim, C, Q); in cells the measure of `volume`, on facets the outward `normal` (dim,
-    C, Q).
+    """Quadrature points of some cells or facets: `cells` (C,) they lie in, `nodes` (C, n) of those, shape
+    functions `value` (C, Q, n) with `gradient` (C, Q, n, dim), `weight` (C, Q), the place `x` (dim, C, Q); in
+    cells the measure of `volume`, on facets the outward `normal` (dim, C, Q).
     """
 
     cells: Ints
@@ -152,9 +144,7 @@ def _flat_rows(gradient: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Parts `x` (K, C, Q) of the displacement, and grad u `sampled` (dim, dim, C, S) where ln J
-    is; no samples where theta is not among the parts.
-    """
+    """Parts `x` (K, C, Q) of u, and grad u `sampled` (dim, dim, C, S) where ln J is, if theta is used."""
 
     x: Floats
     sampled: Floats
@@ -193,7 +183,7 @@ class Integral:
         return values.transpose(2, 3, 0, 1).reshape(-1, C, Q)
 
     def state(self, u: Floats) -> State:
-        """What the form sees of the displacements u (N, dim)."""
+        """Fields of the form at the displacements u (N, dim)."""
         ue, parts = u[self.points.nodes], self.parts
         C, Q, m, _ = self._rows.shape
         x = np.empty((parts.size, C, Q))
@@ -322,9 +312,7 @@ class Integral:
 
 
 class UserIntegral(Integral):
-    """The integral of a user's form. Its tangents are the symmetric part of the exact ones, which
-    are symmetric already if the form has a potential: the solver factorises a symmetric matrix.
-    """
+    """The integral of a user's form; its tangents are the exact ones' symmetric part."""
 
     def cell_tangents(self, u: Floats, pressure: Floats | None = None) -> Floats:
         """(C, n dim, n dim), unknowns ordered (node, component)."""

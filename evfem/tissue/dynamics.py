@@ -24,8 +24,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
-from evfem.tissue.fields import Parts
-from evfem.tissue.forms import deformation_gradient, green_strain, kelvin_voigt, mass
+from evfem.tissue.forms import Parts, deformation_gradient, green_strain, kelvin_voigt, mass
 from evfem.tissue.kernels.blocks import LANES, loops, padded
 from evfem.tissue.laws import split
 from evfem.tissue.pattern import Componentwise, Pattern
@@ -62,9 +61,7 @@ class Dynamics:
         self._strain0: Any = None
 
     def begin(self, u: Floats, velocity: Floats, step: float) -> None:
-        """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N,
-        dim).
-        """
+        """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N, dim)."""
         self.step, self._u0, self._v0 = step, u, velocity
         if step > 0.0 and self.viscosity is not None:
             self._strain0 = self._strain(u)
@@ -73,9 +70,7 @@ class Dynamics:
 
     @cached_property
     def _damping(self) -> Integral:
-        """The Kelvin-Voigt form over the cells that have viscosity; its context is renewed by each
-        step.
-        """
+        """The Kelvin-Voigt form over the cells that have viscosity; its context is renewed by each step."""
         assert self.viscosity is not None
         cells = np.flatnonzero(self.viscosity)
         w = SimpleNamespace(eta=self.viscosity[cells, None], step=self.step, strain0=self._strain0)
@@ -119,7 +114,7 @@ class Dynamics:
         return self.slope * (u - self._u0) / self.step + (1.0 - self.slope) * self._v0
 
     def dissipation(self, u: Floats) -> float:
-        """What the viscous stress dissipates in the step: N mm, in the plane per mm of depth."""
+        """Viscous dissipation in the step: N mm, in the plane per mm of depth."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
         if self.loops is not None:
@@ -135,9 +130,7 @@ class Dynamics:
         return float(0.5 * np.sum(velocity * (self._inertia @ velocity)))
 
     def _strain(self, u: Floats) -> Floats:
-        """Green strain of every damped point: (dim, dim, 1, C, Q) as the form takes it, or in
-        blocks where the compiled loops read it.
-        """
+        """Green strain of damped points: (dim, dim, 1, C, Q) for the form, in blocks for compiled loops."""
         if self.loops is not None:
             blocks, points = self.space.cells.weight.shape[:2]
             dim = self.space.dim
@@ -147,9 +140,7 @@ class Dynamics:
         return green_strain(deformation_gradient(self._damping.field(u)))[:, :, None]
 
     def _request(self, u: Floats) -> tuple[Any, ...]:
-        """What the compiled loops read: the cells, u, viscosity over the step (B, L), strains before
-        the step.
-        """
+        """For the compiled loops: cells, u, viscosity over the step (B, L), strains before the step."""
         assert self.viscosity is not None
         rate = padded(self.viscosity / self.step)
         return self.space.cells, np.ascontiguousarray(u), rate, self._strain0
@@ -159,7 +150,7 @@ DYNAMICS["viscous"] = Dynamics
 
 
 class Inertial(Dynamics, name="inertial"):
-    """Of tissue with mass."""
+    """Dynamics with mass."""
 
     inertia = True
 

@@ -28,17 +28,17 @@ import numpy as np
 
 from evfem.common.checks import Within, check_fields, number
 from evfem.tensor import Array, ddot, det, identity, inv, outer, transpose
-from evfem.tissue.moduli import (
+from evfem.tissue.ogden import (
     POSITIVE,
     Bulk,
     Density,
     Isotropic,
+    Ogden,
     PoissonOrNone,
     Relaxation,
     bulk_modulus,
     check_volumetric,
 )
-from evfem.tissue.ogden import Ogden
 from evfem.tissue.splitlaw import SplitLaw, split
 
 __all__ = ["LAWS", "LinearElastic", "NeoHookean", "Ogden", "SplitLaw", "Yeoh", "split"]
@@ -62,11 +62,9 @@ def _first_invariant(F: Array) -> Array:
 
 
 class _InvariantLaw:
-    """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln
-    J.
+    """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln J.
 
-    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and
-    `_slopes`.
+    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and `_slopes`.
     """
 
     volume_measure: Literal["log", "trace"] = "log"

@@ -24,10 +24,9 @@ from evfem.common.arrays import Floats, Ints
 
 
 class Pattern:
-    """The upper triangle of a symmetric CSR matrix of `size` rows: `indptr`, `indices` (Z,), the
-    places of its `diagonal` (size,), and the `places` (E, P, dim, dim) of the entries of a cell's
-    P = n (n + 1)/2 node pairs, in arrays of Z + 1 + dim numbers: what is not stored goes to Z, what
-    counts twice behind it.
+    """The upper triangle of a symmetric CSR matrix of `size` rows: `indptr`, `indices` (Z,), the places of
+    its `diagonal` (size,), and the `places` (E, P, dim, dim) of the entries of a cell's P = n (n + 1)/2 node
+    pairs, in arrays of Z + 1 + dim numbers: what is not stored goes to Z, what counts twice behind it.
     """
 
     def __init__(self, nodes: Ints, dim: int) -> None:
@@ -66,9 +65,7 @@ class Pattern:
             self.places[..., a, b], self.places[..., b, a] = upper, lower
 
     def _begin(self, i: Any, t: Any) -> tuple[Any, Any]:
-        """Of the t-th pairs of nodes i the places of their first entries, and how many entries of the
-        nodes' first rows there are.
-        """
+        """Of the t-th node pairs the places of their first entries, and the entries of first rows."""
         dim, before = self.dim, self._pairs[i]
         begin = dim * dim * before - i * (dim * (dim - 1) // 2) + dim * t
         return begin, dim * (self._pairs[i + 1] - before)
@@ -79,9 +76,7 @@ class Pattern:
         return begin + a * row + (b - a - a * (a - 1) // 2)
 
     def _fill(self, second: Ints) -> Ints:
-        """Rows, columns and diagonal of the matrix from the second nodes of all pairs (K,); the number
-        t (K,) of each pair among those of its first node.
-        """
+        """Rows, columns, diagonal of the matrix from all pairs (K,), and the number t (K,) of each pair."""
         dim, count = self.dim, self.size // self.dim
         nodes = np.arange(count, dtype=np.int32)
         first = np.repeat(nodes, np.diff(self._pairs))
@@ -102,9 +97,7 @@ class Pattern:
         return np.zeros(self.indices.size + 1 + self.dim)
 
     def add(self, matrices: Floats, cells: Ints, data: Floats) -> None:
-        """Add symmetric matrices (C, n dim, n dim) of some cells to `data`; a cell may have
-        several.
-        """
+        """Add symmetric matrices (C, n dim, n dim) of some cells to `data`; a cell may have several."""
         C, n, dim = len(matrices), matrices.shape[1] // self.dim, self.dim
         split = matrices.reshape(C, n, dim, n, dim)
         for a, b in np.ndindex(dim, dim):
@@ -112,9 +105,7 @@ class Pattern:
             data += np.bincount(self.places[cells, :, a, b].ravel(), values.ravel(), data.size)
 
     def componentwise(self, matrices: Floats) -> Floats:
-        """The matrices (E, n, n) of all cells, the same for each component and none between two,
-        added up like `zeros`.
-        """
+        """Matrices (E, n, n) of all cells, alike for each component, none between, summed like `zeros`."""
         data, values = self.zeros(), matrices[:, self._first, self._second].ravel()
         for a in range(self.dim):
             data += np.bincount(self.places[..., a, a].ravel(), values, data.size)
@@ -141,9 +132,7 @@ class Pattern:
 
 
 class Componentwise:
-    """Matrices (E, n, n) that each component has for itself and that never change, such as masses:
-    added up once for a pattern.
-    """
+    """Constant matrices (E, n, n) that each component has for itself, as masses: summed for a pattern."""
 
     def __init__(self, matrices: Floats) -> None:
         self.matrices = matrices

@@ -1,9 +1,7 @@
-r"""Displacement spaces: shape functions at quadrature points, and how an element measures its
-volume.
+r"""Displacement spaces: shape functions at quadrature points, and how an element measures its volume.
 
-An element sees the change of volume through `theta`, which stands for :math:`\ln J` in its weak
-form (laws of small strain take the trace of the strain for ln J). The elements differ only in this
-measure:
+An element sees the change of volume through `theta`, which stands for :math:`\ln J` in its weak form (laws of
+small strain take the trace of the strain for ln J). The elements differ only in this measure:
 
 =========  ====================================================  =============================
 element    theta at a quadrature point                           locking at nu -> 1/2
@@ -16,19 +14,15 @@ hex8       ln det of the mean of F over the cell                 no
 hex27p1    L2 projection of ln J onto {1, X, Y, Z} of the cell   no
 =========  ====================================================  =============================
 
-On hexahedra that are no parallelepipeds, ln J at the centroid fails the patch test: there
-:math:`F^{-T}:\nabla v` of a constant F does not integrate to its value at the centroid. The mean
-deformation gradient does, by definition (with the mean shape gradients of Flanagan and Belytschko,
-10.1002/nme.1620170504); on quads the two are the same.
+On hexahedra that are no parallelepipeds, ln J at the centroid fails the patch test; the mean deformation
+gradient does not (mean shape gradients of Flanagan and Belytschko, 10.1002/nme.1620170504).
 
-`theta = Pi ln J(samples)` is linear in ln J, hence
-:math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no unknown is added, the tangent is symmetric
-and the forces have a potential. Arrays: E cells, n nodes per cell, Q quadrature points, S sample
-points of ln J; N nodes; dim dimensions.
+Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J; N nodes; dim dimensions.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -38,10 +32,38 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.hexahedron import EDGES, FACES, PLACES
-from evfem.mesh.mesh import Mesh
+from evfem.mesh.mesh import CELLS, Mesh
 from evfem.tensor import det
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.kernels.blocks import Cells, blocked, loops
+
+#: element -> (mesh kind, order of quadrature, how ln J is sampled)
+ELEMENTS: Mapping[str, tuple[str, int, str]] = {
+    "q1": ("quad", 3, "point"),
+    "q1_fbar": ("quad", 3, "centroid"),
+    "q2": ("quad9", 5, "point"),
+    "q2p1": ("quad9", 5, "linear"),
+    "p2": ("triangle6", 4, "point"),
+    "hex8": ("hexahedron", 3, "mean"),
+    "hex27p1": ("hexahedron27", 5, "linear"),
+}
+
+
+def elements_on(corners: int) -> tuple[str, ...]:
+    """Names of the elements on cells with that many corners (3, 4 or 8).
+
+    >>> elements_on(3), elements_on(4), elements_on(8)
+    (('p2',), ('q1', 'q1_fbar', 'q2', 'q2p1'), ('hex8', 'hex27p1'))
+    """
+    return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].corners == corners)
+
+
+def elements_of_order(order: int) -> tuple[str, ...]:
+    """Names of the elements with cells of that order (1 or 2).
+
+    >>> elements_of_order(1)
+    ('q1', 'q1_fbar', 'hex8')
+    """
+    return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].order == order)
 
 
 def scikit_mesh(mesh: Mesh) -> Any:
@@ -65,9 +87,7 @@ def scikit_mesh(mesh: Mesh) -> Any:
 
 
 def straight_points(mesh: Mesh) -> Floats:
-    """Where the nodes would be if every edge were straight, (N, dim); tells nodes apart whatever
-    the curvature.
-    """
+    """Where the nodes would be if every edge were straight, (N, dim): tells them apart when curved."""
     points = mesh.points.copy()
     if mesh.order == 2 and mesh.corners == 8:
         corner = mesh.points[mesh.cells[:, :8]]
@@ -84,8 +104,7 @@ def straight_points(mesh: Mesh) -> Floats:
 
 
 def nodes_at(points: Floats, places: Floats) -> Ints:
-    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its
-    unknowns.
+    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its unknowns.
 
     Equally many are paired in their order along an oblique line, which is theirs unless two lie
     at one place of it; a search tree finds the others. Raises `RuntimeError` where no point lies
@@ -109,9 +128,7 @@ def nodes_at(points: Floats, places: Floats) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Gradients:
-    """Shape gradients at some points of every cell: in the reference cell, `reference` (Q, n, dim),
-    and `inverse` (E, Q, dim, dim) = d xi / dX of the map to the mesh.
-    """
+    """Shape gradients at points of cells: `reference` (Q, n, dim), `inverse` (E, Q, dim, dim) = d xi / dX."""
 
     reference: Floats
     inverse: Floats
@@ -298,9 +315,7 @@ def shape_gradients(basis: Any) -> Floats:
 
 
 def check_orientation(mesh: Mesh, determinant: Floats) -> None:
-    """Refuse inverted cells by the sign of det dX/dxi (E, Q): scikit-fem takes its absolute value,
-    so they would pass silently.
-    """
+    """Refuse inverted cells by the sign of det dX/dxi (E, Q), of which scikit-fem takes the size."""
     sign = np.sign(determinant)
     bad = np.flatnonzero((sign * np.median(sign, axis=1, keepdims=True) <= 0).any(axis=1))
     if bad.size:

@@ -1,12 +1,10 @@
-"""The split form of a law, which elements with a volume change of their own need, for laws that
-lack it.
+"""The split form of a law, which elements with a volume change of their own need, for laws that lack it.
 
 `split(law, dim)` returns a law that has the form already, and wraps an object that only has `P(F)` or
-`psi(F)` on F (3, 3, ...): its energy at F (d, d, ...) and theta is psi(Fbar) with Fbar =
-exp((theta - ln det F)/d) F, d = 3, or in the plane of plane strain, d = 2, with Fbar33 = 1, so that
-det Fbar = exp(theta). Derivatives come by complex step; where the second derivative of an energy is
-needed, by central differences of sixth order of the complex-step stress. A weak form of grad u and
-theta can be a law too.
+`psi(F)` on F (3, 3, ...): its energy at F (d, d, ...) and theta is psi(Fbar) with Fbar = exp((theta - ln det
+F)/d) F, d = 3, or in the plane of plane strain, d = 2, with Fbar33 = 1, so that det Fbar = exp(theta).
+Derivatives come by complex step; where the second derivative of an energy is needed, by central differences
+of sixth order of the complex-step stress. A weak form of grad u and theta can be a law too.
 """
 
 from __future__ import annotations
@@ -33,8 +31,7 @@ from evfem.tensor import (
     symmetric_power,
     transpose,
 )
-from evfem.tissue.fields import Parts, fluxes
-from evfem.tissue.forms import Form
+from evfem.tissue.forms import Form, Parts, fluxes
 
 #: change of F and theta over which the stress of an energy is differenced
 DIFFERENCE_STEP = 4e-3
@@ -47,7 +44,7 @@ Turn = Callable[[float], tuple[Array, Array]]
 
 @runtime_checkable
 class SplitLaw(Protocol):
-    """What elements ask of a law; `split` gives it to every other law."""
+    """A law in split form, as elements use it; `split` gives it to every other law."""
 
     volume_measure: Literal["log", "trace"]
 
@@ -97,9 +94,7 @@ class UserLaw:
         return complex_step(self.law.psi, Fbar, rank=2)
 
     def split_energy(self, F: Array, theta: Array) -> Array:
-        """W(F, theta) (...) at real F; without `psi`, the work of P along a path from rest to
-        Fbar.
-        """
+        """W(F, theta) (...) at real F; without `psi`, the work of P along a path from rest to Fbar."""
         Fbar = _scaled(F, theta)
         if hasattr(self.law, "psi"):
             return np.asarray(self.law.psi(embed(Fbar)))
@@ -130,9 +125,8 @@ class UserLaw:
 class FormLaw:
     """A weak form of grad u and theta in the split form: its fluxes are S and q.
 
-    Its energy is the work along a path from rest; what it does out of the plane is unknown, so
-    nan. `w` is the form's context, whose place `x` (d, C, Q) says in how many dimensions it is
-    taken.
+    Its energy is the work along a path from rest; what it does out of the plane is unknown, so nan. `w` is
+    the form's context, whose place `x` (d, C, Q) says in how many dimensions it is taken.
     """
 
     volume_measure: Literal["log", "trace"] = "log"
@@ -146,9 +140,7 @@ class FormLaw:
 
     @cached_property
     def shear_modulus(self) -> float:
-        """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u
-        itself.
-        """
+        """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u itself."""
         rest = identity(self.parts.dim, 2), np.zeros((1, 1))
         A, c, k = self.split_tangent(*rest)
         if not all(np.isfinite(part).all() for part in (A, c, k, *self.split_stress(*rest))):
@@ -212,9 +204,8 @@ def plane_modulus(law: SplitLaw, dim: int) -> float:
 
 
 def nearly_incompressible(law: SplitLaw, dim: int, times: float | None = None) -> bool:
-    """Whether a law is at rest so many `times` stiffer against a change of volume than in shear,
-    d2W/dtheta2 / mu; by default so that its pressure is worth an unknown of its own
-    (`evfem.solver.pressure`).
+    """Whether a law is at rest so many `times` stiffer against a change of volume than in shear, d2W/dtheta2
+    / mu; by default so that its pressure is worth an unknown of its own (`evfem.solver.pressure`).
 
     For a neo-Hookean law the ratio is 2 nu / (1 - 2 nu). Laws of small strain never need it: their
     theta is linear in the displacements.
@@ -254,9 +245,7 @@ def _scaled(F: Array, theta: Array) -> Array:
 
 
 def _work(stress: Stress, F: Array, theta: Array) -> Array:
-    """Integral of S : dF + q dtheta from rest along R(t phi) (I + t (U - I)) and t theta, 0 <= t
-    <= 1, where F = R(phi) U.
-    """
+    """Integral of S : dF + q dtheta from rest along R(t phi) (I + t (U - I)), t theta, where F = R(phi) U."""
     U = symmetric_power(mul(transpose(F), F), 0.5)
     turn = _turn_in_plane(F) if len(F) == 2 else _turn_in_space(mul(F, inv(U)))
     eye = identity(len(F), F.ndim - 2)

@@ -21,9 +21,8 @@ from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import Array, complex_step, difference
 from evfem.tissue.assembly import Points, UserIntegral, points_of
-from evfem.tissue.elements import ELEMENTS
-from evfem.tissue.fields import Field, Integrand, Parts, fluxes
-from evfem.tissue.space import Space, scikit_mesh, shape_functions, shape_gradients, shape_values
+from evfem.tissue.forms import Field, Integrand, Parts, fluxes
+from evfem.tissue.space import ELEMENTS, Space, scikit_mesh, shape_functions, shape_gradients, shape_values
 
 #: cells or facets that a form is tried on, size of the trial's random displacements and gradients
 PLACES, SIZE = 16, 0.1
@@ -33,9 +32,7 @@ LINEAR, DERIVATIVE, DIFFERENCE = 1e-9, 1e-4, 1e-5
 
 
 def make_term(space: Space, form: Integrand, on: str, boundary: bool, law: Any = None) -> UserIntegral:
-    """A form over the region, or over the outer edges (in space: faces) of the boundary, called
-    `on`; `law` is the region's.
-    """
+    """A form over a region, or the outer edges (faces) of a boundary, called `on`; `law` of the region."""
     parts = tried(space.mesh, form, on, boundary, law).parts
     points = facet_points(space, on) if boundary else points_of(space, space.mesh.cells_of(on))
     return UserIntegral(form, points, parts, SimpleNamespace(x=points.x, n=points.normal, law=law))
@@ -72,9 +69,7 @@ class _Watched(Field):
 
 
 def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None) -> Trial:
-    """Evaluate a form at a few places of a region or boundary; raises `InputError` for an unknown
-    one, and for a form that no run could use.
-    """
+    """Try a form at a few places of a region or boundary; raises `InputError` where no run could use it."""
     x, n = _facet_places(mesh, on) if boundary else _cell_places(mesh, on)
     w = SimpleNamespace(x=x, n=n, law=law)
     all_parts = Parts(len(x), value=True, grad=True, theta=not boundary)
@@ -170,9 +165,7 @@ def _few(rows: Ints) -> Ints:
 
 
 def named_facets(mesh: Mesh, name: str) -> Ints:
-    """Corners of the outer edges (K, 2), in space faces (K, 4), of a boundary; raises `InputError`
-    for an unknown name, and for one without an edge or face.
-    """
+    """Corners (K, 2), in space (K, 4), of a boundary's outer sides; raises `InputError` without any."""
     if name not in mesh.node_sets:
         allowed = f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
         raise InputError("boundary", quoted(name), allowed)

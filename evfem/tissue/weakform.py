@@ -1,5 +1,4 @@
-r"""The tissue: internal forces, tangent, energy and stresses of hyperelasticity, in plane strain or
-in space.
+r"""The tissue: internal forces, tangent, energy and stresses of hyperelasticity, in plane strain or in space.
 
 For the energy density :math:`W(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever
 the law uses the volume change and is the measure of the element (`evfem.tissue.space`),
@@ -25,8 +24,7 @@ from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
 from evfem.tissue.assembly import Integral, UserIntegral, gathered, points_of, projected
-from evfem.tissue.fields import Field, Parts
-from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
+from evfem.tissue.forms import Field, Parts, deformation_gradient, hyperelastic, neo_hookean
 from evfem.tissue.kernels.blocks import LANES, blocked, loops, padded, unblocked
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter
@@ -80,9 +78,7 @@ class Tissue:
         return scatter(self.space.nodes, fe, self.space.size)
 
     def add_tangent(self, u: Floats, pattern: Pattern, data: Floats, pressure: Floats | None = None) -> None:
-        """Add the tangents of all cells to the `data` of a pattern; with the curvature of ln J
-        weighted by a `pressure` (E, Q) of the iterations if one is given.
-        """
+        """Add all tangents to the `data` of a pattern; a `pressure` (E, Q) weights ln J's curvature."""
         if self.loops is not None:
             sampled = None if pressure is None else self._sampled_pressure(pressure)
             data += self._shear.data(pattern)
@@ -137,9 +133,7 @@ class Tissue:
         return total
 
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
-        """Means over the reference cells of the Cauchy stress (E, 4) as xx, yy, zz, xy, in space
-        (E, 6) with yz, xz, and of J (E,).
-        """
+        """Cell means of the Cauchy stress (E, 4) as xx, yy, zz, xy, in space (E, 6) yz, xz; of J (E,)."""
         E = len(self.space.nodes)
         if self.loops is not None:
             return self._looped_stress(self.loops, u)

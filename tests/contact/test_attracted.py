@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.signorini import (
     FORWARD,
     OPEN,
     STICK,
+    AttractionStiffness,
     ContactProblem,
     ExtraUnknowns,
+    Roughness,
 )
 from evfem.contact.solve import solve_with_attraction
 

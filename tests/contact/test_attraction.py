@@ -12,7 +12,7 @@ from evfem.finger.fingerpad import FingerPad
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.surfaces import Flat, Sinusoid
 from evfem.tissue.assembly import Integral
-from evfem.tissue.fields import Parts
+from evfem.tissue.forms import Parts
 from evfem.tissue.space import make_space
 from evfem.tissue.userforms import facet_points
 

@@ -7,7 +7,7 @@ import pytest
 from evfem.studies.pressing import contact_spans
 
 from evfem.finger.fingerpad import FingerPad
-from evfem.surface.edge import outline_nodes
+from evfem.surface.pad import outline_nodes
 
 
 def spans(x, gap):

@@ -9,7 +9,7 @@ import pytest
 
 from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.contact.stability import ATTRACTION, FALLING, FASTER, SLOPES, verge
+from evfem.contact.stability import ATTRACTION, FALLING, FASTER, SLOPES, stability_ratio
 from evfem.surface.pad import SurfaceState
 
 KX, KY, LOAD = 0.4, 1.5, 0.3
@@ -48,8 +48,8 @@ def test_on_a_crest_the_contact_force_turns_against_the_springs(slope, loaded):
     step = point(FORWARD, slope, curvature=-0.9)
     cos2 = 1.0 / (1.0 + slope**2)
     held = KX * cos2 + (0.0 if loaded else KY * (1.0 - cos2))
-    found = verge(with_load(step) if loaded else step)
-    assert found.share == pytest.approx(LOAD * 0.9 * cos2**1.5 / held, rel=1e-12)
+    found = stability_ratio(with_load(step) if loaded else step)
+    assert found.ratio == pytest.approx(LOAD * 0.9 * cos2**1.5 / held, rel=1e-12)
     assert found.cause == SLOPES
 
 
@@ -60,41 +60,43 @@ def test_an_interface_that_yields_along_the_tangent_does_not_hold_a_slipping_nod
     yields = np.array([[0.0, 2.0 / KX]])
     rigid = point(FORWARD, curvature=-0.9, friction=0.8)
     soft = replace(rigid, candidates=replace(rigid.candidates, interface_compliance=yields))
-    assert verge(soft).share == pytest.approx(verge(rigid).share, rel=1e-12)
+    assert stability_ratio(soft).ratio == pytest.approx(stability_ratio(rigid).ratio, rel=1e-12)
     falls = replace(point(FORWARD).candidates, slip_stiffness=np.array([-0.1]), interface_compliance=yields)
-    assert verge(replace(rigid, candidates=falls)).share == pytest.approx(0.1 * 3.0 / KX, rel=1e-12)
+    assert stability_ratio(replace(rigid, candidates=falls)).ratio == pytest.approx(0.1 * 3.0 / KX, rel=1e-12)
 
 
 def test_friction_turns_with_the_force_that_it_needs():
     """On level ground of friction mu the normal force grows by mu times what turns into it."""
     for status in (FORWARD, BACKWARD):
-        found = verge(point(status, curvature=-0.9, friction=0.8))
-        assert found.share == pytest.approx(LOAD * 0.9 * (1.0 + 0.8**2) / KX, rel=1e-12)
+        found = stability_ratio(point(status, curvature=-0.9, friction=0.8))
+        assert found.ratio == pytest.approx(LOAD * 0.9 * (1.0 + 0.8**2) / KX, rel=1e-12)
 
 
 def test_in_a_trough_at_rest_and_without_a_surface_nothing_grows():
-    assert verge(point(FORWARD, curvature=0.9)).share == 0.0
-    assert verge(point(STICK, curvature=-0.9, friction=0.5)).share == 0.0
-    assert verge(point(OPEN, curvature=-0.9)).share == 0.0
+    assert stability_ratio(point(FORWARD, curvature=0.9)).ratio == 0.0
+    assert stability_ratio(point(STICK, curvature=-0.9, friction=0.5)).ratio == 0.0
+    assert stability_ratio(point(OPEN, curvature=-0.9)).ratio == 0.0
 
 
 @pytest.mark.parametrize(("status", "falls"), [(FORWARD, -2.0), (BACKWARD, 2.0)])
 def test_friction_that_falls_along_the_way_lets_go(status, falls):
-    found = verge(point(status, friction=0.5, friction_slope=falls))
-    assert found.share == pytest.approx(LOAD * 2.0 / KX, rel=1e-12)
+    found = stability_ratio(point(status, friction=0.5, friction_slope=falls))
+    assert found.ratio == pytest.approx(LOAD * 2.0 / KX, rel=1e-12)
     assert found.cause == FALLING
-    assert verge(point(status, friction=0.5, friction_slope=-falls)).share == 0.0
+    assert stability_ratio(point(status, friction=0.5, friction_slope=-falls)).ratio == 0.0
 
 
 @pytest.mark.parametrize(("grows", "share"), [(-0.6, 0.6 / KX), (0.6, 0.0)])
 def test_friction_that_falls_with_the_speed_lets_go(grows, share):
     step = point(FORWARD, friction=0.5)
-    found = verge(replace(step, candidates=replace(step.candidates, slip_stiffness=np.array([grows]))))
-    assert found.share == pytest.approx(share, rel=1e-12)
+    found = stability_ratio(
+        replace(step, candidates=replace(step.candidates, slip_stiffness=np.array([grows])))
+    )
+    assert found.ratio == pytest.approx(share, rel=1e-12)
     assert share == 0.0 or found.cause == FASTER
 
 
 def test_an_attraction_that_weakens_with_the_gap_is_held_by_the_spring():
-    found = verge(point(OPEN, weakening=1.2))
-    assert found.share == pytest.approx(1.2 / KY, rel=1e-12)
+    found = stability_ratio(point(OPEN, weakening=1.2))
+    assert found.ratio == pytest.approx(1.2 / KY, rel=1e-12)
     assert found.cause == ATTRACTION

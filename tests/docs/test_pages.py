@@ -31,7 +31,8 @@ from evfem.simulation.result import COLUMNS
 from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
 from evfem.textures.importing import IMPORTERS
-from evfem.tissue import elements, space
+from evfem.tissue import space
+from evfem.tissue import space as elements
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -216,20 +217,16 @@ def test_the_notation_names_what_is_in_the_code():
     assert tuple(name for cells in columns for name in re.findall(r"`(\w+)`", cells[0])) == COLUMNS
 
 
-def test_every_file_of_the_package_is_on_the_page_about_its_inside():
-    """Each room's table has all of its modules, and each public module is where the page says."""
-    page = sections(read("docs/inside.md"))
-    package = Path(evfem.__file__).parent
-    beside = ("data", "meshes", "studies")  # an installed evfem has them all in its folder
-    folders = (path.parent.name for path in package.glob("*/__init__.py"))
-    rooms = [name for name in folders if name not in beside]
-    for room in [*rooms, "outside the rooms"]:
-        folder = package if room == "outside the rooms" else package / room
-        inside = folder.glob("*.py") if folder == package else folder.rglob("*.py")
-        files = {".".join(p.relative_to(folder).with_suffix("").parts) for p in inside}
-        listed = [name for cells in rows(page[room]) for name in re.findall(r"`([\w.]+)`", cells[0])]
-        assert sorted(listed) == sorted(name for name in files if not name.endswith("__init__")), room
-    assert sorted(cells[0].strip("`") for cells in rows(page["Rooms"])) == sorted(rooms)
+def test_the_page_about_the_inside_has_every_room_and_names_what_there_is():
+    """Rooms in the order of the data, modules of the walk, public modules at their places."""
+    page, text = sections(read("docs/inside.md")), read("docs/inside.md")
+    house = runpy.run_path(str(ROOT / "tests" / "test_architecture.py"))
+    assert [cells[0].strip("`") for cells in rows(page["Rooms"])] == list(house["ROOMS"])
+    picture, walk = (found["text"] for found in BLOCK.finditer(text))
+    assert [room for room in house["ROOMS"] if room not in picture] == ["common"]  # below all the others
+    steps = re.findall(r"^ *([a-z]+\.[a-z]+)  ?", walk, re.MULTILINE)
+    assert len(steps) > 10
+    assert set(steps) <= set(house["ORDER"])
     public = {cells[0].strip("`"): cells[1].strip("`") for cells in rows(page["Public names"])}
     assert {name: resolved(re.sub("^ev", "evfem", name)).__name__ for name in public} == public
 

@@ -13,7 +13,7 @@ import evfem as ev
 from evfem.errors import InputError
 from evfem.planning.parts import check_parts
 from evfem.planning.plan import plan, scene_mesh
-from evfem.planning.sense import doubts
+from evfem.planning.plausibility import implausible
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.38)
 PRESS, SLIDE = ev.Press(indentation=0.2, steps=2), ev.Slide(distance=1.0, steps=5)
@@ -447,6 +447,6 @@ def test_looking_takes_next_to_no_time():
     for _ in range(5):
         begin = time.perf_counter()
         check_parts(asked, 2)
-        doubts(asked, mesh, {"tissue": 0.04})
+        implausible(asked, mesh, {"tissue": 0.04})
         best = min(best, time.perf_counter() - begin)
     assert best < 5e-3

@@ -11,8 +11,8 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
+from evfem.planning.pathdependence import path_dependence
 from evfem.planning.plan import plan
-from evfem.planning.way import remembers
 from evfem.simulation.model import make_model
 
 pytestmark = pytest.mark.solver
@@ -79,8 +79,8 @@ def test_the_plan_names_what_hardly_changes_its_volume(nu, said):
 @pytest.mark.parametrize(
     ("friction", "said"),
     [
-        (0.0, "nothing remembers the way, each step is one part"),
-        (0.3, "friction remembers the way, a part errs by at most 0.5 % of the force"),
+        (0.0, "nothing depends on the path, each step is one part"),
+        (0.3, "path dependence by friction, a part errs by at most 0.5 % of the force"),
     ],
 )
 def test_the_plan_says_what_automatic_steps_are(friction, said):
@@ -92,13 +92,13 @@ def test_the_plan_says_what_automatic_steps_are(friction, said):
 
 def test_time_charges_and_the_air_layer_are_remembered_too():
     scene = replace(hovering(voltage=100.0), surface=ev.Display(friction=0.0))
-    assert remembers(scene) == ()
-    assert remembers(replace(scene, air_layer=False)) == ("who touches",)
+    assert path_dependence(scene) == ()
+    assert path_dependence(replace(scene, air_layer=False)) == ("who touches",)
     motion = [ev.Press(indentation=0.1, speed=1.0)]
     slow = replace(scene, motion=motion, finger=finger(BLOCK, viscosity=1e-3))
-    assert remembers(replace(slow, solver=ev.Solver(dynamics="viscous"))) == ("time",)
+    assert path_dependence(replace(slow, solver=ev.Solver(dynamics="viscous"))) == ("time",)
     alternating = {"drive": ev.Drive(resolved=True), "voltage": ev.Sine(100.0, 50.0)}
-    assert remembers(replace(scene, motion=motion, **alternating)) == ("charges",)
+    assert path_dependence(replace(scene, motion=motion, **alternating)) == ("charges",)
 
 
 @pytest.mark.parametrize("error", [0.0, 1.5, 1e-11])
@@ -110,5 +110,5 @@ def test_forces_cannot_be_wanted_to_any_error(error):
 def test_forces_to_an_error_need_what_the_plan_says():
     scene = ev.Scene(finger(BLOCK), ev.Flat(friction=0.0), motion=[ev.Press(indentation=0.1, steps=3)])
     cheap, exact = replace(scene, solver=ev.Solver.within(0.02)), ev.simulate(scene)
-    assert "steps auto: nothing remembers the way, each step is one part" in plan(cheap).solver
+    assert "steps auto: nothing depends on the path, each step is one part" in plan(cheap).solver
     assert ev.simulate(cheap).normal_force == pytest.approx(exact.normal_force, rel=0.02)

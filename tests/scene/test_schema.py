@@ -20,7 +20,7 @@ from evfem.scene.file import dump, load, loads
 from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import default_scene
 from evfem.sweeps import file as sweepfile
-from evfem.sweeps import schema as sweeps
+from evfem.sweeps import file as sweeps
 from evfem.tissue.laws import LAWS
 
 #: a scene for each table, with the dotted place of the table

@@ -7,7 +7,7 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
-from evfem.contact.stability import SLOPES, Verge
+from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
 from evfem.planning.plan import plan
@@ -34,7 +34,7 @@ def said(
     failed = failure("nodes keep changing", [1.0])
     failed.findings, failed.released, failed.unstable = "out of balance: 1 N/mm", released, unstable
     failed.last = going.state, replace(Target.held(going.state.bone, 0.0), duration=duration)
-    going.model.equilibrium.verge = lambda state, target: Verge(share, SLOPES)
+    going.model.equilibrium.stability_ratio = lambda state, target: StabilityRatio(share, SLOPES)
     return advice(going.scene, going.model, failed).split("; ")
 
 

@@ -9,7 +9,7 @@ import pytest
 from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node, shifted
 
 from evfem.contact.signorini import FORWARD, OPEN, STICK
-from evfem.contact.stability import SLOPES, Verge
+from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.interface import PenaltyInterface
@@ -40,7 +40,7 @@ def test_a_residual_that_is_no_number_fails_the_step(residual):
 def test_an_equilibrium_that_the_body_leaves_is_refused():
     interface, old, new = legal(FLAT)
     script = Script([new], (0.0, 0.0))
-    script.left = Verge(1.5, SLOPES)
+    script.left = StabilityRatio(1.5, SLOPES)
     solver = Equilibrium(script, interface, None, Limits(TOLERANCE))
     with pytest.raises(StepFailed, match=f"not stable: {SLOPES}, 1.5 times as hard") as failed:
         solver.step(old, Target.held(old.bone, 0.0))

@@ -11,7 +11,7 @@ from evfem.solver.control import (
     FollowFriction,
     Force,
     GivenVoltage,
-    Loose,
+    Unsupported,
     VoltageProblem,
 )
 
@@ -118,5 +118,5 @@ def test_only_at_the_limit_of_a_pad_that_sticks_the_old_voltage_is_kept(wish, st
 def test_a_force_acts_on_the_way_from_or_to_a_loose_finger():
     """The ends themselves keep their own controls (`Run._path`)."""
     for force in (0.0, 1e-9):
-        assert Loose(0.3).towards(Force(force), 0.5) == Force(force)
-        assert Force(force).towards(Loose(0.3), 0.5) == Force(force)
+        assert Unsupported(0.3).towards(Force(force), 0.5) == Force(force)
+        assert Force(force).towards(Unsupported(0.3), 0.5) == Force(force)

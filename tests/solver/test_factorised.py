@@ -10,7 +10,7 @@ from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
 from evfem.contact.signorini import FORWARD, OPEN
-from evfem.contact.stability import Verge
+from evfem.contact.stability import StabilityRatio
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.scene.motion import Hover, Press, VoltageRamp
 from evfem.scene.scene import Scene, Solver
@@ -197,7 +197,7 @@ def test_a_finger_leaves_an_equilibrium_only_by_the_tangent_there(pressed, monke
     slipping = replace(state, status=np.where(state.status == OPEN, OPEN, FORWARD))
 
     def pushed_out(old, state, target):
-        return None if body.linearisation.made_at(slipping) else Verge(1.03, "slopes")
+        return None if body.linearisation.made_at(slipping) else StabilityRatio(1.03, "slopes")
 
     monkeypatch.setattr(body, "_pushed_out", pushed_out)
     body.linearisation.factorise(replace(state, u=state.u.copy()))

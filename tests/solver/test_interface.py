@@ -7,7 +7,7 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.common.constants import CHANGES, HAIR
+from evfem.common.constants import CHANGES, PIN_OFFSET
 from evfem.contact.signorini import OPEN, STICK
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
@@ -53,7 +53,7 @@ def test_a_node_that_keeps_crossing_a_jump_is_pinned_to_its_rougher_side(table):
     assert not crossing(table, CHANGES - 1)[1].held.any()
     surface, pins = crossing(table, CHANGES)
     assert pins.held.tolist() == [True, False, False]
-    assert abs(pins.x[0] - 0.3) <= 1.001 * HAIR
+    assert abs(pins.x[0] - 0.3) <= 1.001 * PIN_OFFSET
     assert surface.friction_coefficient(pins.x[:1]).tolist() == [0.6]
     assert pins.lower[0] == 0.2
 
@@ -82,7 +82,7 @@ def test_contact_takes_a_pinned_node_at_its_jump(table):
     interface, old = interface_and_state(Flat(friction=table, y=-0.1), [STICK])
     x = interface.positions(old.u)[:, 0]
     node = int(np.argmin(np.abs(x - 0.3)))
-    place = 0.3 + (HAIR if table[-1][1] == 0.6 else -HAIR)
+    place = 0.3 + (PIN_OFFSET if table[-1][1] == 0.6 else -PIN_OFFSET)
     interface.pins.x[node], interface.pins.lower[node] = place, 0.2
     u = old.u.copy()
     u[interface.pad.nodes, 0] = 0.25
@@ -115,7 +115,7 @@ def test_a_pinned_node_does_not_yield_to_where_nothing_holds_it(table, shear, ob
     interface, old = interface_and_state(Flat(friction=table, y=-0.1), [STICK], penalty)
     position, rougher = interface.positions(old.u), 1.0 if table[-1][1] == 0.6 else -1.0
     node = int(np.argmin(np.abs(position[:, 0] - 0.3)))
-    place, force = 0.3 + rougher * HAIR, np.array([5.0, rougher * shear])
+    place, force = 0.3 + rougher * PIN_OFFSET, np.array([5.0, rougher * shear])
     interface.pins.x[node], interface.pins.lower[node] = place, 0.2
     give = interface.compliance(old)[node]
     u, every = old.u.copy(), np.zeros_like(old.contact_force)

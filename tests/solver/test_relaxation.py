@@ -174,8 +174,8 @@ def test_stability_is_that_of_the_body_with_its_present_drag():
         state = solver.step(rest, target)
         model.body.release(state.u, rate)
         solver.body.begin(state, target, False, state)
-        verge = solver.body.leaves(state, state, target)
-        assert (verge is not None and verge.share > 1.0) is unstable
+        margin = solver.body.leaves(state, state, target)
+        assert (margin is not None and margin.ratio > 1.0) is unstable
 
 
 def test_a_prescribed_load_is_kept(point):

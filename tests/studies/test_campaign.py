@@ -18,8 +18,8 @@ from evfem.scene.format import SIGNALS, SURFACES
 from evfem.scene.motion import MOTIONS
 from evfem.scene.schema import sections
 from evfem.simulation.run import simulate
-from evfem.tissue.elements import elements_on
 from evfem.tissue.laws import LAWS
+from evfem.tissue.space import elements_on
 
 Ending = ending.Ending
 

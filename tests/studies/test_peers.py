@@ -217,7 +217,7 @@ def test_in_the_race_each_has_its_best_number_of_steps():
 
 
 def test_few_steps_end_where_many_do():
-    """Without friction nothing remembers the way."""
+    """Without friction nothing depends on the path."""
     many = problem.quantities("A", hosts.run_once("evfem", "q1", "A", 0)["history"])
     few = problem.Way(3, 6, 1e-6)
     found = hosts.run_once("evfem", "q1", "A", 0, way=few)

@@ -26,8 +26,7 @@ from evfem.mesh import file as meshfile
 from evfem.scene import file as scenefile
 from evfem.sweeps import file as sweepfile
 from evfem.sweeps import folder as sweepfolder
-from evfem.sweeps.run import compute
-from evfem.sweeps.units import table_units, units_of
+from evfem.sweeps.run import compute, table_units, units_of
 
 SWEEP = """
 version = 1

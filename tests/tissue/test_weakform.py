@@ -12,9 +12,8 @@ from tools.laws import StressOnly
 
 from evfem.errors import InputError
 from evfem.tensor import det
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.tissue.space import make_space
+from evfem.tissue.space import ELEMENTS, make_space
 from evfem.tissue.splitlaw import embed
 from evfem.tissue.weakform import Tissue, check_laws
 

@@ -10,9 +10,8 @@ from scipy.spatial import cKDTree
 from skfem.io.meshio import from_meshio
 
 from evfem.mesh.mesh import Mesh, raised
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.pattern import Pattern
-from evfem.tissue.space import make_space
+from evfem.tissue.space import ELEMENTS, make_space
 from tools.meshes import between
 
 #: element -> cells before they are raised to the element's order

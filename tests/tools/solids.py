@@ -4,8 +4,7 @@ import numpy as np
 
 from evfem.mesh.hexahedron import PLACES
 from evfem.mesh.mesh import Mesh, raised
-from evfem.tissue.elements import ELEMENTS
-from evfem.tissue.space import make_space
+from evfem.tissue.space import ELEMENTS, make_space
 
 SIDES = ("left", "right", "bottom", "top", "back", "front")  # -x, +x, -y, +y, -z, +z
 

@@ -17,7 +17,7 @@ import evfem as ev
 from evfem.cli import main
 from evfem.planning.parts import check_parts
 from evfem.planning.plan import plan, scene_mesh
-from evfem.planning.sense import doubts, locking
+from evfem.planning.plausibility import implausible, locking
 from evfem.scene import file as scenefile
 from evfem.scene.scene import default_scene
 from evfem.tissue.splitlaw import split
@@ -90,8 +90,8 @@ def test_bone_in_a_mesh_of_softer_parts_is_taken():
     moduli = {"tissue": 0.04, "bone": 6.5e3}
     asked = scene()
     mesh, _ = scene_mesh(asked)
-    assert doubts(asked, mesh, moduli) == ()
-    assert "of bone, 6.5e+04 MPa" in doubts(asked, mesh, moduli | {"bone": 6.5e4})[0]
+    assert implausible(asked, mesh, moduli) == ()
+    assert "of bone, 6.5e+04 MPa" in implausible(asked, mesh, moduli | {"bone": 6.5e4})[0]
 
 
 # -- voltages and lengths --------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ def sentences(shipped):
     mesh, _ = scene_mesh(shipped)
     check_parts(shipped, mesh.dim)
     moduli = {name: split(law, mesh.dim).shear_modulus for name, law in shipped.finger.materials.items()}
-    return doubts(shipped, mesh, moduli)
+    return implausible(shipped, mesh, moduli)
 
 
 def test_the_built_in_scene_and_those_of_the_pages_stay_silent():

@@ -1,4 +1,4 @@
-r"""How far the load of a slide drifts whose indentation is held, from friction and geometry.
+r"""Load drift of a slide at held indentation, from friction and geometry.
 
 A bone that keeps its height does not keep its load. Friction turns the pad about the bone, by
 
@@ -25,7 +25,7 @@ import numpy as np
 
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import way
+from evfem.planning.resolution import path_points
 from evfem.scene.scene import Scene
 
 #: a drift of the load that is worth a word
@@ -56,12 +56,10 @@ def load_drift(finger: FingerPad, friction: float, load: float, modulus: float) 
 
 
 def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[str]:
-    """A sentence for the first slide after a press to a force whose held indentation lets the load
-    drift.
-    """
+    """A sentence for the first slide after a press to a force whose held indentation lets the load drift."""
     if not isinstance(scene.finger, FingerPad) or not scene.ground.is_flat:
         return
-    friction = float(np.max(scene.ground.friction_coefficient(way(scene, mesh, STEP))))
+    friction = float(np.max(scene.ground.friction_coefficient(path_points(scene, mesh, STEP))))
     load = None
     for i, course in enumerate(scene.courses):
         if course.depth is not None:

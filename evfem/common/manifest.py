@@ -1,4 +1,4 @@
-"""Which files of a folder are evfem's: a list of their names that is true whenever a run is killed."""
+"""The manifest of a folder: the names of the files that evfem wrote there, true whenever a run is killed."""
 
 from __future__ import annotations
 
@@ -12,40 +12,38 @@ from evfem.common.storage import disk, names_in, write_names
 from evfem.errors import StorageError
 
 
-class Listed:
-    """The names of the files that evfem wrote in a folder, and the list of them there; a line that
-    is no name of the pattern `ours` counts for nothing.
+class Manifest:
+    """The names of the files that evfem wrote in a folder, also listed in the file `path`; a line that
+    is no name of the pattern `ours` is ignored.
 
-    A name comes into the list with the first writing of its file: without the end of its line
-    before the file takes its place, with it after. Where a kill left a line open, the file is
-    evfem's unless what was to become it is still there under its temporary name. What is removed
-    goes under a temporary name first, too. So a file of somebody else is never taken for evfem's,
-    and none of evfem's for somebody else's, whenever the kill came.
+    A name is listed before its file takes its place, and its line ended after: a file of an open line is
+    evfem's unless its temporary file is still there. What is removed goes under a temporary name first. So no
+    file is taken for somebody else's, whenever a kill came.
     """
 
-    def __init__(self, manifest: Path, ours: re.Pattern[str]) -> None:
-        self.manifest = manifest
-        lines = [line if ours.fullmatch(line) else "" for line in names_in(manifest)]
+    def __init__(self, path: Path, ours: re.Pattern[str]) -> None:
+        self.path = path
+        lines = [line if ours.fullmatch(line) else "" for line in names_in(path)]
         names, last = [line for line in lines[:-1] if line], "".join(lines[-1:])
-        gone = {name for name in names if _removed(manifest.with_name(name)).exists()}
+        gone = {name for name in names if _removed(path.with_name(name)).exists()}
         self.names = {*names} - gone
-        if last and not any(manifest.parent.glob(f".{last}.*.tmp")):
+        if last and not any(path.parent.glob(f".{last}.*.tmp")):
             self.names.add(last)
         if last or gone:
             self._write()
 
     def _write(self) -> None:
-        write_names(self.manifest, sorted(self.names))
+        write_names(self.path, sorted(self.names))
 
     def begin(self, others: Collection[str] = ()) -> None:
         """Forget the names of files that are no longer there, and list `others`."""
-        kept = {name for name in self.names if self.manifest.with_name(name).exists()}
+        kept = {name for name in self.names if self.path.with_name(name).exists()}
         self.names = {*kept, *others}
         self._write()
 
     def remove(self) -> None:
         """Remove all files of the list, and their names from it; a folder stays."""
-        files = [self.manifest.with_name(name) for name in sorted(self.names)]
+        files = [self.path.with_name(name) for name in sorted(self.names)]
         files = [file for file in files if file.is_file()]
         for file in files:
             file.replace(_removed(file))
@@ -68,7 +66,7 @@ class Listed:
                 temporary.touch()
                 self._append(path.name)
             yield
-            with disk(f"write {self.manifest}"):
+            with disk(f"write {self.path}"):
                 self._append("\n")
             self.names.add(path.name)
         except BaseException:
@@ -80,10 +78,10 @@ class Listed:
             raise
 
     def _append(self, text: str) -> None:
-        with self.manifest.open("a", encoding="utf-8", newline="\n") as file:
+        with self.path.open("a", encoding="utf-8", newline="\n") as file:
             file.write(text)
 
 
 def _removed(path: Path) -> Path:
-    """Where a file goes before it is removed: under a temporary name that no process writes."""
+    """Temporary name of a file that is being removed; no process writes to it."""
     return path.with_name(f".{path.name}.0.tmp")

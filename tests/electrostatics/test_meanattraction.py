@@ -6,7 +6,7 @@ import pytest
 from evfem import FILM
 from evfem.electrostatics import Layer, Layers, StrongTroxel, eps_0
 from evfem.field.columns import Columns
-from evfem.field.meanpull import mean_pull
+from evfem.field.meanattraction import mean_pull
 
 ROWS = np.linspace(0.0, 1.0, 9)
 INSULATOR, SKIN = 1.0 - (1.0 - ROWS) ** 2, ROWS**2

@@ -3,7 +3,7 @@
 import pytest
 
 import evfem as ev
-from evfem.planning.drift import load_drift
+from evfem.planning.loaddrift import load_drift
 from evfem.planning.plan import plan
 from evfem.simulation.history import load_drift as measured
 

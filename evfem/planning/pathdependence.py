@@ -1,6 +1,4 @@
-"""What of a scene remembers the way: where nothing does, the steps decide no equilibrium that is
-reached, and few of them will do.
-"""
+"""Path dependence of a scene: without it the equilibria do not depend on the steps, and few steps suffice."""
 
 from __future__ import annotations
 
@@ -9,12 +7,12 @@ from evfem.scene.scene import Scene
 AUTO = "auto"
 
 
-def remembers(scene: Scene) -> tuple[str, ...]:
-    """What makes forces depend on the way, in words; empty where nothing does.
+def path_dependence(scene: Scene) -> tuple[str, ...]:
+    """Causes of path dependence, in words; empty if there is none.
 
     >>> import evfem as ev
     >>> pad, press = ev.FingerPad(resolution="coarse"), [ev.Press(indentation=0.5, steps=2)]
-    >>> [remembers(ev.Scene(pad, ev.Flat(friction=mu), motion=press)) for mu in (0.0, 0.3)]
+    >>> [path_dependence(ev.Scene(pad, ev.Flat(friction=mu), motion=press)) for mu in (0.0, 0.3)]
     [(), ('friction',)]
     """
     drive = scene.drive is not None and scene.drive.resolved
@@ -31,17 +29,16 @@ def remembers(scene: Scene) -> tuple[str, ...]:
 def allowed_error(scene: Scene) -> float | None:
     """The error of a part's path that its strategy allows; None where the steps are as given."""
     strategy = scene.solver.strategy
-    return strategy.path_error if strategy.steps == AUTO and remembers(scene) else None
+    return strategy.path_error if strategy.steps == AUTO and path_dependence(scene) else None
 
 
-def said(scene: Scene) -> str:
-    """What a plan says of the steps of a scene that leaves them to the solver; nothing otherwise."""
+def steps_line(scene: Scene) -> str:
+    """A plan's line on steps that the solver chooses; empty if the scene gives them."""
     if scene.solver.strategy.steps != AUTO:
         return ""
-    names = remembers(scene)
+    names = path_dependence(scene)
     if not names:
         what = "nothing but a snap" if scene.electrics.acts or not scene.ground.is_flat else "nothing"
-        return f"steps auto: {what} remembers the way, each step is one part"
+        return f"steps auto: {what} depends on the path, each step is one part"
     limit = f"{100.0 * scene.solver.strategy.path_error:g} %"
-    verb = "remembers" if len(names) == 1 else "remember"
-    return f"steps auto: {', '.join(names)} {verb} the way, a part errs by at most {limit} of the force"
+    return f"steps auto: path dependence by {', '.join(names)}, a part errs by at most {limit} of the force"

@@ -1,4 +1,4 @@
-"""What contact needs of a surface, for surfaces of the user's own that only have a height."""
+"""Completes a user's surface that only has a height: slope, curvature, friction for contact."""
 
 from __future__ import annotations
 
@@ -48,9 +48,7 @@ def completed(surface: Surface) -> CompleteSurface:
 
 @dataclass(frozen=True)
 class OwnSurface:
-    """A user's surface `own` with derivatives, and with what it does not say itself taken from
-    `plain`.
-    """
+    """A user's surface `own` with derivatives, and with what it does not say itself taken from `plain`."""
 
     own: Any
     plain: Flat

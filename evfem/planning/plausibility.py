@@ -1,7 +1,7 @@
-"""What a scene says, but hardly means.
+"""Warnings about valid but implausible input.
 
-`doubts` says in a sentence each what may be meant, but hardly is: units, fields that no insulator
-withstands, slides that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
+`implausible` gives one sentence each: other units, fields beyond the breakdown of insulators, slides
+that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import way
+from evfem.planning.resolution import path_points
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import NeoHookean
+from evfem.tissue.space import ELEMENTS
 from evfem.tissue.splitlaw import nearly_incompressible, split
 
 #: shear modulus over that of Table 2 in a `FingerPad`, of what is hard when it is dry and of what is always
@@ -48,9 +48,9 @@ HEAVIEST = 100.0
 WAY_STEP = 0.02
 
 
-def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
-    shear moduli (MPa) of the materials.
+def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
+    """One sentence per valid but implausible input of a scene; `moduli` are the shear moduli (MPa) of
+    the materials.
     """
     lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
     return (
@@ -63,9 +63,7 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
 
 
 def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[str]:
-    """A sentence for a material so nearly incompressible that an element which measures the volume
-    at every point locks: forces many times too large, or no equilibrium.
-    """
+    """A sentence for a nearly incompressible material in an element that locks."""
     if ELEMENTS[element][2] != "point":
         return
     locked = [name for name, law in materials.items() if nearly_incompressible(split(law, dim), dim, LOCKED)]
@@ -164,9 +162,7 @@ def touching_traction(scene: Scene) -> float | None:
 
 
 def _unbearable(scene: Scene) -> Iterator[str]:
-    """An attraction of touching skin beyond what any load presses it with, where a fingertip is pressed;
-    of a mesh, which may be anything, the run's own forces tell.
-    """
+    """Where a fingertip is pressed: an attraction of touching skin beyond what any load presses with."""
     if isinstance(scene.finger, MeshedFinger) or not any((c.depth or 0.0) > 0.0 for c in scene.courses):
         return
     traction = touching_traction(scene)
@@ -178,9 +174,7 @@ def _unbearable(scene: Scene) -> Iterator[str]:
 
 
 def weakens(scene: Scene) -> bool:
-    """Whether friction falls with the speed somewhere up to ten times the fastest motion's: a node that is
-    let go is faster than the bone.
-    """
+    """Whether friction falls with the speed somewhere up to ten times the fastest motion's."""
     law, fastest = scene.friction_law, max(course.speed or 0.0 for course in scene.courses)
     if not (scene.has_friction and getattr(law, "timed", False)):
         return False
@@ -203,13 +197,11 @@ def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
 
 
 def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
-    """Whether a pad whose undeformed outline is `gap` (mm) off the first touch surely does not come down:
-    nothing attracts or loads it.
-    """
+    """Whether a pad `gap` (mm) off the first touch surely stays up: nothing attracts or loads it."""
     if gap < 0.0 or scene.electrics.acts or scene.forms:
         return False
     surface: Any = scene.ground
     if not surface.is_flat:
-        gap -= float(np.ptp(surface.height(way(scene, mesh, WAY_STEP))))
+        gap -= float(np.ptp(surface.height(path_points(scene, mesh, WAY_STEP))))
         return gap > 0.0
     return True

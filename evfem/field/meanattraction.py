@@ -42,9 +42,7 @@ from evfem.field.columns import Columns
 
 @dataclass(frozen=True, eq=False)
 class MeanPull:
-    """Mean forces (L, 2) on the pad at the lines, in N per mm of depth at 1 V effective; `phi`
-    (L, rows) is the complex potential at 1 V, `y` (L, rows) where.
-    """
+    """Mean forces (L, 2) on the pad at the lines, N per mm at 1 V; potential `phi` (L, rows) at `y`."""
 
     forces: Floats
     phi: Floats
