@@ -92,7 +92,7 @@ def test_sets_of_abaqus_run_by_the_names_that_a_scene_gives_them(tmp_path):
     assert ev.scenefile.loads(ev.scenefile.dump(scene), tmp_path) == scene
     for old, new, said in (
         ('soft = "tissue"', "", 'all and tissue with the same cells; .* as all = "all"'),
-        ('"tissue"', '"tisue"', r"finger.regions: .*soft = tisue; .*block.inp: tissue, all"),
+        ('"tissue"', '"tisue"', r"finger.regions: .*soft = tisue; .*block.inp: all, tissue"),
         ('"Bottom"', '"bottom"', r"finger.boundaries: .*pad = bottom; .*block.inp: Bottom, bone"),
     ):
         (tmp_path / "wrong.toml").write_text(SCENE.replace(old, new))
