@@ -131,14 +131,14 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
             rows = [[cell.strip() for cell in row] for row in csv.reader(lines) if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(key, f"{path} ({reason})", allowed) from None
+        raise InputError(key, f"{path.name} ({reason})", allowed) from None
     names, *body = rows or [[]]
     odd = [row for row in body if len(row) != len(names)]
     if odd or not body or len(set(names)) < len(names):
         reason = f"{','.join(odd[0])[:60]!r}" if odd else "no line of values" if not body else "a name twice"
-        raise InputError(key, f"{path} with {','.join(names)[:60]!r}, then {reason}", allowed)
+        raise InputError(key, f"{path.name} with {','.join(names)[:60]!r}, then {reason}", allowed)
     if len(body) > MOST_ROWS:
-        raise InputError(key, f"{path} with more rows", f"at most {MOST_ROWS} rows")
+        raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
     return {
         name: _words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
     }

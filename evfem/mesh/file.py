@@ -143,7 +143,7 @@ def _reason(error: BaseException, said: str, path: Path) -> str:
     if isinstance(error, ModuleNotFoundError):
         reason = f"a format that needs {error.name}: pip install 'evfem[meshes]'"
     elif isinstance(error, KeyError):
-        reason = f"unknown or missing: {reason}"
+        reason = f"{error.args[0]}, which meshio does not know or misses"
     if PHYSICAL in reason:
         reason = "version 4.1 with elements outside of physical groups: save without them, or as 2.2"
     return " ".join(reason.split())[:200] or "damaged, or of a kind that meshio does not know"
