@@ -6,6 +6,7 @@ The command line maps them to its exit status: `InputError` 2, `NotConverged` 3,
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import Enum
@@ -40,7 +41,7 @@ def readable(value: object) -> str:
         start = value[: LONGEST_VALUE + 1]  # a file of 4 MB may be one text
         return _cut(json.dumps(start, ensure_ascii=not start.isprintable()), LONGEST_VALUE)
     try:
-        return _cut(repr(value), LONGEST_VALUE)
+        return _cut(re.sub(r"\bnp\.\w+\((.*?)\)", r"\1", repr(value)), LONGEST_VALUE)  # np.float64(1.0): 1.0
     except (ValueError, RecursionError):  # an integer of too many digits, lists in lists
         return f"{type(value).__name__} too large to show"
 
@@ -72,7 +73,8 @@ def _cut(text: str, most: int) -> str:
 class InputError(EvfemError, ValueError):
     """Input that cannot be used: names the key, what was given and what is allowed.
 
-    `given` is a value, or words (`quoted` makes a value of a text), or `ABSENT`.
+    `given` is a value, or words (`quoted` makes a value of a text), or `ABSENT`. Of the names that are
+    allowed, the one that a text may have meant comes first.
 
     >>> raise InputError("finger.width", -3.0, "a length between 1 and 200 mm")
     Traceback (most recent call last):
@@ -83,6 +85,11 @@ class InputError(EvfemError, ValueError):
     """
 
     def __init__(self, key: str, given: object, allowed: str) -> None:
+        if isinstance(given, str) and given[:1] == given[-1:] == '"' and "? (" not in allowed:
+            names = [name for name in re.split(r" \| |, ", allowed) if " " not in name]
+            close = near(given[1:-1], names)
+            if close and close[0] != given[1:-1] and len(close[0]) > 2:
+                allowed = f"{close[0]}? ({allowed})"
         self.key, self.given, self.allowed = key, given, allowed
         text = "missing" if given is ABSENT else f"given {_words(given)}"
         super().__init__(f"{_line(key)}: {text}; allowed: {allowed}")

@@ -24,7 +24,7 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
-        "hexahedron mesh archive faces solids quality file",
+        "hexahedron mesh archive faces solids quality groups file",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},

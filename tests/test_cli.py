@@ -11,6 +11,7 @@ import time
 from contextlib import suppress
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from tools.commands import called, process_of, run_process
 from tools.fakes import SQUARE_SCENE
@@ -544,7 +545,7 @@ def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path
 def test_an_unknown_study_is_refused_before_any_other_starts(tmp_path):
     status, out, err = called(tmp_path, "study", "section321", "fig99", "--out", "here")
     assert (status, out) == (2, "")
-    assert err.startswith('evfem: study: given "fig99"; allowed: section321, ')
+    assert err.startswith('evfem: study: given "fig99"; allowed: fig09? (section321, ')
     assert files(tmp_path) == []
 
 
@@ -608,3 +609,25 @@ def test_the_exit_status_is_that_of_the_error(monkeypatch, capsys):
         assert cli.main(["plan"]) == status
         assert capsys.readouterr().err.startswith("evfem: ")
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+@pytest.mark.parametrize(
+    ("words", "change", "meant"),
+    [
+        (["plan", "scen.toml"], "", "scene.toml?"),
+        (["plan", "scene.toml"], '[finger]\nresolution = "corse"\n', "coarse? (coarse | "),
+        (["study", "fig5"], "", "fig05? (section321"),
+        (["texture", "show", "weav"], "", "weave? ("),
+    ],
+)
+def test_what_may_have_been_meant_comes_first(tmp_path, words, change, meant):
+    press = 'version = 1\n[surface]\nkind = "flat"\n[[motion]]\nkind = "press"\nindentation = 0.1\n'
+    (tmp_path / "scene.toml").write_text(press + change)
+    status, out, err = called(tmp_path, *words)
+    assert (status, out) == (2, "")
+    assert f"allowed: {meant}" in err
+
+
+def test_numbers_of_numpy_are_shown_as_numbers():
+    with pytest.raises(evfem.errors.InputError, match=r"given 400\.0; allowed: 12 to 24 mm"):
+        evfem.FingerPad(width=np.float64(400.0))

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import set_frozen
-from evfem.common.tables import numbers, read_table
+from evfem.common.checks import choice, set_frozen
+from evfem.common.tables import numbers, read_headed, read_table
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene.keys import shown
 from evfem.scene.options import Solver
 from evfem.scene.scene import DEPTH
-from evfem.simulation.history import SPATIAL, over_depth
+from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, over_depth
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
@@ -133,20 +133,36 @@ class MeasuredCurve:
         sd: float | None = None,
         where: Mapping[str, Any] | None = None,
         depth: float | None = None,
+        columns: Mapping[str, int | str] | None = None,
+        zero: float = 0.0,
+        branch: str | None = None,
     ) -> MeasuredCurve:
         """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of
-        the history: `indentation,normal_force`.
+        the history: `indentation,normal_force`; or with others, of which `columns` names those that are
+        meant, OVER first, by names or numbers from 1: {"indentation": "Travel", "normal_force": 3}.
+
+        Units of the header are converted to mm, N, s, V and MPa. `zero` is the OVER (in these) at which
+        OVER shall be 0, as the travel at first touch. `branch` is "loading", up to the largest OVER, or
+        "unloading", from there on. Rows with gaps are left out, and rows at one place, as rounding makes
+        them, count by their mean.
 
         With a `depth` (mm) the file is in N, mm2 and mJ over this depth, as an experiment is and
         `Result.total`, and what depends on it is divided by it, `sd` too.
         """
-        table = read_table(Path(path), "data")
-        spread = sd if "sd" not in table else table.pop("sd")
-        if len(table) != 2:
-            given = f"{path} with the header {','.join(table)}"
-            raise InputError("data", given, "two columns of the history, as indentation,normal_force; and sd")
-        (over, at), (column, values) = table.items()
-        curve = cls(column, over, at, values, motion, spread, where or {})
+        table = read_headed(Path(path), "data")
+        wanted = dict(zip(table.names, table.names, strict=True)) if columns is None else dict(columns)
+        over, *others = (name for name in wanted if name != "sd")
+        if len(others) != 1 or (columns is None and len(set(table.names)) < len(table.names)):
+            given = f"{Path(path).name} with the header {','.join(table.names)}"
+            allowed = "two columns of the history, as indentation,normal_force; and sd; or `columns`"
+            raise InputError("data", given, allowed)
+        found = [
+            table.column(f"data.columns.{name}", wanted[name], _bases(others[0] if name == "sd" else name))
+            for name in (over, *others, "sd")
+            if name in wanted
+        ]
+        at, values, *spread = _branch(np.column_stack(found), branch).T
+        curve = cls(others[0], over, at - zero, values, motion, spread[0] if spread else sd, where or {})
         return curve if depth is None else curve._per_depth(DEPTH["check"]("data.depth", depth))
 
     def _per_depth(self, depth: float) -> MeasuredCurve:
@@ -274,6 +290,28 @@ def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Float
     if len(spread) not in (1, count) or not (spread > 0.0).all():
         raise InputError("data.sd", shown(sd), rule)
     return {"values": found, "sd": np.broadcast_to(spread, count).copy()}
+
+
+def _bases(name: str) -> tuple[str | None, ...]:
+    """Units of a column of the history, per mm of depth and in all."""
+    return UNITS.get(name), SPATIAL_UNITS.get(name)
+
+
+def _branch(rows: Floats, branch: str | None) -> Floats:
+    """Rows (n, 2 or 3) of a place, a value and perhaps its standard deviation: those of a branch, without
+    gaps, one for each place.
+    """
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    if branch is not None and len(rows):
+        choice("data.branch", branch, ("loading", "unloading"))
+        top = np.flatnonzero(rows[:, 0] == rows[:, 0].max())
+        rows = rows[: top[0] + 1] if branch == "loading" else rows[top[-1] :]
+    starts = np.flatnonzero(np.diff(rows[:, 0], prepend=np.nan) != 0.0)
+    number = np.diff(starts, append=len(rows))[:, None]
+    mean = np.add.reduceat(rows, starts) / number if len(rows) else rows
+    if rows.shape[1] == 3 and len(rows):
+        mean[:, 2] = np.sqrt(np.add.reduceat(rows[:, 2] ** 2, starts)) / number[:, 0]
+    return mean
 
 
 def _setting(key: Any, value: Any) -> Any:

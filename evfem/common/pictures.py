@@ -33,20 +33,22 @@ def read_grey(
 
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise InputError(key, f"{path}, which is too long", allowed)
+            raise InputError(key, f"{path.name}, which is too long", allowed)
         with Image.open(path, formats=formats) as image:
             if image.width * image.height > most_pixels or min(image.size) < 1:
-                raise InputError(key, f"{path}, {image.width} x {image.height} pixels", allowed)
+                raise InputError(key, f"{path.name}, {image.width} x {image.height} pixels", allowed)
             values, white = _values(image)
     except InputError:
         raise
     except OSError as error:
-        raise InputError(key, f"{path} ({error.strerror or 'cut off or of another kind'})", allowed) from None
+        raise InputError(
+            key, f"{path.name} ({error.strerror or 'cut off or of another kind'})", allowed
+        ) from None
     except Exception:  # whatever the many decoders raise for a damaged file
-        raise InputError(key, f"{path} (damaged)", allowed) from None
+        raise InputError(key, f"{path.name} (damaged)", allowed) from None
     known = values[np.isfinite(values)]
     if not known.size:
-        raise InputError(key, f"{path}, in which nothing is to be seen", allowed)
+        raise InputError(key, f"{path.name}, in which nothing is to be seen", allowed)
     low, high = float(known.min()), float(known.max())
     if white is None:
         values = (values - low) / (high - low or 1.0)

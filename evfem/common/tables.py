@@ -6,8 +6,7 @@ import csv
 import io
 import math
 import re
-from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,10 +15,32 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, quoted, unknown
 
-#: most rows of a csv file
-MOST_ROWS = 1_000_000
+#: most rows of a csv file, and most bytes of one
+MOST_ROWS, MOST_BYTES = 1_000_000, 200_000_000
+#: unit -> the one that is meant without a word, and the number of these
+UNITS: Mapping[str, tuple[str, float]] = {
+    **{name: ("mm", size) for name, size in {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3}.items()},
+    "nm": ("mm", 1e-6),
+    "cm": ("mm", 10.0),
+    "m": ("mm", 1e3),
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "V": ("V", 1.0),
+    "kV": ("V", 1e3),
+    "N": ("N", 1.0),
+    "mN": ("N", 1e-3),
+    "kN": ("N", 1e3),
+    "N/mm": ("N/mm", 1.0),
+    "mm2": ("mm2", 1.0),
+    "MPa": ("MPa", 1.0),
+    "kPa": ("MPa", 1e-3),
+    "Pa": ("MPa", 1e-6),
+}
+#: name of a column -> what it is in
+IN = {"time": "s", "voltage": "V", **dict.fromkeys(("x", "y", "z", "height", "position"), "mm")}
 
 
 def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
@@ -94,32 +115,6 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
     return buffer.getvalue()
 
 
-def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
-    """Columns of a csv file whose first line is `header` and whose other lines hold one number per column.
-
-    Raises `InputError` with `key` for a file that cannot be read or has anything else in it, or
-    more than `MOST_ROWS` rows.
-    """
-    allowed = f"a readable csv file with the header {','.join(header)}"
-    columns = [array("d") for _ in header]
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as lines:
-            rows = ((n, [cell.strip() for cell in row]) for n, row in enumerate(csv.reader(lines), 1) if row)
-            _, first = next(rows, (0, []))
-            if first != header:
-                raise InputError(key, f"{path}, which starts with {','.join(first)[:60]!r}", allowed)
-            for number, cells in rows:
-                row = _row(cells, f"{path}, line {number}", len(header), key)
-                if len(columns[0]) == MOST_ROWS:
-                    raise InputError(key, f"{path} with more rows", f"at most {MOST_ROWS} rows")
-                for column, value in zip(columns, row, strict=True):
-                    column.append(value)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(key, f"{path} ({reason})", allowed) from None
-    return [np.array(column) for column in columns]
-
-
 def read_table(path: Path, key: str) -> dict[str, Any]:
     """All columns of a csv file by the names in its first line: arrays of numbers, or lists of words.
 
@@ -132,14 +127,14 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
             rows = [[cell.strip() for cell in row] for row in csv.reader(lines) if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(key, f"{path} ({reason})", allowed) from None
+        raise InputError(key, f"{path.name} ({reason})", allowed) from None
     names, *body = rows or [[]]
     odd = [row for row in body if len(row) != len(names)]
     if odd or not body or len(set(names)) < len(names):
         reason = f"{','.join(odd[0])[:60]!r}" if odd else "no line of values" if not body else "a name twice"
-        raise InputError(key, f"{path} with {','.join(names)[:60]!r}, then {reason}", allowed)
+        raise InputError(key, f"{path.name} with {','.join(names)[:60]!r}, then {reason}", allowed)
     if len(body) > MOST_ROWS:
-        raise InputError(key, f"{path} with more rows", f"at most {MOST_ROWS} rows")
+        raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
     return {
         name: _words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
     }
@@ -156,47 +151,102 @@ class Headed:
     columns: list[Floats]
     commas: bool
 
+    def column(self, key: str, given: int | str, bases: Collection[str | None]) -> Floats:
+        """A column by its name or its number from 1, in one of the units `bases`."""
+        called = [*self.names, *map(str, range(1, len(self.names) + 1))]
+        if str(given).lower() not in called:
+            raise unknown(key, str(given), called, f"{quoted(given)}, which is no column")
+        i = called.index(str(given).lower()) % len(self.names)
+        unit = self.units[i]
+        base, factor = (None, 1.0) if unit is None else UNITS.get(unit, (unit, 1.0))
+        if unit is not None and base not in bases:
+            rule = " | ".join(name for name, (base, _) in UNITS.items() if base in bases) or "no unit"
+            raise InputError(key, f"{self.names[i]} in {unit}", rule)
+        return self.columns[i] if factor == 1.0 else self.columns[i] * factor
+
+
+def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
+    """Columns of a text file (`read_headed`) with exactly the names `header` and a number everywhere, in
+    mm, s and V.
+    """
+    allowed = f"a readable csv file with the header {','.join(header)}"
+    table = read_headed(path, key, allowed, gaps=False)
+    if table.names != header:
+        raise InputError(key, f"{path.name}, which starts with {','.join(table.names)[:60]!r}", allowed)
+    return [table.column(f"{key}.{name}", name, (IN.get(name),)) for name in header]
+
 
 #: name and unit in a header: x [mm], x (mm), x/mm, "x, mm", x_mm
 NAMED = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\)|[/,]\s*([^/,]+)|_([µμunm]?m|[mu]?s))?")
 
 
-def read_headed(path: Path, key: str) -> Headed:
+def read_headed(
+    path: Path, key: str, allowed: str = "a text file with columns of numbers below a header",
+    gaps: bool = True,
+) -> Headed:  # fmt: skip
     """Columns of a text file as instruments write it: below a header, with commas, semicolons, tabs or
-    blanks between them, units beside the names or in a line of their own, UTF-8 or Latin-1.
+    blanks between them, units beside the names or in a line of their own, UTF-8, Latin-1, or UTF-16 with
+    its mark. Without a header columns are called 1, 2, ...
 
-    What stands above the header is left out. Raises `InputError` with `key` for anything else.
+    The header is the last line above the numbers that has as many columns, with or without a # before
+    it; other lines that begin with # or % are left out. Raises `InputError` with `key` for anything
+    else, and for missing numbers without `gaps`.
     """
-    allowed = "a text file with columns of numbers below a header"
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(key, f"{path} ({error.strerror or error})", allowed) from None
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    lines = [(n, line.strip(" \r")) for n, line in enumerate(text.split("\n"), 1) if line.strip()]
-    first = next((i for i, (_, line) in enumerate(lines) if _numeric(_cells(line, _separator(line)))), None)
-    if not first or "\0" in text:
-        raise InputError(key, f"{path}, which starts with {text[:40]!r}", allowed)
-    separator = _separator(lines[first][1])
-    above = [_cells(line, separator) for _, line in lines[:first]]
-    width = len(_cells(lines[first][1], separator))
-    if len(above[-1]) != width or len(lines) - first > MOST_ROWS:
-        given = f"{path}, {len(lines) - first} rows of {width} columns below {','.join(above[-1])[:60]!r}"
-        raise InputError(key, given, f"{allowed}, at most {MOST_ROWS}, with a name for each column")
+    lines = [(n, line.strip(" \r")) for n, line in enumerate(_text(path, key, allowed).split("\n"), 1)]
+    lines = [(n, line) for n, line in lines if line]
+    plain = [(n, line) for n, line in lines if line[0] not in "#%"]
+    found = (_numbers(_cells(line, _separator(line))) for _, line in plain)
+    first = next((i for i, row in enumerate(found) if len(row) > 1 and np.isfinite(row).any()), None)
+    if first is None:
+        start = lines[0][1] if lines else ""
+        raise InputError(
+            key, f"{path.name} without a line of numbers (it starts with {start[:40]!r})", allowed
+        )
+    rows, separator = plain[first:], _separator(plain[first][1])
+    if len(rows) > MOST_ROWS:
+        raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
+    width = len(_cells(rows[0][1], separator))
+    above = [_cells(line.lstrip("#% "), separator) for n, line in lines if n < rows[0][0]]
+    heads = [cells for cells in above if len(cells) == width] or above
+    parts = [_named(cell) for cell in heads[-1]] if heads else []
+    if len(heads) > 1 and len(heads[-2]) == len(parts) and all(_is_unit(cell) for cell in heads[-1]):
+        parts = [(name.lower(), unit.strip("[]()")) for name, unit in zip(*heads[-2:], strict=True)]
+    parts = parts or [(str(i), None) for i in range(1, width + 1)]
+    width = len(parts)
     values = []
-    for number, line in lines[first:]:
-        row = _cells(line, separator)
-        if len(row) != width or not _numeric(row, gaps=True):
-            raise InputError(key, f"{path}, line {number}: {line[:60]!r}", f"{width} numbers on each line")
-        values.append([_real(cell) for cell in row])
-    parts = [_named(cell) for cell in above[-1]]
-    if len(above) > 1 and len(above[-2]) == width and all(_is_unit(cell) for cell in above[-1]):
-        parts = [(name.lower(), unit.strip("[]()")) for name, unit in zip(*above[-2:], strict=True)]
-    commas = separator != "," and any("," in line for _, line in lines[first:])
+    for number, line in rows:
+        row = _numbers(_cells(line, separator))
+        if len(row) != width or not (gaps or all(map(math.isfinite, row))):
+            rule = f"{width} {'' if gaps else 'finite '}numbers on each line"
+            raise InputError(key, f"{path.name}, line {number}: {line[:60]!r}", rule)
+        values.append(row)
+    commas = separator != "," and any("," in line for _, line in rows)
     return Headed([name for name, _ in parts], [unit for _, unit in parts], list(np.array(values).T), commas)
+
+
+def _text(path: Path, key: str, allowed: str) -> str:
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
+    if len(data) > MOST_BYTES:
+        raise InputError(key, f"{path.name} with more rows", f"at most {MOST_BYTES // 10**6} MB")
+    codings = ("utf-16",) if data.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "latin-1")
+    for coding in codings:
+        try:
+            text = data.decode(coding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text
+    raise InputError(key, f"{path.name} (not a text file)", allowed)
+
+
+def is_even(x: Floats) -> bool:
+    """Whether places are evenly spaced, to a tenth of a step, as they are when they were rounded."""
+    step = (x[-1] - x[0]) / max(x.size - 1, 1)
+    return bool(step > 0.0 and np.abs(x - np.linspace(x[0], x[-1], x.size)).max() <= 0.1 * step)
 
 
 def _separator(line: str) -> str | None:
@@ -210,11 +260,12 @@ def _cells(line: str, separator: str | None) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _numeric(cells: list[str], gaps: bool = False) -> bool:
+def _numbers(cells: list[str]) -> list[float]:
+    """Numbers of a line, NaN for gaps; none where one is something else."""
     try:
-        return all(gaps or math.isfinite(value) for value in map(_real, cells)) and (gaps or len(cells) > 1)
+        return [_real(cell) for cell in cells]
     except ValueError:
-        return False
+        return []
 
 
 def _real(cell: str) -> float:
@@ -231,7 +282,10 @@ def _named(cell: str) -> tuple[str, str | None]:
 
 
 def _is_unit(cell: str) -> bool:
-    return re.fullmatch(r"[\[(]?([cµμunm]?m|[mu]?s|m?N|g|m/s\^?2|1/mm|1|-|)[\])]?", cell) is not None
+    return (
+        re.fullmatch(r"[\[(]?([cµμunm]?m|[mu]?s|[mk]?N|N/mm|mm2|k?V|[kM]?Pa|g|m/s\^?2|1/mm|1|-|)[\])]?", cell)
+        is not None
+    )
 
 
 def _words_or_numbers(words: Iterable[str]) -> Any:
@@ -240,14 +294,3 @@ def _words_or_numbers(words: Iterable[str]) -> Any:
         return np.array([float(word) for word in words])
     except ValueError:
         return words
-
-
-def _row(cells: list[str], place: str, columns: int, key: str) -> list[float]:
-    try:
-        row = [float(cell) for cell in cells] if len(cells) == columns else []
-    except ValueError:
-        row = []
-    if not row or not all(map(math.isfinite, row)):
-        given = ",".join(cells)[:60]
-        raise InputError(key, f"{place}: {given!r}", f"{columns} finite numbers on each line")
-    return row

@@ -55,18 +55,18 @@ def read(
         with path.open("rb") as file:
             data = file.read(MOST_BYTES + 1)
     except OSError as error:
-        raise InputError(key, f"{path} ({error.strerror or error})", allowed) from None
+        raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
     if len(data) > MOST_BYTES:
-        raise InputError(key, f"{path}, which is too long", f"at most {MOST_SAMPLES} samples")
+        raise InputError(key, f"{path.name}, which is too long", f"at most {MOST_SAMPLES} samples")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # chunks that scipy does not know
             warnings.filterwarnings("error", "Reached EOF prematurely")
             rate, samples = wavfile.read(io.BytesIO(data))
     except Exception:  # whatever scipy raises for a damaged file
-        raise InputError(key, f"{path}, cut off or of another kind", allowed) from None
+        raise InputError(key, f"{path.name}, cut off or of another kind", allowed) from None
     if samples.ndim > 1 + several or samples.size == 0 or rate <= 0:
-        raise InputError(key, f"{path}, with several channels or no samples", allowed)
+        raise InputError(key, f"{path.name}, with several channels or no samples", allowed)
     return int(rate), samples, _comment(data)
 
 

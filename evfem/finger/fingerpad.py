@@ -61,12 +61,12 @@ RESOLUTIONS: Mapping[str, Divisions] = {
 _SCAN = str | dict[str, list[float]]
 _MESH = instance("the path of a mesh file", str, os.PathLike, Mesh)
 _MESH |= {"key": "mesh", "type": str, "file": meshfile.LARGEST}
-_REGIONS: dict[str, Any] = {"allowed": "a table name = number"}
+_REGIONS: dict[str, Any] = {"allowed": 'a table name = number, or name = "group of the file"'}
 
 
 def _regions(key: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
     for region in given.values():
-        if isinstance(region, bool) or not isinstance(region, Integral):
+        if isinstance(region, bool) or not isinstance(region, Integral | str):
             raise InputError(key, quoted(region), _REGIONS["allowed"])
     return given
 
@@ -228,7 +228,8 @@ def _check_scan(ridges: ScannedRidges, slope: float, spacing: float) -> None:
 
 @dataclass(frozen=True)
 class MeshedFinger:
-    """A finger on a mesh of the user's own: a file or a `Mesh`, whose `regions` are those of `meshfile.read`.
+    """A finger on a mesh of the user's own: a file or a `Mesh`, with the `regions`
+    and `boundaries` of `meshfile.read`.
 
     The mesh is read and checked at once: raises `InputError` when it is faulty or does not fit the materials.
     """
@@ -238,7 +239,12 @@ class MeshedFinger:
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0
     regions: Annotated[
-        Mapping[str, int] | None, _REGIONS, "names of the numbers in the cell data `region`"
+        Mapping[str, int | str] | None,
+        _REGIONS,
+        "names of the numbers in the cell data `region`, or of groups",
+    ] = None
+    boundaries: Annotated[
+        Mapping[str, int | str] | None, _REGIONS, "names of sets that the file calls otherwise"
     ] = None
 
     def __post_init__(self) -> None:
@@ -268,4 +274,6 @@ class MeshedFinger:
     @cached_property
     def _own(self) -> Mesh:
         source = self.source
-        return check(source) if isinstance(source, Mesh) else meshfile.read(source, self.regions)
+        if isinstance(source, Mesh):
+            return check(source)
+        return meshfile.read(source, self.regions, self.boundaries)

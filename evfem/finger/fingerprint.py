@@ -155,10 +155,12 @@ def _from_image(path: Path, pixel: float, height: float, dark: str | None) -> He
     allowed = f"a grey image of at most {MOST} points, or a csv file with the header x,z,height"
     grey, _ = read_grey(path, "finger.ridges", allowed, MOST)
     if min(grey.shape) < 2 or not np.isfinite(grey).all() or not np.ptp(grey) > 0.0:
-        raise InputError("finger.ridges", f"{path} of one grey, one row or with transparent points", allowed)
+        raise InputError(
+            "finger.ridges", f"{path.name} of one grey, one row or with transparent points", allowed
+        )
     if dark is None:
         allowed = "ridges | grooves: what is dark in a picture of a print; scanners and ink show ridges dark"
-        raise InputError("finger.ridge_dark", f"nothing for {path}", allowed)
+        raise InputError("finger.ridge_dark", f"nothing for {path.name}", allowed)
     share = (grey[::-1] - grey.min()) / np.ptp(grey)
     rows, columns = grey.shape
     x, z = (pixel * (np.arange(n) - 0.5 * (n - 1)) for n in (columns, rows))

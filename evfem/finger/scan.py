@@ -18,7 +18,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
-from evfem.common.tables import numbers, read_table
+from evfem.common.tables import numbers, read_headed
 from evfem.errors import InputError, quoted
 from evfem.finger.outline import Ellipse, quintic
 
@@ -69,10 +69,11 @@ class RidgeScan:
     @classmethod
     def from_csv(cls, path: str | Path) -> RidgeScan:
         """The scan in a file with the header `x,height` or `x,y` and one point (mm) in each line."""
-        table = read_table(Path(path), "finger.ridge_scan")
-        if list(table) not in (["x", "height"], ["x", "y"]):
-            raise InputError("finger.ridge_scan", f"{path} with the header {','.join(table)[:60]!r}", ALLOWED)
-        return cls(**table)
+        table = read_headed(Path(path), "finger.ridge_scan", ALLOWED, gaps=False)
+        if table.names not in (["x", "height"], ["x", "y"]):
+            given = f"{Path(path).name} with the header {','.join(table.names)[:60]!r}"
+            raise InputError("finger.ridge_scan", given, ALLOWED)
+        return cls(**{name: table.column("finger.ridge_scan", name, ("mm",)) for name in table.names})
 
     @classmethod
     def of(cls, given: Any) -> RidgeScan:

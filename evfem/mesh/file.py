@@ -1,9 +1,9 @@
 """A user's mesh in, any finger mesh out: names, encoding and checks.
 
-Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ... (nonzero: belongs).
-Files written here also carry the names of the regions as field data (`region:NAME` = number), so that no
-table is needed to read them back. Encoding of `.msh` files: physical groups of surfaces (regions) and of
-lines or points (sets of nodes), or of volumes and surfaces.
+Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ...
+(nonzero: belongs). Files written here also carry the names of the regions as field data
+(`region:NAME` = number), so that no table is needed to read them back. Other formats:
+`evfem.mesh.groups`.
 
 Files are read by meshio, which knows no limits: `parts` bounds the file's size and turns all it
 raises into one reason. A small file that was made to fill the memory still may: see
@@ -15,7 +15,6 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import re
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -26,6 +25,7 @@ import numpy as np
 from evfem.common.arrays import Ints
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
+from evfem.mesh.groups import PHYSICAL, PREFIX, Name, dimension_of, groups_in, regions_in, sets_in
 from evfem.mesh.mesh import CELLS, KINDS, Mesh
 from evfem.mesh.quality import check
 
@@ -34,60 +34,66 @@ if TYPE_CHECKING:
 
 #: largest mesh file that is read, in bytes
 LARGEST = 128 * 2**20
-#: meshio's name of the numbers of physical groups
-PHYSICAL = "gmsh:physical"
-#: Prefix of the field data that carry the names of regions in a `.vtu` file.
-PREFIX = "region:"
-
-#: what cells of a dimension are in physical groups of
-GROUPS: Mapping[int, str] = {2: "surface", 3: "volume"}
+#: kinds of VTK's images -> what they are, with its nodes in order
+PIXELS: Mapping[str, tuple[str, list[int]]] = {
+    "pixel": ("quad", [0, 1, 3, 2]),
+    "voxel": ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6]),
+}
 #: kinds that are refused for what they lack
+_TETRAHEDRA = "Gmsh makes hexahedra of tetrahedra and wedges: docs/howto/mesh.md, From tetrahedra"
 LACKING: Mapping[str, str] = {
     "quad8": "quad8 has no middle node: export quad9 or quad",
     "hexahedron20": "a pressure pulls at the corners of hexahedron20's faces, which contact cannot: export "
     "hexahedron27 or hexahedron",
+    **dict.fromkeys(("tetra", "tetra10", "wedge", "pyramid"), _TETRAHEDRA),
 }
 
-_Names = dict[tuple[int, int], str]
 
+def read(
+    path: str | os.PathLike[str],
+    regions: Mapping[str, Name] | None = None,
+    boundaries: Mapping[str, Name] | None = None,
+) -> Mesh:
+    """The checked mesh, in mm, of a file of at most 128 MB that meshio reads: `.vtu`, `.msh` and
+    others.
 
-def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
-    """The checked mesh, in mm, of a file of at most 128 MB that meshio reads: `.vtu`, `.msh` and others.
-
-    `regions` maps a name to its number in the cell data `region`; it is not needed for physical
-    groups of gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are
-    turned counter-clockwise. Raises `InputError` naming `finger.mesh` or `finger.regions` for
-    everything that cannot be a finger.
+    `regions` maps a name to the name or number of a group of cells in the file; it is not needed where
+    each cell is in one group with a name. `boundaries` does it for sets of nodes. Nodes keep the
+    numbers of the file, cells are turned counter-clockwise. Raises `InputError` naming `finger.mesh`,
+    `finger.regions` or `finger.boundaries` for everything that cannot be a finger.
     """
     path = Path(path)
-    raw, names = _read(path)
+    raw = _read(path)
     body = _body(raw)
-    solid = [k for k, one in enumerate(raw.cells) if _dimension(one.type, body) >= body and len(one)]
+    solid = [k for k, one in enumerate(raw.cells) if dimension_of(one.type, body) >= body and len(one)]
     kind = _one_kind(path, [raw.cells[k].type for k in solid])
     cells = np.vstack([raw.cells[k].data for k in solid]).astype(np.int64)
-    if names:
-        region, region_names = _groups(path, raw, solid, names, body)
-        sets = _group_sets(raw, names, body)
-    else:
-        region, region_names = _numbers(path, raw, solid, regions)
-        sets = {}
-    sets.update(_point_sets(path, raw))
+    try:
+        groups = groups_in(path, raw, body)
+    except ValueError as error:
+        raise InputError("finger.mesh", f"{path.name} with {error}", "one integer per cell") from None
+    region, region_names = regions_in(path, groups, {k: len(raw.cells[k]) for k in solid}, regions)
+    sets = sets_in(path, raw, [one for one in groups if one.block not in solid], boundaries)
     points = raw.points.astype(float) if body == 3 else _plane(path, raw.points)
     mesh = Mesh(points, cells, kind, region, region_names, sets)
-    return check(mesh, str(path))
+    return check(mesh, path.name)
 
 
-def _read(path: Path) -> tuple[meshio.Mesh, _Names]:
+def _read(path: Path) -> meshio.Mesh:
     if not path.is_file():
-        raise InputError("finger.mesh", str(path), "a mesh file that exists")
+        raise InputError("finger.mesh", path.name, "a mesh file that exists")
     try:
         raw = parts(path)
-        return raw, _physical_names(path.read_bytes()) if path.suffix.lower() == ".msh" else {}
     except ValueError as error:
         allowed = "a readable mesh file: .vtu, .msh with physical groups, or another format of meshio's"
-        raise InputError("finger.mesh", f"{path} ({error})", allowed) from error
+        raise InputError("finger.mesh", f"{path.name} ({error})", allowed) from error
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
+    for block in raw.cells:
+        if block.type in PIXELS:
+            block.type, order = PIXELS[block.type]
+            block.data = block.data[:, order]
+    return raw
 
 
 def parts(path: Path) -> meshio.Mesh:
@@ -102,11 +108,16 @@ def parts(path: Path) -> meshio.Mesh:
         start = file.read(1000)
     if b"<!DOCTYPE" in start or b"<!ENTITY" in start or start.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise ValueError("a document type, or no UTF-8 text")
+    if start.startswith(b"$NOD"):
+        raise ValueError("version 1 of Gmsh's format: save as 2.2 or 4.1")
     import meshio
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:
         raise ValueError(f"meshio knows no format {path.suffix or 'without an ending'}")
     said = io.StringIO()
+    meshio._vtk_common.vtk_to_meshio_type[11] = "voxel"  # which it does not know, and pixels by name alone
+    meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)
+    meshio._mesh.topological_dimension.update(pixel=2, voxel=3)
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             warnings.simplefilter("ignore")
@@ -118,29 +129,24 @@ def parts(path: Path) -> meshio.Mesh:
         for block in raw.cells:
             if len(block) and not 0 <= np.min(block.data) <= np.max(block.data) < len(raw.points):
                 raise ValueError("cells of nodes that do not exist")
+        for nodes in raw.point_sets.values():
+            if len(nodes) and not 0 <= np.min(nodes) <= np.max(nodes) < len(raw.points):
+                raise ValueError("sets of nodes that do not exist")
     except (Exception, SystemExit) as error:  # its readers raise anything, and leave where the file is wrong
-        raise ValueError(_reason(error, said.getvalue())) from error
+        raise ValueError(_reason(error, said.getvalue(), path)) from error
     return raw
 
 
-def _reason(error: BaseException, said: str) -> str:
-    """Why meshio could not read a file, on one line."""
-    reason = said if isinstance(error, SystemExit) else str(error)
-    if isinstance(error, KeyError):
-        reason = f"unknown or missing: {reason}"
+def _reason(error: BaseException, said: str, path: Path) -> str:
+    """Why meshio could not read a file, on one line, without the folder."""
+    reason = (said if isinstance(error, SystemExit) else str(error)).replace(str(path), path.name)
+    if isinstance(error, ModuleNotFoundError):
+        reason = f"a format that needs {error.name}: pip install 'evfem[meshes]'"
+    elif isinstance(error, KeyError):
+        reason = f"{error.args[0]}, which meshio does not know or misses"
     if PHYSICAL in reason:
         reason = "version 4.1 with elements outside of physical groups: save without them, or as 2.2"
     return " ".join(reason.split())[:200] or "damaged, or of a kind that meshio does not know"
-
-
-def _physical_names(content: bytes) -> _Names:
-    """(dimension, number) -> name: meshio keeps one group per name, but `nail` may be a region and
-    a boundary.
-    """
-    section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", content, re.DOTALL)
-    row = re.compile(rb'^\s*([0-3])\s+(\d{1,9})\s+"(.*)"\s*$', re.MULTILINE)
-    rows = row.findall(section[1]) if section else []
-    return {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in rows}
 
 
 def _one_kind(path: Path, kinds: list[str]) -> str:
@@ -148,8 +154,8 @@ def _one_kind(path: Path, kinds: list[str]) -> str:
     if len(found) == 1 and found[0] in KINDS:
         return found[0]
     allowed = f"cells of one kind: {', '.join(KINDS[:-1])} or {KINDS[-1]}"
-    allowed += "".join(f" ({LACKING[name]})" for name in found if name in LACKING)
-    given = f"{path} with " + (" and ".join(found) if found else "no two-dimensional") + " cells"
+    allowed += "".join(f" ({why})" for why in dict.fromkeys(LACKING[n] for n in found if n in LACKING))
+    given = f"{path.name} with " + (" and ".join(found) if found else "no two-dimensional") + " cells"
     raise InputError("finger.mesh", given, allowed)
 
 
@@ -160,112 +166,13 @@ def _body(raw: meshio.Mesh) -> int:
     return max([2, *(CELLS[one.type].dimension for one in raw.cells if one.type in CELLS and len(one))])
 
 
-def _dimension(kind: str, body: int) -> int:
-    """Of a kind of cell; kinds that only meshio knows count as parts of the body, and are refused there."""
-    return CELLS[kind].dimension if kind in CELLS else body
-
-
 def _plane(path: Path, points: np.ndarray) -> np.ndarray:
     """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is refused."""
     points = np.asarray(points, dtype=float)
     if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > 1e-9:
-        given = f"{path} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
+        given = f"{path.name} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
         raise InputError("finger.mesh", given, "a plane mesh: the same z everywhere")
     return np.ascontiguousarray(points[:, :2])
-
-
-def _groups(
-    path: Path, raw: meshio.Mesh, solid: list[int], names: _Names, body: int
-) -> tuple[Ints, dict[str, int]]:
-    tag = np.concatenate([_tags(raw)[k] for k in solid])
-    region_names = {name: number for (dimension, number), name in names.items() if dimension == body}
-    lost = sorted(set(np.unique(tag).tolist()) - set(region_names.values()))
-    if lost:
-        given = f"{path} with {int(np.isin(tag, lost).sum())} cells outside every named group"
-        raise InputError("finger.mesh", given, f"every cell in a physical {GROUPS[body]} with a name")
-    present = set(np.unique(tag).tolist())
-    return tag, {name: number for name, number in region_names.items() if number in present}
-
-
-def _group_sets(raw: meshio.Mesh, names: _Names, body: int) -> dict[str, Ints]:
-    sets: dict[str, Ints] = {}
-    for block, tag in zip(raw.cells, _tags(raw), strict=True):
-        dimension = _dimension(block.type, body)
-        for number in np.unique(tag).tolist() if dimension < body else []:
-            if name := names.get((dimension, number)):
-                nodes = block.data[tag == number]
-                sets[name] = np.union1d(sets.get(name, np.empty(0, np.int64)), nodes).astype(np.int64)
-    return sets
-
-
-def _tags(raw: meshio.Mesh) -> list[Ints]:
-    """Numbers of physical groups, 0 for none; Gmsh gives negative ones to curves that run backwards."""
-    tags = raw.cell_data.get(PHYSICAL)
-    return [np.abs(tag) for tag in tags] if tags else [np.zeros(len(one), dtype=int) for one in raw.cells]
-
-
-def _numbers(
-    path: Path, raw: meshio.Mesh, solid: list[int], regions: Mapping[str, int] | None
-) -> tuple[Ints, dict[str, int]]:
-    if "region" not in raw.cell_data:
-        raise InputError(
-            "finger.mesh",
-            f"{path} without region numbers",
-            "integer cell data `region`, or a .msh file with named physical groups",
-        )
-    region = np.concatenate([np.asarray(raw.cell_data["region"][k]).reshape(-1) for k in solid])
-    if not np.isfinite(region).all() or (region != np.round(region)).any():
-        given = f"{path} with cell data `region` that are no integers"
-        raise InputError("finger.mesh", given, "one integer per cell")
-    region = region.astype(np.int64)
-    if regions is None:
-        regions = {
-            name.removeprefix(PREFIX): int(np.ravel(number)[0])
-            for name, number in raw.field_data.items()
-            if name.startswith(PREFIX) and np.size(number) and np.isfinite(number).all()
-        }
-    return region, _checked_names(path, region, regions)
-
-
-def _checked_names(path: Path, region: Ints, regions: Mapping[str, int]) -> dict[str, int]:
-    present = np.unique(region).tolist()
-    nameless = [n for n in present if n not in regions.values()]
-    if nameless:
-        raise InputError(
-            "finger.regions",
-            f"no name for {', '.join(map(str, nameless))} of {path}",
-            "name = number for every number in the cell data `region`",
-        )
-    absent = [name for name, number in regions.items() if number not in present]
-    if absent:
-        raise InputError(
-            "finger.regions",
-            f"{absent[0]} = {regions[absent[0]]}",
-            f"numbers that occur in {path}: {', '.join(map(str, present))}",
-        )
-    double = sorted(name for name, number in regions.items() if list(regions.values()).count(number) > 1)
-    if double:
-        given = f"{' and '.join(double)} with the same number"
-        raise InputError("finger.regions", given, "one name per number")
-    return dict(regions)
-
-
-def _point_sets(path: Path, raw: meshio.Mesh) -> dict[str, Ints]:
-    """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and 1."""
-    sets = {}
-    for name, values in raw.point_data.items():
-        values = np.asarray(values)
-        values = values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
-        if values.ndim != 1:
-            continue
-        if name in ("pad", "bone"):
-            if not np.isfinite(values).all():
-                given = f"{path} with NaN in point data `{name}`"
-                raise InputError("finger.mesh", given, "0 or 1 at every point")
-        elif values.dtype.kind not in "iub" or not np.isin(values, (0, 1)).all():
-            continue
-        sets[name] = np.flatnonzero(values).astype(np.int64)
-    return sets
 
 
 def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:

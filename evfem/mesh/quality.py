@@ -16,7 +16,7 @@ from evfem.errors import InputError
 from evfem.mesh import solids
 from evfem.mesh.hexahedron import PLACES
 from evfem.mesh.mesh import CELLS, KINDS, Mesh
-from evfem.mesh.solids import Refuse, some
+from evfem.mesh.solids import Refuse, some, turned
 
 #: Extent of a finger's outline in mm: other numbers mean other units.
 SMALLEST, LARGEST = 1.0, 200.0
@@ -102,20 +102,15 @@ def _nodes(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _oriented(mesh: Mesh, refuse: Refuse) -> Mesh:
-    """Cells counter-clockwise if all of them were clockwise; a mixture is refused."""
+    """Each cell counter-clockwise."""
     corner = mesh.points[mesh.cells[:, : mesh.corners]]
     x, y = corner[..., 0], corner[..., 1]
     area = 0.5 * np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
-    if (area < 0.0).all():
-        m = mesh.corners
-        order = [0, *range(m - 1, 0, -1)]
-        if mesh.order == 2:
-            order += [m + i for i in range(m - 1, -1, -1)] + ([8] if m == 4 else [])
-        return replace(mesh, cells=mesh.cells[:, order])
-    bad = np.flatnonzero(area <= 0.0)
-    if len(bad):
-        refuse(f"inverted or empty cells (cell {some(bad)})", "all cells turning the same way round")
-    return mesh
+    m = mesh.corners
+    order = [0, *range(m - 1, 0, -1)]
+    if mesh.order == 2:
+        order += [m + i for i in range(m - 1, -1, -1)] + ([8] if m == 4 else [])
+    return turned(mesh, area, order, refuse)
 
 
 def _shapes(mesh: Mesh, refuse: Refuse) -> None:
@@ -228,7 +223,8 @@ def _names(mesh: Mesh, refuse: Refuse) -> None:
     have = ", ".join(sorted(mesh.node_sets)) or "none"
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
-            refuse(f"no boundary {name} (it has {have})", "point data, or physical groups, `pad` and `bone`")
+            fault = f"no node in {name}" if name in mesh.node_sets else f"no boundary {name} (it has {have})"
+            refuse(fault, "sets of nodes `pad` and `bone`, or [finger.boundaries] with their names")
 
 
 def _with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -34,16 +35,21 @@ def some(numbers: Ints) -> str:
 
 
 def oriented(mesh: Mesh, refuse: Refuse) -> Mesh:
-    """Cells right-handed if all of them were left-handed; a mixture is refused."""
+    """Each cell right-handed."""
     corner = mesh.points[mesh.cells[:, :8]]
     middles = corner[:, face_nodes(1)].mean(axis=2)
     volume = np.linalg.det(middles[:, 1::2] - middles[:, ::2])
-    if (volume < 0.0).all():
-        return replace(mesh, cells=mesh.cells[:, MIRRORED[: mesh.cells.shape[1]]])
-    bad = np.flatnonzero(volume <= 0.0)
+    return turned(mesh, volume, MIRRORED[: mesh.cells.shape[1]], refuse)
+
+
+def turned(mesh: Mesh, size: Floats, order: Any, refuse: Refuse) -> Mesh:
+    """Cells of negative size (E,), area or volume, with their nodes in another order."""
+    bad = np.flatnonzero(size == 0.0)
     if len(bad):
-        refuse(f"inverted or empty cells (cell {some(bad)})", "all cells turning the same way round")
-    return mesh
+        refuse(f"empty cells (cell {some(bad)})", "cells with an area or a volume")
+    if (size > 0.0).all():
+        return mesh
+    return replace(mesh, cells=np.where(size[:, None] < 0.0, mesh.cells[:, order], mesh.cells))
 
 
 def connection(mesh: Mesh, refuse: Refuse) -> None:

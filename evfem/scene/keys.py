@@ -112,12 +112,21 @@ def check_size(key: str, path: Path, most: int) -> None:
         size = path.stat().st_size
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
         reason = getattr(error, "strerror", None) or "no path"
-        given = f"{shown(str(path))} ({reason})"
-        raise InputError(key, given, "a file that exists and can be read") from error
+        given, allowed = f"{shown(str(path))} ({reason})", "a file that exists and can be read"
+        close = near(path.name, _beside(path))
+        raise InputError(key, given, f"{close[0]}? ({allowed})" if close else allowed) from error
     if not path.is_file():
         raise InputError(key, f"{path}, which is no file", "a file")
     if size > most:
         raise InputError(key, f"{path} with {size / 2**20:.0f} MB", f"a file of at most {most // 2**20} MB")
+
+
+def _beside(path: Path) -> list[str]:
+    """Names of the files in the folder of a path."""
+    try:
+        return [one.name for one in path.parent.iterdir()]
+    except (OSError, ValueError):
+        return []
 
 
 def columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]]:

@@ -19,16 +19,15 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, instance, number, one_of, real
 from evfem.common.pictures import read_grey
-from evfem.common.tables import Headed, read_headed
+from evfem.common.tables import UNITS, Headed, is_even, read_headed
 from evfem.electrostatics import wav
 from evfem.errors import InputError, quoted
 from evfem.textures.generate import phases
 from evfem.textures.importing import IMPORTERS, POSITIVE, Heights, Importer
 from evfem.textures.texture import QUANTITIES, Texture
 
-#: units of length -> mm, of time -> s
-LENGTHS = {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "nm": 1e-6, "cm": 10.0, "m": 1e3}
-TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+#: units of length -> mm
+LENGTHS = {name: size for name, (base, size) in UNITS.items() if base == "mm"}
 #: names of columns that mean the same, and those that are no lengths
 OTHER_NAMES, PURE = {"z": "height", "position": "x", "distance": "x"}, ("friction", "frequency", "amplitude")
 #: endings of texts that may have a header
@@ -81,7 +80,7 @@ class Image(Heights, kind="image"):
         allowed = f"an image ({', '.join(IMAGES)}) of up to {MOST_PIXELS} pixels, at least 4 wide"
         grey, numbers = read_grey(path, "file", allowed, MOST_PIXELS, IMAGES)
         if grey.shape[1] < 4:
-            raise InputError("file", f"{path}, {grey.shape[1]} x {grey.shape[0]} pixels", allowed)
+            raise InputError("file", f"{path.name}, {grey.shape[1]} x {grey.shape[0]} pixels", allowed)
         line = round(self.row * (grey.shape[0] - 1))
         height = grey[line] * self.depth
         notes = [
@@ -115,7 +114,9 @@ class Table(Heights, kind="csv"):
         quantity = _quantity_of(table.names)
         if quantity is None:
             headers = " | ".join(",".join(header) for header, _ in QUANTITIES.values())
-            raise InputError("file", f"{path}, which starts with {','.join(table.names)[:60]!r}", headers)
+            given = f"{path.name}, which starts with {','.join(table.names)[:60]!r}"
+            raise InputError("file", given, headers)
+        table = _only(table, quantity)
         scales = [_scale(name, own, self.unit) for name, own in _units(table)]
         first, second = (column * scale for column, scale in zip(table.columns, scales, strict=True))
         notes = _said(table, self.unit)
@@ -125,9 +126,18 @@ class Table(Heights, kind="csv"):
 
 
 def _quantity_of(names: list[str]) -> str | None:
-    """Kind of columns with these names."""
+    """What columns of these names are, perhaps among others."""
     usual = [OTHER_NAMES.get(name, name) for name in names]
-    return next((quantity for quantity, (header, _) in QUANTITIES.items() if usual == header), None)
+    found = (q for q, (header, _) in QUANTITIES.items() if all(usual.count(name) == 1 for name in header))
+    return next(found, None)
+
+
+def _only(table: Headed, quantity: str) -> Headed:
+    """The columns of a quantity alone."""
+    usual = [OTHER_NAMES.get(name, name) for name in table.names]
+    i, j = map(usual.index, QUANTITIES[quantity][0])
+    names, units, columns = table.names, table.units, table.columns
+    return Headed([names[i], names[j]], [units[i], units[j]], [columns[i], columns[j]], table.commas)
 
 
 def _units(table: Headed) -> list[tuple[str, str | None]]:
@@ -166,11 +176,11 @@ class Scan(Heights, kind="scan"):
     def __call__(self, path: str | Path) -> Texture:
         path = Path(path)
         if find_spec("SurfaceTopography") is None:
-            raise InputError("file", str(path), 'the extra scans: pip install "evfem[scans]"')
+            raise InputError("file", path.name, 'the extra scans: pip install "evfem[scans]"')
         topography = _topography(path)
         named = topography.unit or self.unit
         if named not in LENGTHS:
-            given = f"{path}, {'without a unit' if named is None else f'in {named}'}"
+            given = f"{path.name}, {'without a unit' if named is None else f'in {named}'}"
             raise InputError("unit", given, f"one of {', '.join(LENGTHS)}")
         scale, note = LENGTHS[named], f"In {named}."
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * scale
@@ -190,20 +200,20 @@ def _topography(path: Path) -> Any:
     allowed = "a scan that SurfaceTopography reads, of up to 50,000,000 points"
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise InputError("file", f"{path}, which is too long", allowed)
+            raise InputError("file", f"{path.name}, which is too long", allowed)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             import SurfaceTopography
 
             reader = SurfaceTopography.open_topography(str(path))
             if np.prod(reader.default_channel.nb_grid_pts) > MOST_POINTS:
-                raise InputError("file", f"{path}, with too many points", allowed)
+                raise InputError("file", f"{path.name}, with too many points", allowed)
             return reader.topography()
     except InputError:
         raise
     except Exception as error:  # forty readers, each with errors of its own
         reason = getattr(error, "strerror", None) or "of an unknown kind or damaged"
-        raise InputError("file", f"{path} ({reason})", allowed) from None
+        raise InputError("file", f"{path.name} ({reason})", allowed) from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -261,15 +271,13 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
     else:
         table = read_headed(path, "file")
         if table.names[0] != "time":
-            raise InputError("file", f"{path}, which starts with {table.names[0]!r}", "a column time first")
-        unit = table.units[0] or "s"
-        if unit not in TIMES:
-            raise InputError("time", f"in {unit}", " | ".join(TIMES))
-        rate = _rate(table.columns[0] * TIMES[unit])
+            given = f"{path.name}, which starts with {table.names[0]!r}"
+            raise InputError("file", given, "a column time first")
+        rate = _rate(table.column("time", 1, ("s",)))
         columns, names = table.columns[1:], table.names[1:]
     which = _channel(channel, names, len(columns))
     if not np.isfinite(columns[which]).all():
-        raise InputError("file", f"{path}, with gaps", "a recording without gaps")
+        raise InputError("file", f"{path.name}, with gaps", "a recording without gaps")
     return rate, columns[which], names[which] if names else ""
 
 
@@ -296,10 +304,9 @@ def _recorded(path: Path, given: str | None, column: str) -> str:
 
 
 def _rate(time: Floats) -> float:
-    steps = np.diff(time)
-    if time.size < 16 or not (steps > 0.0).all() or np.ptp(steps) > 0.01 * steps.mean():
+    if time.size < 16 or not is_even(time):
         raise InputError("time", f"{time.size} rows", "at least 16 rows at an even spacing in s")
-    return float(1.0 / steps.mean())
+    return float((time.size - 1) / (time[-1] - time[0]))
 
 
 def spectrum_of(samples: Floats, rate: float, size: int) -> tuple[Floats, Floats]:

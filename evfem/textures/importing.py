@@ -21,6 +21,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, instance, number, one_of
+from evfem.common.tables import is_even
 from evfem.errors import InputError
 from evfem.textures.texture import Texture
 
@@ -89,6 +90,7 @@ class Heights(Importer):
     def cleaned(self, x: Floats, height: Floats) -> tuple[Floats, Floats, list[str]]:
         """x (n,), heights (n,), both mm, and what was done; x then begins at 0."""
         notes: list[str] = []
+        x, height = x[np.isfinite(x)], height[np.isfinite(x)]
         inside = np.ones(x.size, bool)
         if self.start is not None or self.stop is not None:
             start, stop = self.start or 0.0, np.inf if self.stop is None else self.stop
@@ -133,7 +135,7 @@ def _smoothed(x: Floats, height: Floats, cutoff: float) -> Floats:
     from scipy.ndimage import gaussian_filter1d
 
     step = float(np.ptp(x)) / (x.size - 1)
-    if np.abs(np.diff(x) - step).max() > 0.01 * step:
+    if not is_even(x):
         raise InputError("smooth", "points that are not evenly spaced", "an even spacing, or no smoothing")
     alpha = np.sqrt(np.log(2.0) / np.pi)  # ISO 16610-21
     sigma = alpha * cutoff / np.sqrt(2.0 * np.pi) / step

@@ -78,6 +78,52 @@ def test_a_curve_from_a_file(tmp_path):
     assert MeasuredCurve.from_csv(tmp_path / "plain.csv", sd=0.1).sd.tolist() == [0.1, 0.1]
 
 
+#: as machines write: a note, names, units, a place twice by rounding, a gap, there and back
+MACHINE = """Machine 7, 2 µm
+Time;Standard travel;Standard force
+s;mm;mN
+0,0;0,50;0
+0,1;0,50;2
+0,2;0,70;9
+0,3;0,80;
+0,4;0,90;36
+# turned
+0,5;0,89;35
+0,6;0,69;8
+"""
+
+
+@pytest.mark.parametrize("coding", ["utf-8-sig", "latin-1", "utf-16"])
+@pytest.mark.parametrize("columns", [("Standard travel", "standard FORCE"), (2, 3)])
+def test_a_file_as_machines_write_it(tmp_path, coding, columns):
+    path = tmp_path / "press.csv"
+    path.write_bytes(MACHINE.encode(coding))
+    chosen = dict(zip(("indentation", "normal_force"), columns, strict=True))
+    loading = MeasuredCurve.from_csv(path, 0, columns=chosen, zero=0.5, branch="loading", depth=10.0)
+    np.testing.assert_allclose(loading.at, [0.0, 0.2, 0.4], atol=1e-15)
+    np.testing.assert_allclose(loading.values, [1e-4, 9e-4, 36e-4])  # mN over 10 mm
+    unloading = MeasuredCurve.from_csv(path, 1, columns=chosen, branch="unloading")
+    assert unloading.at.tolist() == [0.9, 0.89, 0.69]
+    np.testing.assert_allclose(unloading.values, [0.036, 0.035, 0.008])
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({}, "press.csv with the header time,standard travel,standard force; allowed: .*`columns`"),
+        ({"columns": {"indentation": 2, "normal_force": "Standard farce"}}, r"standard force\?"),
+        ({"columns": {"indentation": 2, "voltage": 3}}, r"voltage: given standard force in mN; allowed: V"),
+        ({"columns": {"indentation": 2, "normal_force": 3}}, "0.9, then 0.89 .*a curve each"),
+        ({"columns": {"indentation": 2, "normal_force": 3}, "branch": "up"}, r"data\.branch: .*loading"),
+    ],
+)
+def test_what_a_file_of_a_machine_lacks_is_said(tmp_path, given, sentence):
+    (tmp_path / "press.csv").write_text(MACHINE)
+    with pytest.raises(InputError, match=sentence) as caught:
+        MeasuredCurve.from_csv(tmp_path / "press.csv", **given)
+    assert str(tmp_path) not in str(caught.value)
+
+
 def test_values_from_a_file(tmp_path):
     head = "finger.participant,electrostatics.voltage,motion.0.gap,electrostatic_force.last"
     (tmp_path / "hover.csv").write_text(f"{head}\ni,2000,0.5,2e-4\nii,1414,0.25,1e-4\n")
@@ -96,13 +142,13 @@ def test_values_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "then no line of values"),
-        ("indentation,normal_force\n", "then no line of values"),
-        ("indentation,normal_force\n0.1\n", "then '0.1'; allowed: a readable csv file"),
-        ("indentation,indentation\n0.1,2\n", "then a name twice"),
+        ("", "without a line of numbers"),
+        ("indentation,normal_force\n", "without a line of numbers"),
+        ("indentation,normal_force\n0.1\n", "without a line of numbers"),
+        ("indentation,indentation\n0.1,2\n", "header indentation,indentation; allowed: two columns"),
         ("indentation,normal_force,time\n0.1,2,3\n", "indentation,normal_force,time; allowed: two columns"),
         ("indentation,force\n0.1,2\n", "data.column: given an unknown key; allowed: "),
-        ("indentation,normal_force\n0.1,much\n", "data.values: given"),
+        ("indentation,normal_force\n0,0\n0.1,much\n", "line 3: '0.1,much'; allowed: 2 numbers"),
     ],
 )
 def test_damaged_files_are_refused(tmp_path, text, sentence):

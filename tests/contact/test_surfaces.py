@@ -153,7 +153,7 @@ def test_missing_and_binary_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="No such file") as caught:
         Profile.from_csv(tmp_path / "none.csv")
     assert caught.value.key == "surface.file"
-    (tmp_path / "picture.csv").write_bytes(b"\xff\xfe\x00\x01")
+    (tmp_path / "picture.csv").write_bytes(b"\x89PNG\x00\x01")
     with pytest.raises(InputError, match="not a text file"):
         Profile.from_csv(tmp_path / "picture.csv")
 

@@ -71,8 +71,8 @@ def without(name, value=0.0):
     return {"point_data": data}
 
 
-def inverted(cells, region):
-    cells[17] = cells[17, ::-1]
+def crossed(cells, region):
+    cells[17] = cells[17, [0, 1, 3, 2]]
     return cells, region
 
 
@@ -94,7 +94,7 @@ WRONG = {
     "micrometres": (scaled(1e3), "between 1 and 200 mm"),
     "orphan nodes": (changed_cells(lambda c, r: (c[1:], r[1:])), "1 nodes that no cell uses (node 0)"),
     "double nodes": (raw(shifted_copy(0.0)), "nodes in the same place (nodes"),
-    "one inverted cell": (changed_cells(inverted), "inverted or empty cells (cell 17)"),
+    "bow tie": (changed_cells(crossed), "cells (cell 17"),
     "tangled cell": (moved(61 * 5 + 30, [0.0, -2.0]), "cells (cell"),
     "tangled mid-node": (
         moved(raised(half_finger()).cells[80, 4], [0.0, -3.0], raised(half_finger())),
@@ -109,7 +109,7 @@ WRONG = {
     "hanging node": (raw(hanging()), "crosses or touches itself"),
     "no pad": (without("pad", None), "no boundary pad (it has bone)"),
     "no bone": (without("bone", None), "no boundary bone (it has pad)"),
-    "empty pad": (without("pad"), "no boundary pad"),
+    "empty pad": (without("pad"), "no node in pad"),
     "pad of NaN": (without("pad", np.nan), "NaN in point data `pad`"),
     "pad on the bone": (
         {"point_data": raw()["point_data"] | {"pad": raw()["point_data"]["bone"]}},

@@ -341,7 +341,7 @@ WRONG = [
     (OWN_MESH, MESH, "mesh = 3", "finger.mesh", "given 3"),
     (OWN_MESH, MESH, "\nwidth = 16.0", "finger.width", "no geometry keys"),
     (OWN_MESH, MESH, '\nparticipant = "i"', "finger.participant", "no geometry"),
-    (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", 'given "zero"'),
+    (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", "tissue = zero"),
     (OWN_MESH, "E = 0.05", "E = -0.05", "finger.materials.tissue.E", "given -0.05"),
     (TEXTURE, "speed = 20.0", "", "motion[1].speed", "dynamics = viscous"),
     (TEXTURE, "viscosity = 1.0e-3", "", "finger.viscosity", "dynamics = viscous"),

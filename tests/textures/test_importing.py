@@ -60,11 +60,12 @@ HEADS = {
     "blanks": "x [mm] z [um]",
     "line": "Position,Height\nmm,um",
     "nanometres": "x [um],z [nm]",
+    "comment": "# x [mm],z [um]\n# taken on Tuesday",
 }
 
 
 @pytest.mark.parametrize("name", HEADS)
-@pytest.mark.parametrize("coding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize("coding", ["utf-8", "latin-1", "utf-16"])
 def test_each_column_has_the_unit_that_the_header_says(tmp_path, name, coding):
     head = HEADS[name]
     x, z = np.arange(50) * 0.02, 2e-3 * np.cos(np.arange(50.0))  # mm
@@ -107,6 +108,18 @@ def test_decimal_commas_and_gaps(tmp_path):
     (tmp_path / "b.csv").write_text("x,height\n0,0\n1,nan\n2,\n3,3\n4,4\n5,5\n")
     texture = Table(**SOURCE, level="none")(tmp_path / "b.csv")
     assert texture.values.tolist() == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+
+
+def test_columns_beside_the_two_and_rounded_places_are_no_obstacle(tmp_path):
+    place = np.round(np.arange(200) / 30.0, 3)  # steps of 0.033 and 0.034 mm
+    height = np.cos(np.arange(200.0))
+    path = csv(tmp_path / "a.csv", "time [s],x [mm],height [um]", np.arange(200.0), place, height)
+    path.write_text(path.read_text().replace("time", "number"))
+    texture = Table(**SOURCE, level="none", smooth=0.01)(path)
+    np.testing.assert_array_equal(texture.x, place)
+    assert np.abs(texture.values).max() < 1.1e-3
+    missing = csv(tmp_path / "b.csv", "x,height", [0.0, 1.0, np.nan, 3.0, 4.0], np.arange(5.0))
+    assert Table(**SOURCE, level="none")(missing).x.tolist() == [0.0, 1.0, 3.0, 4.0]
 
 
 def test_a_parabola_is_taken_off():
