@@ -19,12 +19,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from evfem.common.arrays import Floats
 from evfem.common.listed import Listed
 from evfem.common.notices import LOG
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
+from evfem.scene import probes
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import ANOTHER, Checkpoint
 from evfem.simulation.doubtful import doubtful
@@ -42,8 +44,9 @@ from evfem.simulation.result import Frame, Result, Row, Saved, provenance
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000
 MANIFEST = ".evfem-files"
-HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
+HISTORY, PROBES, SUMMARY, FIELDS, PICTURE, STATE = (
     "history.csv",
+    "probes.csv",
     "summary.json",
     "fields.pvd",
     "forces.png",
@@ -52,7 +55,7 @@ HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
 #: of a finger in three dimensions: its skin alone, beside the fields of the solid
 SKIN = "skin.pvd"
 OURS = re.compile(
-    r"history\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png|checkpoint\.npz"
+    r"history\.csv|probes\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png|checkpoint\.npz"
 )
 #: what a killed run was writing
 LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
@@ -79,6 +82,7 @@ class RunFolder:
     _series: tuple[ParaViewSeries, ...] = field(default=(), init=False)
     _digest: str = field(default="", init=False)
     _lines: list[str] = field(default_factory=list, init=False)
+    _probe_lines: list[str] = field(default_factory=list, init=False)
     _pending: tuple[Row, Frame | None, Callable[[], dict[str, Any]]] | None = field(default=None, init=False)
 
     def started(self, mesh: Mesh, scene: Scene, total_steps: int) -> None:
@@ -123,10 +127,12 @@ class RunFolder:
             self._open()
         if frame is not None and self._wants(row):
             self._add(row, frame)
+        state = checkpoint()
         if not self.rows or self.rows[-1]["step"] != row["step"]:
             with self._listed.writing(self.path / STATE):
-                self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
+                self._checkpoint.write(self._digest, state, [*self.rows, row])
             self.rows.append(row)
+        self._write_probes(state.get(probes.STATE))
         self._write_history()
         self._write_index(self._series)
         self._pending = None
@@ -150,6 +156,17 @@ class RunFolder:
         header = csv_header(columns_of(self.rows[0])) if self.rows else csv_header()
         with self._listed.writing(self.path / HISTORY):
             write_text(self.path / HISTORY, header + "".join(self._lines))
+
+    def _write_probes(self, values: Floats | None) -> None:
+        """What was found at the probes' points (S, P, K) after every step, where the scene has some."""
+        if values is None or self.mesh is None:
+            return
+        wanted, done = self.scene.output.probes, len(self._probe_lines)
+        new = zip(self.rows[done:], values[done:], strict=True)
+        self._probe_lines += [probes.csv_lines(wanted, row, one) for row, one in new]
+        with self._listed.writing(self.path / PROBES):
+            header = probes.csv_header(self.mesh.dim)
+            write_text(self.path / PROBES, header + "".join(self._probe_lines))
 
     def close(self, result: Result | None) -> dict[str, Any]:
         """Write history, summary and picture of what has converged; returns the summary.
@@ -202,7 +219,8 @@ class RunFolder:
         from evfem.planning.plan import scene_mesh
 
         assert self.resume is not None
-        names = (HISTORY, SUMMARY, PICTURE) if self.plots else (HISTORY, SUMMARY)
+        names = [HISTORY, *([PROBES] if self.scene.output.probes else []), SUMMARY]
+        names += [PICTURE] if self.plots else []
         missing = [name for name in names if not (self.path / name).exists()]
         if not missing:
             return []
@@ -210,6 +228,8 @@ class RunFolder:
         with disk(f"use {self.path}"):
             _remove_left(self.path)
         self.rows, (self.mesh, _) = list(self.resume.rows), scene_mesh(self.scene)
+        if PROBES in missing or SUMMARY in missing:
+            self._write_probes(self.resume.arrays.get(probes.STATE))
         if HISTORY in missing or SUMMARY in missing:  # a kill before the end leaves them a row behind
             self._write_history()
             series = [ParaViewSeries(self.path / name, self.rows) for name in (FIELDS, SKIN)]
@@ -324,9 +344,12 @@ def result_in(path: Path) -> Result:
         with disk(f"read {path}"):
             origin = json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"]
             rows = read_rows((path / HISTORY).read_text(encoding="utf-8"))
-        mesh, _ = scene_mesh(loads(origin["parameters"]))
+            found = (path / PROBES).read_text(encoding="utf-8") if (path / PROBES).is_file() else ""
+        scene = loads(origin["parameters"])
+        mesh, _ = scene_mesh(scene)
         frames = [frame_in(file, row, mesh) for row in rows if (file := _fields_of(path, row)).is_file()]
-        return Result.from_rows(rows, frames, mesh, origin)
+        at_probes = probes.read_csv(found, scene.output.probes, mesh.dim, len(rows)) if found else {}
+        return Result.from_rows(rows, frames, mesh, origin, at_probes)
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise InputError("path", f"{path}, damaged: {error}", allowed) from error
 

@@ -56,7 +56,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics options scene keys written format schema file spatial",
+        "motion terms electrics keys probes options scene written format schema file spatial",
     ),
     "planning": (
         {"numpy"},

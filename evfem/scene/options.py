@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 from evfem.common.checks import GONE, Checked, Within, among, check_fields, number, real, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
+from evfem.scene import probes
 from evfem.solver.strategy import Strategy
 from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.elements import ELEMENTS, elements_on
@@ -110,8 +112,8 @@ class Solver:
 
 @dataclass(frozen=True)
 class Output(Checked):
-    """Which fields are kept. What is left open `evfem run` chooses so that its files of fields stay small
-    (`evfem.export.FieldFiles`).
+    """Which fields are kept, and of which points histories. What is left open `evfem run` chooses so that
+    its files of fields stay small (`evfem.export.FieldFiles`).
     """
 
     every: Annotated[
@@ -127,3 +129,8 @@ class Output(Checked):
     compression: Annotated[
         bool, yes_or_no(), "of the fields' files: a third of the size, slower to write"
     ] = False
+    probes: Annotated[
+        Mapping[str, Any],
+        {"allowed": "a table [output.probes] of names with points or a Probe", "check": probes.checked},
+        "points of the tissue whose stress and strain are kept after every step",
+    ] = field(default_factory=dict)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common import notices
+from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
 from evfem.common.pools import blas_limits
@@ -23,6 +24,7 @@ from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
 from evfem.planning.way import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
+from evfem.scene.probes import STATE, Probes, histories
 from evfem.scene.scene import Scene
 from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
@@ -151,6 +153,9 @@ class Run:
             rise=lambda old, new, target: rise(Part(self.model, old, new), target),
         )
         self.outside, self.sunk = outside(self.model), np.zeros(2)
+        wanted = scene.output.probes
+        self.probes = Probes(wanted, self.model.body.tissue) if wanted else None
+        self.probed: list[Floats] = []
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
@@ -341,6 +346,8 @@ class Run:
         row["jumps"] = row["relaxations"] + self.stepper.snaps - snapped
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
+        if self.probes is not None:
+            self.probed.append(self.probes.at(self.state.u))
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
@@ -375,7 +382,12 @@ class Run:
         if (core := self.model.core) is not None:
             about["core"] = core.told
         about["warnings"] = [*through(self.model, self.sunk), *doubtful(self.scene, self.rows)]
-        return Result.from_rows(self.rows, self.frames, self.model.mesh, about)
+        probes = {}
+        if self.probes is not None:
+            probes = histories(
+                self.scene.output.probes, self.model.mesh.dim, self.probes.stacked(self.probed)
+            )
+        return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes)
 
     # -- checkpoints
 
@@ -387,6 +399,7 @@ class Run:
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
+            **({} if self.probes is None else {STATE: self.probes.stacked(self.probed)}),
             **ledger_arrays(self.ledger, self.state),
         }
 
@@ -397,6 +410,7 @@ class Run:
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)
+        self.probed = list(arrays.get(STATE, ()))
 
 
 def _check_observers(observers: Sequence[Observer]) -> None:
