@@ -53,8 +53,8 @@ def _numbers(allowed: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Probe(Checked):
-    """Points above each other's x (and z): at a `depth` below the undeformed outline, measured vertically,
-    or at the lower boundary of a layer.
+    """Points of the tissue at some x (and z): at a `depth` below the undeformed outline, measured
+    vertically, or `at` the lower boundary of a layer.
 
     >>> Probe(x=[0.0, 0.5], depth=0.85).x
     (0.0, 0.5)
