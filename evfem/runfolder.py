@@ -26,9 +26,9 @@ from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
-from evfem.scene import probes
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import ANOTHER, Checkpoint
+from evfem.simulation.checkpoint import PROBES as AT_PROBES
 from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import (
     columns_of,
@@ -129,7 +129,7 @@ class RunFolder:
             with self._listed.writing(self.path / STATE):
                 self._checkpoint.write(self._digest, state, [*self.rows, row])
             self.rows.append(row)
-        self._write_probes(state.get(probes.STATE))
+        self._write_probes(state.get(AT_PROBES))
         self._write_history()
         self._write_index(self._series)
         self._pending = None
@@ -158,6 +158,8 @@ class RunFolder:
         """What was found at the probes' points (S, P, K) after every step, where the scene has some."""
         if values is None or self.mesh is None:
             return
+        from evfem.scene import probes
+
         wanted, done = self.scene.output.probes, len(self._probe_lines)
         new = zip(self.rows[done:], values[done:], strict=True)
         self._probe_lines += [probes.csv_lines(wanted, row, one) for row, one in new]
@@ -226,7 +228,7 @@ class RunFolder:
             _remove_left(self.path)
         self.rows, (self.mesh, _) = list(self.resume.rows), scene_mesh(self.scene)
         if PROBES in missing or SUMMARY in missing:
-            self._write_probes(self.resume.arrays.get(probes.STATE))
+            self._write_probes(self.resume.arrays.get(AT_PROBES))
         if HISTORY in missing or SUMMARY in missing:  # a kill before the end leaves them a row behind
             self._write_history()
             series = [ParaViewSeries(self.path / name, self.rows) for name in (FIELDS, SKIN)]
@@ -345,10 +347,17 @@ def result_in(path: Path) -> Result:
         scene = loads(origin["parameters"])
         mesh, _ = scene_mesh(scene)
         frames = [frame_in(file, row, mesh) for row in rows if (file := _fields_of(path, row)).is_file()]
-        at_probes = probes.read_csv(found, scene.output.probes, mesh.dim, len(rows)) if found else {}
-        return Result.from_rows(rows, frames, mesh, origin, at_probes)
+        return Result.from_rows(rows, frames, mesh, origin, _probes_in(found, scene, mesh, len(rows)))
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise InputError("path", f"{path}, damaged: {error}", allowed) from error
+
+
+def _probes_in(text: str, scene: Scene, mesh: Mesh, steps: int) -> dict[str, Any]:
+    if not text:
+        return {}
+    from evfem.scene.probes import read_csv
+
+    return read_csv(text, scene.output.probes, mesh.dim, steps)
 
 
 def _fields_of(path: Path, row: Row) -> Path:

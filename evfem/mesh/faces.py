@@ -24,6 +24,8 @@ LINE = np.array([[-1.0], [1.0], [0.0]])
 STARTS, TRIED, ITERATIONS, CLOSE = 5, 8, 30, 1e-9
 #: how far outside of a side or cell, in its own coordinates, a place still belongs to it
 ON = 1e-8
+#: so far from the middle, in these coordinates, a search for a place is given up
+FAR = 10.0
 
 Shape = Callable[[Floats], tuple[Floats, Floats]]
 
@@ -92,23 +94,22 @@ def _nearest(points: Floats, samples: Floats) -> Ints:
 
 
 def inverted(shape: Shape, nodes: Floats, target: Floats, start: Floats) -> Floats:
-    """Places (C, d) where patches with nodes (C, n, d) reach a target (d,), by Newton's method; nan where
+    """Places (C, d) where patches with nodes (C, n, d) reach a target (d,), by Newton's method; inf where
     it does not come there.
     """
     xi = np.tile(start, (len(nodes), 1))
-    size = np.ptp(nodes, axis=1).max(initial=0.0)
-    with np.errstate(all="ignore"):  # far outside of a cell anything may happen
+    with np.errstate(all="ignore"):  # of a place that is lost all is nan
         for _ in range(ITERATIONS):
             value, slope = shape(xi)
             away = target - np.einsum("cn,cnk->ck", value, nodes)
             way = np.einsum("cnk,cnl->ckl", nodes, slope)
-            good = np.isfinite(way).all(axis=(1, 2)) & (np.abs(np.linalg.det(way)) > 0.0)
-            xi = xi + np.einsum(
-                "ckl,cl->ck", np.linalg.inv(np.where(good[:, None, None], way, np.eye(xi.shape[1]))), away
-            )
-            xi[~good] = np.nan
-    xi[~(np.abs(away) <= 1e-9 * size).all(axis=1)] = np.nan
-    return np.where(np.isfinite(xi), xi, np.inf)
+            lost = ~((np.abs(np.linalg.det(way)) > 0.0) & (np.abs(xi - start) < FAR).all(axis=1))
+            way[lost], away[lost] = np.eye(len(target)), np.nan
+            step = np.linalg.solve(way, away[..., None])[..., 0]
+            xi = xi + step
+            if not np.any(np.abs(step) > CLOSE):
+                break
+    return np.where(np.abs(step) <= CLOSE, xi, np.inf)
 
 
 def crossings(mesh: Mesh, region: str | None, level: Floats) -> list[Floats]:

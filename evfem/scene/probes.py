@@ -26,8 +26,6 @@ from evfem.mesh.mesh import Mesh
 from evfem.scene.keys import read
 from evfem.tensor import det, identity
 
-#: name of the numbers (S, P, K) of all points after each step in a checkpoint
-STATE = "probes"
 #: points of all probes at most
 MOST_POINTS = 10_000
 SYMMETRIC = ("xx", "yy", "zz", "xy", "yz", "xz")
@@ -223,6 +221,7 @@ class Probes:
     """
 
     def __init__(self, wanted: Wanted, tissue: Any) -> None:
+        self.wanted = wanted
         self.space, mesh = tissue.space, tissue.space.mesh
         places, layers = [], []
         for name, one in wanted.items():
@@ -270,6 +269,10 @@ class Probes:
     def stacked(self, several: Sequence[Floats]) -> Floats:
         """The numbers of several steps (S, P, K)."""
         return np.array(several).reshape(-1, len(self.place), len(columns(self.space.dim)))
+
+    def histories(self, several: Sequence[Floats]) -> dict[str, ProbeHistory]:
+        """The history of each probe from the numbers of several steps."""
+        return histories(self.wanted, self.space.dim, self.stacked(several))
 
     def at(self, u: Floats) -> Floats:
         """The numbers (P, K) of `columns` at displacements u (N, d)."""

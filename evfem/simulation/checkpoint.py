@@ -23,7 +23,6 @@ import evfem
 from evfem.common.checks import plain
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
-from evfem.scene.probes import STATE as PROBES
 from evfem.simulation.history import COLUMNS, NEEDED, SUMS, columns_of
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
@@ -35,6 +34,8 @@ CHECKPOINT_FORMAT = "evfem-checkpoint-5"
 ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
+#: name of what was found at the points of all probes after each step (S, P, K)
+PROBES = "probes"
 #: arrays whose size a run that has just been set up does not know
 OF_ANY_SIZE = ("candidates", "factor_pressure", PROBES)
 

@@ -23,7 +23,6 @@ from evfem.common.views import curves, plus, table
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.archive import mesh_arrays, mesh_of
 from evfem.mesh.mesh import Mesh
-from evfem.scene.probes import ProbeHistory
 from evfem.simulation.history import (
     COLUMNS,
     DRIFT,
@@ -111,13 +110,15 @@ class Result(History):
     (`SPATIAL`): `position_z`, components of the tangential forces, and the contact areas. There
     `tangential_force` and `applied_tangential_force` are along the direction of the last slide's
     angle (+x before the first), positive where a finger slides by a positive distance.
+
+    `probes` has by name the histories at points that the scene asked for (`evfem.scene.probes`).
     """
 
     frames: list[Frame]
     mesh: Mesh
     provenance: dict[str, Any] = field(default_factory=dict)
     in_space: Mapping[str, Floats] = field(default_factory=dict)
-    probes: Mapping[str, ProbeHistory] = field(default_factory=dict)
+    probes: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def from_rows(
@@ -126,7 +127,7 @@ class Result(History):
         frames: Sequence[Frame],
         mesh: Mesh,
         provenance: dict[str, Any],
-        probes: Mapping[str, ProbeHistory] | None = None,
+        probes: Mapping[str, Any] | None = None,
     ) -> Result:
         """A result from rows as the solver reports them; each row has exactly the keys of
         `COLUMNS`.
@@ -350,9 +351,11 @@ def load(path: str | Path) -> Result:
         raise InputError("result", f"{path}, damaged: {error}", "a file written by Result.save") from error
 
 
-def _probes_from(arrays: Mapping[str, np.ndarray], steps: int) -> dict[str, ProbeHistory]:
-    found = dict[str, ProbeHistory]()
+def _probes_from(arrays: Mapping[str, np.ndarray], steps: int) -> dict[str, Any]:
+    found: dict[str, Any] = {}
     for name in dict.fromkeys(key.split("/")[1] for key in arrays if key.startswith("probes/")):
+        from evfem.scene.probes import ProbeHistory
+
         own = {spec.name: arrays[f"probes/{name}/{spec.name}"] for spec in fields(ProbeHistory)}
         points = len(own["position"])
         for quantity, values in own.items():

@@ -8,7 +8,7 @@ import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,10 +24,10 @@ from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
 from evfem.planning.way import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
-from evfem.scene.probes import STATE, Probes, histories
 from evfem.scene.scene import Scene
 from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
+    PROBES,
     ledger_arrays,
     ledger_of,
     reusable_arrays,
@@ -58,6 +58,9 @@ from evfem.solver.hand import AT_REST, Grip
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
+
+if TYPE_CHECKING:
+    from evfem.scene.probes import Probes
 
 #: what is known where a motion starts
 START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
@@ -153,8 +156,11 @@ class Run:
             rise=lambda old, new, target: rise(Part(self.model, old, new), target),
         )
         self.outside, self.sunk = outside(self.model), np.zeros(2)
-        wanted = scene.output.probes
-        self.probes = Probes(wanted, self.model.body.tissue) if wanted else None
+        self.probes: Probes | None = None
+        if scene.output.probes:
+            from evfem.scene.probes import Probes
+
+            self.probes = Probes(scene.output.probes, self.model.body.tissue)
         self.probed: list[Floats] = []
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
@@ -382,11 +388,7 @@ class Run:
         if (core := self.model.core) is not None:
             about["core"] = core.told
         about["warnings"] = [*through(self.model, self.sunk), *doubtful(self.scene, self.rows)]
-        probes = {}
-        if self.probes is not None:
-            probes = histories(
-                self.scene.output.probes, self.model.mesh.dim, self.probes.stacked(self.probed)
-            )
+        probes = None if self.probes is None else self.probes.histories(self.probed)
         return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes)
 
     # -- checkpoints
@@ -399,7 +401,7 @@ class Run:
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
-            **({} if self.probes is None else {STATE: self.probes.stacked(self.probed)}),
+            **({} if self.probes is None else {PROBES: self.probes.stacked(self.probed)}),
             **ledger_arrays(self.ledger, self.state),
         }
 
@@ -410,7 +412,7 @@ class Run:
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)
-        self.probed = list(arrays.get(STATE, ()))
+        self.probed = list(arrays.get(PROBES, ()))
 
 
 def _check_observers(observers: Sequence[Observer]) -> None:
