@@ -126,6 +126,24 @@ def test_depth_below_a_dome_in_space():
     np.testing.assert_array_equal(position[:, ::2], [[0.3, 0.4], [-0.9, 0.1]])
 
 
+def test_a_point_on_a_border_has_one_material():
+    """Of the lowest region, or of the layer at whose boundary it is: shear stress tells the modulus."""
+    mesh = block(3, 2, width=3.0, height=1.0)
+    low = (mesh.centres[:, 1] < 0.5).astype(int)
+    mesh = replace(mesh, region=low, region_names={"tissue": 0, "skin": 1})
+    laws = {"tissue": ev.NeoHookean(E=0.03, nu=0.4), "skin": ev.NeoHookean(E=0.3, nu=0.4)}
+    probes = {"tissue": [[0.2, 0.5]], "skin": ev.Probe(x=[0.2], at="skin")}
+    motion = [ev.Press(indentation=0.1, steps=1), ev.Slide(distance=0.1, steps=1)]
+    finger, surface, output = ev.MeshedFinger(mesh, laws), ev.Flat(friction=2.0), ev.Output(probes=probes)
+    result = ev.simulate(ev.Scene(finger, surface, motion=motion, output=output))
+    for name, E in (("tissue", 0.03), ("skin", 0.3)):
+        probe = result.probes[name]
+        np.testing.assert_array_equal(probe.position, [[0.2, 0.5]])
+        F, J = probe.deformation_gradient[-1, 0], probe.J[-1, 0]
+        shear = E / 2.8 * (F @ F.T)[0, 1] / J
+        np.testing.assert_allclose(probe.cauchy_stress[-1, 0, 0, 1], shear, rtol=1e-9)
+
+
 class StopAfter:
     def __init__(self, steps):
         self.steps = steps
