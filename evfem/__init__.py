@@ -46,6 +46,7 @@ _NAMES = {
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),
+    "scene.probes": ("Probe",),
     "planning.plan": ("plan",),
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),

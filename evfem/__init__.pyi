@@ -65,6 +65,7 @@ from evfem.scene.motion import VoltageRamp as VoltageRamp
 from evfem.scene.motion import Wait as Wait
 from evfem.scene.options import Output as Output
 from evfem.scene.options import Solver as Solver
+from evfem.scene.probes import Probe as Probe
 from evfem.scene.scene import Scene as Scene
 from evfem.scene.scene import default_scene as default_scene
 from evfem.scene.terms import Boundary as Boundary

@@ -241,8 +241,8 @@ def _finish(folder: RunFolder, result: object) -> int:
 
 def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
     """Print the table of a run, what its result warns of, how far it came, and where its results are."""
-    from evfem.runfolder import SUMMARY, table
-    from evfem.simulation.history import DRIFT, load_drift
+    from evfem.runfolder import SUMMARY
+    from evfem.simulation.history import DRIFT, load_drift, table
 
     if rows:
         print(table(rows, depth=scene.depth))

@@ -17,6 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from evfem.common.arrays import Floats
 from evfem.common.manifest import Manifest
 from evfem.common.notices import LOG
 from evfem.common.storage import disk, refuse_others, replacing, write_text
@@ -25,14 +26,12 @@ from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import ANOTHER, Checkpoint
+from evfem.simulation.checkpoint import PROBES as AT_PROBES
 from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import (
-    UNITS,
-    WHOLE_UNITS,
     columns_of,
     csv_header,
     csv_line,
-    over_depth,
     read_rows,
 )
 from evfem.simulation.result import Frame, Result, Row, Saved, provenance
@@ -40,8 +39,9 @@ from evfem.simulation.result import Frame, Result, Row, Saved, provenance
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000
 MANIFEST = ".evfem-files"
-HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
+HISTORY, PROBES, SUMMARY, FIELDS, PICTURE, STATE = (
     "history.csv",
+    "probes.csv",
     "summary.json",
     "fields.pvd",
     "forces.png",
@@ -50,7 +50,7 @@ HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
 #: of a finger in three dimensions: its skin alone, beside the fields of the solid
 SKIN = "skin.pvd"
 OURS = re.compile(
-    r"history\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png|checkpoint\.npz"
+    r"history\.csv|probes\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png|checkpoint\.npz"
 )
 #: what a killed run was writing
 LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
@@ -75,6 +75,7 @@ class RunFolder:
     _series: tuple[ParaViewSeries, ...] = field(default=(), init=False)
     _digest: str = field(default="", init=False)
     _lines: list[str] = field(default_factory=list, init=False)
+    _probe_lines: list[str] = field(default_factory=list, init=False)
     _pending: tuple[Row, Frame | None, Callable[[], dict[str, Any]]] | None = field(default=None, init=False)
 
     def started(self, mesh: Mesh, scene: Scene, total_steps: int) -> None:
@@ -119,10 +120,12 @@ class RunFolder:
             self._open()
         if frame is not None and self._wants(row):
             self._add(row, frame)
+        state = checkpoint()
         if not self.rows or self.rows[-1]["step"] != row["step"]:
             with self._manifest.writing(self.path / STATE):
-                self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
+                self._checkpoint.write(self._digest, state, [*self.rows, row])
             self.rows.append(row)
+        self._write_probes(state.get(AT_PROBES))
         self._write_history()
         self._write_index(self._series)
         self._pending = None
@@ -146,6 +149,19 @@ class RunFolder:
         header = csv_header(columns_of(self.rows[0])) if self.rows else csv_header()
         with self._manifest.writing(self.path / HISTORY):
             write_text(self.path / HISTORY, header + "".join(self._lines))
+
+    def _write_probes(self, values: Floats | None) -> None:
+        """What was found at the probes' points (S, P, K) after every step, where the scene has some."""
+        if values is None or self.mesh is None:
+            return
+        from evfem.scene import probes
+
+        wanted, done = self.scene.output.probes, len(self._probe_lines)
+        new = zip(self.rows[done:], values[done:], strict=True)
+        self._probe_lines += [probes.csv_lines(wanted, row, one) for row, one in new]
+        with self._manifest.writing(self.path / PROBES):
+            header = probes.csv_header(self.mesh.dim)
+            write_text(self.path / PROBES, header + "".join(self._probe_lines))
 
     def close(self, result: Result | None) -> dict[str, Any]:
         """Write history, summary and picture of what has converged; returns the summary.
@@ -196,7 +212,8 @@ class RunFolder:
         from evfem.planning.plan import scene_mesh
 
         assert self.resume is not None
-        names = (HISTORY, SUMMARY, PICTURE) if self.plots else (HISTORY, SUMMARY)
+        names = [HISTORY, *([PROBES] if self.scene.output.probes else []), SUMMARY]
+        names += [PICTURE] if self.plots else []
         missing = [name for name in names if not (self.path / name).exists()]
         if not missing:
             return []
@@ -204,6 +221,8 @@ class RunFolder:
         with disk(f"use {self.path}"):
             _remove_left(self.path)
         self.rows, (self.mesh, _) = list(self.resume.rows), scene_mesh(self.scene)
+        if PROBES in missing or SUMMARY in missing:
+            self._write_probes(self.resume.arrays.get(AT_PROBES))
         if HISTORY in missing or SUMMARY in missing:  # a kill before the end leaves them a row behind
             self._write_history()
             series = [ParaViewSeries(self.path / name, self.rows) for name in (FIELDS, SKIN)]
@@ -315,11 +334,21 @@ def result_in(path: Path) -> Result:
         with disk(f"read {path}"):
             origin = json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"]
             rows = read_rows((path / HISTORY).read_text(encoding="utf-8"))
-        mesh, _ = scene_mesh(loads(origin["parameters"]))
+            found = (path / PROBES).read_text(encoding="utf-8") if (path / PROBES).is_file() else ""
+        scene = loads(origin["parameters"])
+        mesh, _ = scene_mesh(scene)
         frames = [frame_in(file, row, mesh) for row in rows if (file := _fields_of(path, row)).is_file()]
-        return Result.from_rows(rows, frames, mesh, origin)
+        return Result.from_rows(rows, frames, mesh, origin, _probes_in(found, scene, mesh, len(rows)))
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise InputError("path", f"{path}, damaged: {error}", allowed) from error
+
+
+def _probes_in(text: str, scene: Scene, mesh: Mesh, steps: int) -> dict[str, Any]:
+    if not text:
+        return {}
+    from evfem.scene.probes import read_csv
+
+    return read_csv(text, scene.output.probes, mesh.dim, steps)
 
 
 def _fields_of(path: Path, row: Row) -> Path:
@@ -367,74 +396,3 @@ def _picture(result: Result, path: Path) -> None:
         figure = forces(result).figure
         assert isinstance(figure, Figure)
         figure.savefig(temporary, format="png", dpi=150)
-
-
-#: column of the history -> its head in the table of forces
-HEADS = {
-    "position": "position",
-    "indentation": "indent.",
-    "voltage": "voltage",
-    "applied_force": "applied",
-    "normal_force": "normal",
-    "tangential_force": "tangential",
-    "electrostatic_force": "electrost.",
-}
-WIDTHS = (9, 8, 8, 10, 10, 11, 11)
-
-
-def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
-    """At most about `most` rows of a history, always the last of each motion, in 80 columns; over
-    a whole `depth` (mm), and of a finger in three dimensions, forces are in N.
-
-    >>> row = dict.fromkeys(HEADS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
-    >>> print(table([row]))
-    step motion  position indent. voltage   applied    normal tangential electrost.
-                       mm      mm       V      N/mm      N/mm       N/mm       N/mm
-       1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
-    """
-    units = UNITS if depth is None and not any("contact_area" in row for row in rows) else WHOLE_UNITS
-    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
-    for row in (rows[i] for i in chosen(rows, most)):
-        row = row if depth is None else over_depth(row, depth)
-        sizes = zip(HEADS, WIDTHS, strict=True)
-        numbers = [_number(float(row[name]), _digits(name), width - 1) for name, width in sizes]
-        lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
-    return "\n".join(line.rstrip() for line in lines)
-
-
-def chosen(rows: Sequence[Row], most: int) -> list[int]:
-    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its last.
-
-    >>> chosen([{"motion_index": int(i > 3)} for i in range(104)], 6)
-    [0, 2, 3, 36, 70, 103]
-    """
-    index = [row["motion_index"] for row in rows]
-    ends = [i + 1 for i in range(len(index)) if i + 1 == len(index) or index[i + 1] != index[i]]
-    share = max(most // max(len(ends), 1), 1)
-    picked = []
-    for start, end in zip([0, *ends], ends, strict=False):
-        count = min(share, end - start)
-        picked += [start + round((k + 1) * (end - start) / count) - 1 for k in range(count)]
-    return picked
-
-
-def _line(step: str, motion: str, values: Sequence[str]) -> str:
-    return f"{step:>4} {motion:<7}" + "".join(f"{v:>{w}}" for v, w in zip(values, WIDTHS, strict=True))
-
-
-def _number(value: float, digits: int, width: int) -> str:
-    """With so many decimals, fewer where the column is too narrow for them, and no sign on what
-    rounds to zero.
-
-    >>> _number(-1e-7, 5, 9), _number(-12345.678, 5, 9), _number(-1e12, 5, 9), _number(1.0, 5, 9)
-    ('0.00000', '-12345.68', '-1.00e+12', '1.00000')
-    """
-    for kept in range(digits, -1, -1):
-        text = f"{round(value, kept) + 0.0:.{kept}f}"
-        if len(text) <= width:
-            return text
-    return f"{value:.2e}" if width > 8 else f"{value:.0e}"
-
-
-def _digits(name: str) -> int:
-    return {"position": 3, "indentation": 3, "voltage": 0}.get(name, 5)

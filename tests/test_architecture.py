@@ -55,7 +55,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics options scene keys serialiser format schema file spatial",
+        "motion terms electrics keys probes options scene serialiser format schema file spatial",
     ),
     "planning": (
         {"numpy"},

@@ -2,7 +2,7 @@
 
 import pytest
 
-from evfem.runfolder import chosen, table
+from evfem.simulation.history import chosen, table
 from evfem.simulation.result import COLUMNS
 
 

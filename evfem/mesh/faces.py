@@ -1,4 +1,5 @@
-"""Sides of cells, edges and faces: their shape functions, and how thick a layer is below them.
+"""Sides of cells, edges and faces: their shape functions, how thick a layer is below them, and where
+vertical lines cross them.
 
 An edge has 2 ends, and on quadratic cells a middle. A face has 4 corners, and on quadratic cells 4
 middles of its edges and its centre, counter-clockwise seen from outside. Coordinates go from -1 to 1.
@@ -6,6 +7,8 @@ middles of its edges and its centre, counter-clockwise seen from outside. Coordi
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -19,6 +22,12 @@ LINE = np.array([[-1.0], [1.0], [0.0]])
 #: starts of the search for the nearest place of a face, so many each way; the nearest that are tried; most
 #: iterations, and the change of a place that ends them
 STARTS, TRIED, ITERATIONS, CLOSE = 5, 8, 30, 1e-9
+#: how far outside of a side or cell, in its own coordinates, a place still belongs to it
+ON = 1e-8
+#: so far from the middle, in these coordinates, a search for a place is given up
+FAR = 10.0
+
+Shape = Callable[[Floats], tuple[Floats, Floats]]
 
 
 def shape_functions(nodes: int, places: Floats) -> tuple[Floats, Floats]:
@@ -82,3 +91,48 @@ def _nearest(points: Floats, samples: Floats) -> Ints:
     chunks = np.array_split(points, len(points) // 256 + 1)  # so few need no tree, whose import is slow
     away = (((chunk[:, None] - samples) ** 2).sum(axis=-1) for chunk in chunks)
     return np.concatenate([np.argpartition(one, most - 1, axis=1)[:, :most] for one in away])
+
+
+def inverted(shape: Shape, nodes: Floats, target: Floats, start: Floats) -> Floats:
+    """Places (C, d) where patches with nodes (C, n, d) reach a target (d,), by Newton's method; inf where
+    it does not come there.
+    """
+    xi = np.tile(start, (len(nodes), 1))
+    with np.errstate(all="ignore"):  # of a place that is lost all is nan
+        for _ in range(ITERATIONS):
+            value, slope = shape(xi)
+            away = target - np.einsum("cn,cnk->ck", value, nodes)
+            way = np.einsum("cnk,cnl->ckl", nodes, slope)
+            lost = ~((np.abs(np.linalg.det(way)) > 0.0) & (np.abs(xi - start) < FAR).all(axis=1))
+            way[lost], away[lost] = np.eye(len(target)), np.nan
+            step = np.linalg.solve(way, away[..., None])[..., 0]
+            xi = xi + step
+            if not np.any(np.abs(step) > CLOSE):
+                break
+    return np.where(np.abs(step) <= CLOSE, xi, np.inf)
+
+
+def crossings(mesh: Mesh, region: str | None, level: Floats) -> list[Floats]:
+    """Heights, from below, at which the boundary of a region (None: of all tissue) is crossed by vertical
+    lines at x (and z), level (P, d - 1).
+    """
+    sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
+    _, number = mesh.edges if mesh.dim == 2 else mesh.faces
+    if region is not None:
+        inside = mesh.region == mesh.region_names[region]
+        sides, number = sides[inside], number[inside]
+    patches = mesh.points[sides[np.bincount(number.ravel())[number] == 1]]
+    flat = np.delete(patches, 1, axis=2)
+    margin = 0.2 * np.ptp(flat, axis=1)
+    low, high = flat.min(axis=1) - margin, flat.max(axis=1) + margin
+
+    shape = partial(shape_functions, patches.shape[1])
+    found = []
+    for place in level:
+        near = np.flatnonzero(((low <= place) & (place <= high)).all(axis=1))
+        xi = inverted(shape, flat[near], place, np.zeros(len(place)))
+        on = (np.abs(xi) <= 1.0 + ON).all(axis=1)
+        y = np.sort(np.einsum("cn,cn->c", shape(xi[on])[0], patches[near[on], :, 1]))
+        # a line through the end of two sides meets both
+        found.append(y[np.diff(y, prepend=-np.inf) > 1e-9 * np.ptp(mesh.points)])
+    return found

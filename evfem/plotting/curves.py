@@ -7,6 +7,7 @@ along the abscissa: any column that grows or falls, by default the one that the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from evfem.plotting.figures import (
     ORANGE,
     PURPLE,
     SKY,
+    STYLES,
     VERMILION,
     Panels,
     axes_or_new,
@@ -37,6 +39,7 @@ from evfem.plotting.labels import (
     column_text,
     kind_of,
     named,
+    quantity_label,
     units_of,
     values_of,
 )
@@ -153,11 +156,17 @@ def checked_over(over: str | None, result: Result) -> str:
 
 
 def along(result: Result, name: str, over: str) -> Any:
-    """A column as it is drawn over another one; over the time, of the steps that take none only the last."""
-    values = values_of(result, name)
-    if over != "time" or not len(values):
-        return values
-    return values[np.append(np.diff(result.time) > 0.0, True)]
+    """A column as it is drawn over another one; over the time, of the steps that take none only the
+    last.
+    """
+    return values_of(result, name)[_drawn(result, over)]
+
+
+def _drawn(result: Result, over: str) -> Any:
+    """The steps that are drawn over a column."""
+    if over != "time" or not len(result.time):
+        return slice(None)
+    return np.append(np.diff(result.time) > 0.0, True)
 
 
 def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
@@ -215,6 +224,28 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
     _marked(panels[0], over, result).set_xlabel("")
     panels[-1].set_xlabel(column_label(over, result.units))
     return panels
+
+
+def probes(
+    result: Result, quantity: str = "von_mises", over: str | None = None, ax: Axes | None = None
+) -> Axes:
+    """What was found at the points of all probes, a line for each, over `over` (see `forces`).
+
+    `quantity` is one of a `ProbeHistory`, of a vector or tensor with its component: `cauchy_stress_yy`,
+    `displacement_x`, `principal_stretches_1`. Points are told by their place in the undeformed tissue.
+    """
+    if not result.probes:
+        raise InputError("result", "a run without probes", "a run of a scene with Output(probes=...)")
+    over = checked_over(over, result)
+    rows, x, lines = _drawn(result, over), along(result, over, over), []
+    for probe, look in styled(result.probes):
+        values = probe.component(quantity)[rows]
+        for place, y, style in zip(probe.position, values.T, cycle(STYLES)):
+            label = f"{look['label']} ({', '.join(f'{at + 0.0:.3g}' for at in place)})"
+            lines.append((x, y, look | {"label": label, "linestyle": style}))
+    ax = _marked(curves(ax, lines, "", quantity_label(quantity)), over, result)
+    ax.legend(fontsize="small")
+    return ax
 
 
 def compare(

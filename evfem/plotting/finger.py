@@ -29,7 +29,17 @@ from evfem.plotting.fields import (
     values_of,
     within,
 )
-from evfem.plotting.figures import EDGE, GROUND, STATUS, WIDTH, Panels, add_colorbar, axes_or_new, new_figure
+from evfem.plotting.figures import (
+    EDGE,
+    GROUND,
+    STATUS,
+    WIDTH,
+    Panels,
+    add_colorbar,
+    axes_or_new,
+    new_figure,
+    styled,
+)
 from evfem.plotting.labels import field_label, named
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
@@ -200,6 +210,7 @@ class View:
         _draw_borders(ax, mesh, points)
         _name_bone(ax, mesh, points, window)
         _draw_surface(ax, height, window)
+        _mark_probes(ax, self.result, self.frame, window)
         if self.field in TRACTIONS:
             draw_arrows(ax, mesh, self.frame, self.field, height, window)
         ax.set(xlim=window[:2], ylim=window[2:], aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
@@ -319,6 +330,24 @@ def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: Window) -> None:
     middle = 0.5 * (points[around].min(axis=0) + points[around].max(axis=0))
     if within(middle[None], window)[0]:
         ax.text(middle[0], middle[1], "bone", ha="center", va="center", color="0.5", fontsize="small")
+
+
+def _mark_probes(ax: Axes, result: Result, frame: Frame, window: Window) -> None:
+    """The probes' points where the tissue has them, in the colours of their histories, and their names."""
+    for probe, look in styled(result.probes):
+        moved = probe.displacement[result.step == frame.step]
+        shown = [place for place in (probe.position + moved).reshape(-1, 2) if within(place[None], window)[0]]
+        for place in shown:
+            ax.plot(*place, "o", color=look["color"], markersize=6.0, markeredgecolor="white", zorder=3.0)
+        if shown:
+            box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+            at: dict[str, Any] = {
+                "textcoords": "offset points",
+                "va": "center",
+                "fontsize": "small",
+                "zorder": 3.0,
+            }
+            ax.annotate(look["label"], shown[-1], (6.0, 0.0), color=look["color"], bbox=box, **at)
 
 
 def _draw_surface(ax: Axes, height: Height, window: Window) -> None:

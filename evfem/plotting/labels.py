@@ -36,6 +36,9 @@ TEXTS = {
 FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
 FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
 FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
+#: quantity of a probe -> its unit if it is not MPa
+QUANTITY_UNITS = dict.fromkeys(("deformation_gradient", "green_strain", "principal_stretches", "J"), "")
+QUANTITY_UNITS |= {"displacement": "mm", "strain_energy_density": "N/mm2"}
 #: last word of a key of a scene file -> its unit
 KEY_UNITS = dict.fromkeys(("gap", "indentation", "thickness", "height", "width", "distance", "y"), "mm")
 KEY_UNITS |= {"force": "N/mm", "voltage": "V", "amplitude": "V", "bias": "V", "E": "MPa", "mu": "MPa"}
@@ -106,6 +109,17 @@ def field_label(field: str) -> str:
     ('von Mises stress (MPa)', 'contact pressure (MPa)')
     """
     return with_unit(FIELD_TEXTS.get(field, field.replace("_", " ")), FIELD_UNITS.get(field, "MPa"))
+
+
+def quantity_label(name: str) -> str:
+    """A quantity of a probe, or a component of it, with its unit.
+
+    >>> quantity_label("cauchy_stress_yy"), quantity_label("J"), quantity_label("displacement_x")
+    ('Cauchy stress yy (MPa)', 'volume ratio J', 'displacement x (mm)')
+    """
+    quantity = next((one for one in QUANTITY_UNITS if name.startswith(one)), "")
+    text = FIELD_TEXTS.get(name, name.replace("_", " ").replace("cauchy", "Cauchy").replace("green", "Green"))
+    return with_unit(text, QUANTITY_UNITS.get(quantity, "MPa"))
 
 
 def key_label(key: str, units: Units = UNITS) -> str:

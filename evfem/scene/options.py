@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 from evfem.common.checks import GONE, Checked, Within, among, check_fields, number, real, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
@@ -108,9 +109,19 @@ class Solver:
         return self.element
 
 
+def _probes(key: str, value: Any) -> Any:
+    if value == {}:  # whose check would cost an import
+        return {}
+    from evfem.scene.probes import checked
+
+    return checked(key, value)
+
+
 @dataclass(frozen=True)
 class Output(Checked):
-    """Which fields are kept; left open, `evfem run` keeps their files small (`evfem.export.FieldFiles`)."""
+    """Which fields are kept, and of which points histories. What is left open `evfem run` chooses so that
+    its files of fields stay small (`evfem.export.FieldFiles`).
+    """
 
     every: Annotated[
         int | None,
@@ -125,3 +136,8 @@ class Output(Checked):
     compression: Annotated[
         bool, yes_or_no(), "of the fields' files: a third of the size, slower to write"
     ] = False
+    probes: Annotated[
+        Mapping[str, Any],
+        {"allowed": "a table [output.probes] of names with points or a Probe", "check": _probes},
+        "points of the tissue whose stress and strain are kept after every step",
+    ] = field(default_factory=dict)

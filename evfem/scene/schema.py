@@ -21,6 +21,7 @@ from evfem.finger.fingertip import FINGERS
 from evfem.scene import format as file
 from evfem.scene.keys import VERSION
 from evfem.scene.motion import MOTIONS
+from evfem.scene.probes import Probe
 from evfem.scene.scene import Output, Solver
 from evfem.solver.hand import Hand
 from evfem.solver.strategy import Strategy
@@ -164,6 +165,7 @@ def sections() -> list[Section]:
         section("solver", Solver),
         section("solver.strategy", Strategy),
         section("output", Output),
+        section("output.probes.NAME", Probe),
         *kinds("motion", MOTIONS, "which kind"),
     ]
 
@@ -185,6 +187,7 @@ def schema() -> Schema:
         for one in tables["finger"]
     ]
     friction = {"$ref": "#/definitions/friction"}
+    probe = {"anyOf": [_shape((list[list[float]],)), tables["output.probes.NAME"][0].schema()]}
     inner: dict[str, Schema] = {
         "version": {"const": VERSION},
         "finger": {"anyOf": fingers},
@@ -195,7 +198,7 @@ def schema() -> Schema:
         ),
         "hand": tables["hand"][0].schema(),
         "solver": tables["solver"][0].schema(strategy=tables["solver.strategy"][0].schema()),
-        "output": tables["output"][0].schema(),
+        "output": tables["output"][0].schema(probes={"type": "object", "additionalProperties": probe}),
         "motion": {"type": "array", "minItems": 1, "items": one_of["motion"]},
     }
     (top,) = tables[""]

@@ -237,3 +237,75 @@ def column_of(name: str, values: list[Any]) -> Any:
     if name == "motion":
         return np.array(values, dtype=str)
     return np.array(values, dtype=np.int64 if name in INTEGERS else np.float64)
+
+
+#: column of the history -> its head in the table of forces
+HEADS = {
+    "position": "position",
+    "indentation": "indent.",
+    "voltage": "voltage",
+    "applied_force": "applied",
+    "normal_force": "normal",
+    "tangential_force": "tangential",
+    "electrostatic_force": "electrost.",
+}
+COLUMN_WIDTHS = (9, 8, 8, 10, 10, 11, 11)
+
+
+def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
+    """At most about `most` rows of a history, always the last of each motion, in 80 columns; over
+    a whole `depth` (mm), and of a finger in three dimensions, forces are in N.
+
+    >>> row = dict.fromkeys(HEADS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
+    >>> print(table([row]))
+    step motion  position indent. voltage   applied    normal tangential electrost.
+                       mm      mm       V      N/mm      N/mm       N/mm       N/mm
+       1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
+    """
+    units = UNITS if depth is None and not any("contact_area" in row for row in rows) else WHOLE_UNITS
+    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
+    for row in (rows[i] for i in chosen(rows, most)):
+        row = row if depth is None else over_depth(row, depth)
+        sizes = zip(HEADS, COLUMN_WIDTHS, strict=True)
+        numbers = [_number(float(row[name]), _digits(name), width - 1) for name, width in sizes]
+        lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def chosen(rows: Sequence[Row], most: int) -> list[int]:
+    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its
+    last.
+
+    >>> chosen([{"motion_index": int(i > 3)} for i in range(104)], 6)
+    [0, 2, 3, 36, 70, 103]
+    """
+    index = [row["motion_index"] for row in rows]
+    ends = [i + 1 for i in range(len(index)) if i + 1 == len(index) or index[i + 1] != index[i]]
+    share = max(most // max(len(ends), 1), 1)
+    picked = []
+    for start, end in zip([0, *ends], ends, strict=False):
+        count = min(share, end - start)
+        picked += [start + round((k + 1) * (end - start) / count) - 1 for k in range(count)]
+    return picked
+
+
+def _line(step: str, motion: str, values: Sequence[str]) -> str:
+    return f"{step:>4} {motion:<7}" + "".join(f"{v:>{w}}" for v, w in zip(values, COLUMN_WIDTHS, strict=True))
+
+
+def _number(value: float, digits: int, width: int) -> str:
+    """With so many decimals, fewer where the column is too narrow for them, and no sign on what
+    rounds to zero.
+
+    >>> _number(-1e-7, 5, 9), _number(-12345.678, 5, 9), _number(-1e12, 5, 9), _number(1.0, 5, 9)
+    ('0.00000', '-12345.68', '-1.00e+12', '1.00000')
+    """
+    for kept in range(digits, -1, -1):
+        text = f"{round(value, kept) + 0.0:.{kept}f}"
+        if len(text) <= width:
+            return text
+    return f"{value:.2e}" if width > 8 else f"{value:.0e}"
+
+
+def _digits(name: str) -> int:
+    return {"position": 3, "indentation": 3, "voltage": 0}.get(name, 5)

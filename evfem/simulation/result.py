@@ -106,16 +106,24 @@ class Result(History):
     (`SPATIAL`): `position_z`, components of the tangential forces, and the contact areas. There
     `tangential_force` and `applied_tangential_force` are along the direction of the last slide's
     angle (+x before the first), positive where a finger slides by a positive distance.
+
+    `probes` has by name the histories at points that the scene asked for (`evfem.scene.probes`).
     """
 
     frames: list[Frame]
     mesh: Mesh
     provenance: dict[str, Any] = field(default_factory=dict)
     in_space: Mapping[str, Floats] = field(default_factory=dict)
+    probes: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def from_rows(
-        cls, rows: Sequence[Row], frames: Sequence[Frame], mesh: Mesh, provenance: dict[str, Any]
+        cls,
+        rows: Sequence[Row],
+        frames: Sequence[Frame],
+        mesh: Mesh,
+        provenance: dict[str, Any],
+        probes: Mapping[str, Any] | None = None,
     ) -> Result:
         """A result from rows as the solver reports them; each row has exactly the keys of `COLUMNS`."""
         for row in rows:
@@ -125,7 +133,8 @@ class Result(History):
         columns = {name: column_of(name, [row[name] for row in rows]) for name in COLUMNS}
         further = SPATIAL if mesh.dim == 3 else ()
         in_space = {name: column_of(name, [row[name] for row in rows]) for name in further}
-        return cls(**columns, frames=list(frames), mesh=mesh, provenance=provenance, in_space=in_space)
+        kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "probes": probes or {}}
+        return cls(**columns, frames=list(frames), mesh=mesh, **kept)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -293,6 +302,8 @@ class Result(History):
             if values:
                 arrays[f"frames/{spec.name}"] = np.stack([np.asarray(value) for value in values])
         arrays |= mesh_arrays(self.mesh)
+        for name, probe in self.probes.items():
+            arrays |= {f"probes/{name}/{spec.name}": getattr(probe, spec.name) for spec in fields(probe)}
         arrays["provenance"] = np.array(json.dumps(self.provenance))
         save_arrays(path, arrays)
 
@@ -319,9 +330,25 @@ def load(path: str | Path) -> Result:
             raise ValueError("columns of different length")
         if not isinstance(provenance, dict):
             raise ValueError("no provenance")
-        return Result(**columns, frames=frames, mesh=mesh, provenance=provenance, in_space=in_space)
+        probes = _probes_from(arrays, len(columns["step"]))
+        kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "probes": probes}
+        return Result(**columns, frames=frames, mesh=mesh, **kept)
     except (KeyError, ValueError, TypeError, IndexError, RecursionError) as error:
         raise InputError("result", f"{path}, damaged: {error}", "a file written by Result.save") from error
+
+
+def _probes_from(arrays: Mapping[str, np.ndarray], steps: int) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys(key.split("/")[1] for key in arrays if key.startswith("probes/")):
+        from evfem.scene.probes import ProbeHistory
+
+        own = {spec.name: arrays[f"probes/{name}/{spec.name}"] for spec in fields(ProbeHistory)}
+        points = len(own["position"])
+        for quantity, values in own.items():
+            if values.dtype.kind != "f" or (quantity != "position" and values.shape[:2] != (steps, points)):
+                raise ValueError(f"{quantity} of the probe {name}")
+        found[name] = ProbeHistory(**own)
+    return found
 
 
 def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:

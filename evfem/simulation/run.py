@@ -8,11 +8,12 @@ import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from evfem.common import notices
+from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
 from evfem.common.pools import blas_limits
@@ -26,6 +27,7 @@ from evfem.scene.motion import Course
 from evfem.scene.scene import Scene
 from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
+    PROBES,
     ledger_arrays,
     ledger_of,
     reusable_arrays,
@@ -56,6 +58,9 @@ from evfem.solver.hand import AT_REST, Grip
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
+
+if TYPE_CHECKING:
+    from evfem.scene.probes import Probes
 
 #: what is known where a motion starts
 START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
@@ -169,6 +174,12 @@ class Run:
         if self.model.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
+        self.probes: Probes | None = None
+        if scene.output.probes:
+            from evfem.scene.probes import Probes
+
+            self.probes = Probes(scene.output.probes, self.model.body.tissue)
+        self.probed: list[Floats] = []
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
@@ -349,6 +360,8 @@ class Run:
         row["jumps"] = row["relaxations"] + self.stepper.snaps - snapped
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
+        if self.probes is not None:
+            self.probed.append(self.probes.at(self.state.u))
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
@@ -383,7 +396,8 @@ class Run:
         if (core := self.model.core) is not None:
             about["core"] = core.told
         about["warnings"] = [*through(self.model, self.sunk), *doubtful(self.scene, self.rows)]
-        return Result.from_rows(self.rows, self.frames, self.model.mesh, about)
+        probes = None if self.probes is None else self.probes.histories(self.probed)
+        return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes)
 
     # -- checkpoints
 
@@ -395,6 +409,7 @@ class Run:
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
+            **({} if self.probes is None else {PROBES: self.probes.stacked(self.probed)}),
             **ledger_arrays(self.ledger, self.state),
         }
 
@@ -405,6 +420,7 @@ class Run:
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)
+        self.probed = list(arrays.get(PROBES, ()))
 
 
 def _check_observers(observers: Sequence[Observer]) -> None:

@@ -29,6 +29,8 @@ OF_PAGES = {
     "pictures-stress.png": ("howto/pictures.md", "stress.png"),
     "pictures-beside.png": ("howto/pictures.md", "beside.png"),
     "pictures-slide.gif": ("howto/pictures.md", "slide.gif"),
+    "probes-marks.png": ("howto/probes.md", "marks.png"),
+    "probes-history.png": ("howto/probes.md", "probes.png"),
 }
 EXAMPLES = (
     "pressure stress whole status slide stiffness area tractions energies layers electrovibration hover "

@@ -17,11 +17,13 @@ from evfem.plotting import (
     forces,
     friction,
     history,
+    probes,
     signal,
     spectrum,
 )
 from evfem.plotting.curves import ENERGIES, OVER, abscissa
 from evfem.plotting.labels import kind_of
+from evfem.scene.probes import Probe, columns, histories
 from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS, Result
 
@@ -251,3 +253,20 @@ def test_every_column_has_a_kind_and_a_unit():
     counts = {"step", "motion_index", "motion", "substeps", "newton_iterations", "relaxations", "jumps"}
     assert {name for name in COLUMNS if not kind_of(name)[1]} == counts
     assert kind_of("electrostatic_force_x") == kind_of("normal_force") == ("force per depth", "N/mm")
+
+
+def test_a_line_for_each_point_of_each_probe_over_its_steps():
+    numbers = np.random.default_rng(1).normal(size=(4, 3, len(columns(2))))
+    wanted = {"merkel": [[0.0, 1.0], [2.0, 3.0]], "deep": Probe(x=[0.0], depth=1.0)}
+    result = replace(fake_result(), probes=histories(wanted, 2, numbers))
+    ax = probes(result, "cauchy_stress_xy", over="step")
+    first, second, deep = ax.get_lines()[:3]  # then lines where motions end
+    at = columns(2).index("cauchy_stress_xy")
+    for line, point in ((first, 0), (second, 1), (deep, 2)):
+        np.testing.assert_array_equal(line.get_ydata(), numbers[:, point, at])
+    assert first.get_color() == second.get_color() != deep.get_color()
+    assert ax.get_ylabel() == "Cauchy stress xy (MPa)"
+    with pytest.raises(InputError, match=r"quantity: given .*allowed: displacement_x"):
+        probes(result, "cauchy_stress_xw")
+    with pytest.raises(InputError, match="a run without probes"):
+        probes(fake_result())

@@ -11,15 +11,18 @@ from tools.fakes import fake_result
 from tools.meshes import KINDS, square_mesh
 
 from evfem.errors import InputError
-from evfem.finger.fingerpad import FingerPad
+from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.plotting import FIELDS, contact_pressure, deformed, regions, side_by_side
 from evfem.plotting.fields import CELL_FIELDS, patches, scale_of
 from evfem.scene.file import dump
 from evfem.scene.motion import Press
-from evfem.scene.scene import Scene
+from evfem.scene.probes import Probe
+from evfem.scene.scene import Output, Scene
 from evfem.simulation.model import placed
 from evfem.simulation.result import POINT_FIELDS
-from evfem.surface.surfaces import Sinusoid
+from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Flat, Sinusoid
+from evfem.tissue.laws import NeoHookean
 
 WINDOW = (-0.5, 0.7, -0.1, 0.4)
 
@@ -329,3 +332,17 @@ def test_axes_that_are_given_are_used(tmp_path):
 
 def test_the_fields_are_those_of_a_frame():
     assert set(FIELDS) == {*CELL_FIELDS, "displacement", *POINT_FIELDS}
+
+
+def test_probes_are_marked_where_they_are_and_only_in_the_window():
+    law = NeoHookean(E=0.1, nu=0.4)
+    body = MeshedFinger(square_mesh("quad9"), {"soft": law, "hard": law})
+    output = Output(probes={"merkel": [[0.1, 0.3], [0.4, 0.3]], "deep": Probe(x=[0.0], depth=1.5)})
+    result = simulate(Scene(body, Flat(y=0.0), motion=[Press(indentation=0.2, steps=2)], output=output))
+    for frame, top, names in ((0, 2.0, ["merkel", "deep"]), (1, 0.9, ["merkel"])):
+        ax = deformed(result, frame=frame, near=(-1.0, 1.0, 0.0, top))
+        marks = [line.get_xydata()[0] for line in ax.get_lines() if line.get_marker() == "o"]
+        probes = [result.probes[name] for name in names]
+        moved = np.concatenate([probe.position + probe.displacement[frame] for probe in probes])
+        np.testing.assert_allclose(marks, moved)
+        assert [text.get_text() for text in ax.texts] == names
