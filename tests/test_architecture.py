@@ -29,7 +29,7 @@ ROOMS = {
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
-        "space pattern assembly weakform userforms dynamics drag body",
+        "space pattern assembly weakform userforms branches dynamics body",
     ),
     "finger": (
         {"numpy", "PIL"},

@@ -37,6 +37,7 @@ from evfem.finger.sizes import (
     Materials,
     NailThickness,
     NailWidth,
+    Relaxation,
     Skin,
     Viscosity,
     check_at_most,
@@ -48,6 +49,7 @@ from evfem.finger.sizes import (
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
+from evfem.tissue.moduli import BulkRelaxes
 
 #: The smallest and the largest ratio of height and width.
 SLIMMEST = 0.5, 1.2
@@ -249,6 +251,8 @@ class MeshedFinger:
     regions: Annotated[
         Mapping[str, int] | None, _REGIONS, "names of the numbers in the cell data `region`"
     ] = None
+    relaxation: Relaxation = ()
+    bulk_relaxation: BulkRelaxes = False
 
     def __post_init__(self) -> None:
         check_fields(self, "finger.")

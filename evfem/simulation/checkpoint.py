@@ -30,7 +30,7 @@ from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
 from evfem.solver.state import NO_PRESSURE, Reusable, State, TangentPoint
 
-CHECKPOINT_FORMAT = "evfem-checkpoint-5"
+CHECKPOINT_FORMAT = "evfem-checkpoint-6"
 ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
@@ -59,6 +59,7 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
         "factor_touching": np.zeros(state.status.size, dtype=bool) if at is None else at.touching,
         "factor_status": np.zeros_like(state.status) if at is None else at.status,
         "factor_pressure": NO_PRESSURE if at is None else at.pressure,
+        "factor_inner": state.inner if at is None else at.inner,
         "duration": np.array(carried.duration),
     }
 
@@ -76,6 +77,7 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
             duration=float(arrays["factor_duration"]),
             status=arrays["factor_status"].astype(np.int64),
             pressure=arrays["factor_pressure"],
+            inner=arrays["factor_inner"],
         )
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 

@@ -9,7 +9,7 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
 
     rate <- 1
     repeat, at most `DRAG_STEPS` times
-        solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state
+        solve one equilibrium with drag of this rate (`evfem.tissue.dynamics.Drag`) from the last state
         if it failed: raise the rate, by twice the last factor; give up beyond `DRAG_MOST`
         else: accept; give up if a finger that is pulled has lost the surface
             if the body slows down and the rate is small: solve the equilibrium without drag; if it is

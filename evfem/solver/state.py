@@ -10,6 +10,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import OPEN
 from evfem.solver.strategy import Strategy
+from evfem.tissue.dynamics import NO_BRANCHES
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
@@ -55,7 +56,8 @@ class State:
     too (`evfem.solver.pressure`). With a law of friction other than Coulomb's: how long the pad
     nodes have touched, `age` (P,) in s. With a hand: x of the drive, velocity of the bone and force
     of the drive, `hand` (3,) in mm, mm/s and N/mm. Under a voltage resolved in time each pad node
-    has charges over eps_0 (M, P) in V/mm, two where nothing relaxes (`evfem.contact.charging`).
+    has charges over eps_0 (M, P) in V/mm, two where nothing relaxes (`evfem.contact.charging`). Maxwell
+    branches keep `inner` (`evfem.tissue.branches`).
     """
 
     u: Floats
@@ -71,6 +73,7 @@ class State:
     age: Floats = field(default_factory=lambda: NO_AGE)
     hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
+    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
 
     @property
     def touching(self) -> Any:
@@ -82,8 +85,8 @@ class State:
 class TangentPoint:
     """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,)
     when the step began, whether the attraction was frozen, the time step's displacements at its
-    beginning (N, dim) and its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if
-    that is an unknown.
+    beginning (N, dim) and its seconds, the pad nodes' statuses (P,), the pressure (E, Q) if
+    that is an unknown, and what branches kept when the step began.
     """
 
     u: Floats
@@ -94,6 +97,7 @@ class TangentPoint:
     duration: float
     status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
+    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
 
 
 @dataclass(frozen=True, eq=False)

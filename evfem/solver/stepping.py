@@ -218,7 +218,7 @@ class Stepper:
         """
         self.equilibrium.interface.begin(old, target.duration)
         if self.body is not None and self.body.dynamics is not None:
-            self.body.dynamics.begin(old.u, old.velocity, target.duration)
+            self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner)
 
     def _relaxation(self, body: Body) -> Relaxation:
         """How `body` is released."""

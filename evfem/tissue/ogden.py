@@ -11,7 +11,16 @@ import numpy as np
 from evfem.common.checks import check_fields, real
 from evfem.errors import InputError
 from evfem.tensor import Array, complex_step, ddot, det, inv, mul, symmetric_power, transpose
-from evfem.tissue.moduli import Bulk, Density, PoissonOrNone, Relaxation, bulk_modulus, check_volumetric
+from evfem.tissue.moduli import (
+    Branches,
+    Bulk,
+    BulkRelaxes,
+    Density,
+    PoissonOrNone,
+    Relaxation,
+    bulk_modulus,
+    check_volumetric,
+)
 from evfem.tissue.splitlaw import stepped_tangent
 
 #: largest exponent: stretches of tissue to this power are still numbers
@@ -52,6 +61,8 @@ class Ogden:
     bulk: Bulk = None
     viscosity: Relaxation = None
     density: Density = 1e-9
+    relaxation: Branches = None
+    bulk_relaxation: BulkRelaxes = False
     volume_measure: Literal["log", "trace"] = field(default="log", init=False, repr=False)
 
     def __post_init__(self) -> None:
