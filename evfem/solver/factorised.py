@@ -90,11 +90,6 @@ class FactorisedBody:
         self._renewed = False
         self._scaled_down = False
 
-    @property
-    def at_rest(self) -> Floats:
-        """What branches keep of the undeformed body."""
-        return self.body.at_rest
-
     # -- a step begins
 
     def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
@@ -388,9 +383,8 @@ class FactorisedBody:
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity, its increment and what branches keep of it."""
         velocity, increment = self.body.velocity(state.u), state.u - old.u
-        inner = self.body.inner(state.u)
-        ended = {"velocity": velocity, "last_increment": increment, "inner": inner}
-        return replace(state, pressure=NO_PRESSURE, **ended)
+        state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
+        return replace(state, pressure=NO_PRESSURE)
 
     def admit(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""

@@ -45,7 +45,6 @@ from evfem.solver.interface import Interface
 from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import normals, surface_state
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import NO_BRANCHES
 
 
 def in_vain(residuals: list[float], same: bool) -> bool:
@@ -212,9 +211,7 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        dynamics = self.body.dynamics
-        none = np.zeros_like(state.u), 0.0, NO_BRANCHES
-        begin, seconds, inner = none if dynamics is None else dynamics.beginning
+        begin, seconds, inner = self.body.beginning
         at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
         self._made_at = TangentPoint(*at, state.status, state.pressure, inner)
         self.record.factorisations += 1

@@ -111,6 +111,13 @@ class Body:
         return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
 
     @property
+    def beginning(self) -> tuple[Floats, float, Floats]:
+        """Displacements (N, dim) that the step began with, its seconds, and what branches had kept."""
+        if self.dynamics is None:
+            return np.zeros((self.space.size, self.space.dim)), 0.0, NO_BRANCHES
+        return self.dynamics.beginning
+
+    @property
     def at_rest(self) -> Floats:
         """What branches keep of the undeformed body."""
         return NO_BRANCHES if self.dynamics is None else self.dynamics.at_rest

@@ -122,7 +122,9 @@ def maxwell(u: Any, v: Any, w: Any) -> Any:
     K (theta - theta_v) of those of the bulk.
     """
     F = deformation_gradient(u)
-    bar, A, q = isochoric(F), 0.0, 0.0
+    bar = isochoric(F)
+    A: Any = 0.0
+    q: Any = 0.0
     for branch in w.branches:
         M = branch.before + branch.share * bar
         A = A + branch.shear * det(M) ** (1.0 / 3.0) * inv(M)
