@@ -257,7 +257,19 @@ def _time(scene: Scene) -> Term:
     if terms is None:
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
     lost = lost and f"; without speed quasi-static, {lost}"
-    return Term("time", True, f"{dynamics}, {terms.scheme}{lost}")
+    return Term("time", True, f"{dynamics}, {terms.scheme}{_relaxing(scene)}{lost}")
+
+
+def _relaxing(scene: Scene) -> str:
+    """Relaxation times of the tissue's branches beside the seconds of the steps."""
+    givers = (scene.finger, *scene.finger.materials.values())
+    times = [time for one in givers for _, time in getattr(one, "relaxation", None) or ()]
+    if not times:
+        return ""
+    parts = [(one.course, one.part(k)[2]) for one in scene.motion for k in (1, one.steps)]
+    steps = [course.seconds(count) for course, count in parts if course.takes_time]
+    told = f"; branches relax in {min(times):.2g} to {max(times):.2g} s"
+    return told + (f", steps take {min(steps):.2g} to {max(steps):.2g} s" if steps else "")
 
 
 def _hand(scene: Scene) -> tuple[Term, ...]:
