@@ -266,7 +266,7 @@ def _relaxing(scene: Scene) -> str:
     times = [time for one in givers for _, time in getattr(one, "relaxation", None) or ()]
     if not times:
         return ""
-    parts = [(one.course, one.part(k)[2]) for one in scene.motion for k in (1, one.steps)]
+    parts = [(one.course, one.part(k)[2]) for one in scene.motion for k in {1, min(2, one.steps), one.steps}]
     steps = [course.seconds(count) for course, count in parts if course.takes_time]
     told = f"; branches relax in {min(times):.2g} to {max(times):.2g} s"
     return told + (f", steps take {min(steps):.2g} to {max(steps):.2g} s" if steps else "")
