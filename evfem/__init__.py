@@ -65,6 +65,7 @@ _NAMES = {
     "estimate.touch": ("Touch",),
     "tissue.forms": ("form", "grad"),
     "tissue.laws": ("LinearElastic", "NeoHookean", "Ogden", "Yeoh"),
+    "tissue.ogden": ("relaxation_of",),
 }
 #: public modules -> where they are
 _MODULES = {

@@ -113,6 +113,7 @@ from evfem.tissue.laws import LinearElastic as LinearElastic
 from evfem.tissue.laws import NeoHookean as NeoHookean
 from evfem.tissue.laws import Ogden as Ogden
 from evfem.tissue.laws import Yeoh as Yeoh
+from evfem.tissue.ogden import relaxation_of as relaxation_of
 
 materials = _laws
 meshfile = _mesh_file

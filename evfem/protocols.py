@@ -55,7 +55,9 @@ class RoughnessLaw(Protocol):
 
 @runtime_checkable
 class StressLaw(Protocol):
-    """A material by its stress. Optional: `psi` too, `viscosity` in s, `density` in t/mm3."""
+    """A material by its stress. Optional: `psi` too, `viscosity` in s, `density` in t/mm3,
+    rows `relaxation`.
+    """
 
     def P(self, F: Any) -> Any:
         """First Piola-Kirchhoff stress (3, 3, ...) in MPa at the deformation gradient F (3, 3, ...)."""

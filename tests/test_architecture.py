@@ -28,7 +28,8 @@ ROOMS = {
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
-        "forms splitlaw ogden laws kernels.blocks space pattern assembly weakform userforms dynamics body",
+        "forms splitlaw ogden laws kernels.blocks space pattern assembly weakform userforms branches "
+        "dynamics body",
     ),
     "finger": (
         {"numpy", "PIL"},

@@ -31,6 +31,7 @@ from evfem.finger.sizes import (
     Materials,
     NailThickness,
     NailWidth,
+    Relaxation,
     Skin,
     Viscosity,
     check_at_most,
@@ -42,6 +43,7 @@ from evfem.finger.sizes import (
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
+from evfem.tissue.ogden import BulkRelaxes
 
 #: The smallest and the largest ratio of height and width.
 SLIMMEST = 0.5, 1.2
@@ -246,6 +248,8 @@ class MeshedFinger:
     boundaries: Annotated[
         Mapping[str, int | str] | None, _REGIONS, "names of sets that the file calls otherwise"
     ] = None
+    relaxation: Relaxation = ()
+    bulk_relaxation: BulkRelaxes = False
 
     def __post_init__(self) -> None:
         check_fields(self, "finger.")

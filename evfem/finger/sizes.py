@@ -18,6 +18,7 @@ from evfem.finger.outline import Ridges
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import Material
 from evfem.tissue.laws import LAWS, NeoHookean
+from evfem.tissue.ogden import BRANCHES, BulkRelaxes, Pairs
 
 #: What can be meshed well: the largest slope of the wall of a rounded and of a flat-topped ridge, and the
 #: smallest distance between bone and dermis (mm).
@@ -58,6 +59,7 @@ BoneWidth = Annotated[float, between(2.0, 12.0, "mm"), "full width of the bone"]
 BoneHeight = Annotated[float, between(2.0, 10.0, "mm"), "full height of the bone"]
 BoneOffset = Annotated[float, between(-1.0, 3.0, "mm"), "centre of the bone above that of the finger"]
 Viscosity = Annotated[float, between(0.0, 1e3, "s"), "relaxation time of materials without their own"]
+Relaxation = Annotated[Pairs, BRANCHES, "Maxwell branches of materials without their own"]
 NailThickness = Annotated[float, _thickness("nail"), "of the nail"]
 NailWidth = Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"]
 Materials = Annotated[
@@ -119,6 +121,8 @@ class LayeredFinger:
     materials: Materials = field(default_factory=dict)
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0
+    relaxation: Relaxation = ()
+    bulk_relaxation: BulkRelaxes = False
     layers: ClassVar[tuple[TissueLayer, ...]] = LAYERS
     beside: ClassVar[tuple[TissueLayer, ...]] = ()
 

@@ -143,6 +143,15 @@ def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
     return mesh, scene.solver.element_on(mesh.corners)
 
 
+def probed(scene: Scene) -> str | None:
+    """A sentence where probes lack what branches carry, else None."""
+    laws = scene.finger.materials.values()
+    relaxes = getattr(scene.finger, "relaxation", ()) or any(getattr(law, "relaxation", ()) for law in laws)
+    if not (scene.output.probes and scene.solver.timed and relaxes):
+        return None
+    return "probes have the stress and the energy of the law at rest, without what its branches add"
+
+
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
     check_parts(scene, mesh.dim)
@@ -159,6 +168,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         too_fast(scene),
         left_out(scene),
         unseen(scene, mesh),
+        probed(scene),
         *oscillating(scene, mesh),
         *drifting(scene, mesh, moduli),
     )
@@ -270,7 +280,19 @@ def _time(scene: Scene) -> Term:
     if terms is None:
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
     lost = lost and f"; without speed quasi-static, {lost}"
-    return Term("time", True, f"{dynamics}, {terms.scheme}{lost}")
+    return Term("time", True, f"{dynamics}, {terms.scheme}{_relaxing(scene)}{lost}")
+
+
+def _relaxing(scene: Scene) -> str:
+    """Relaxation times of the tissue's branches beside the seconds of the steps."""
+    givers = (scene.finger, *scene.finger.materials.values())
+    times = [time for one in givers for _, time in getattr(one, "relaxation", None) or ()]
+    if not times:
+        return ""
+    parts = [(one.course, one.part(k)[2]) for one in scene.motion for k in {1, min(2, one.steps), one.steps}]
+    steps = [course.seconds(count) for course, count in parts if course.takes_time]
+    told = f"; branches relax in {min(times):.2g} to {max(times):.2g} s"
+    return told + (f", steps take {min(steps):.2g} to {max(steps):.2g} s" if steps else "")
 
 
 def _hand(scene: Scene) -> tuple[Term, ...]:

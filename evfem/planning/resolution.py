@@ -130,7 +130,7 @@ def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
 
 def _longest(scene: Scene) -> tuple[int, float]:
     """The motion with the longest steps, presses being from first touch, and their seconds."""
-    steps = [motion.course.seconds() / motion.steps for motion in scene.motion]
+    steps = [motion.course.seconds() / motion.part(motion.steps)[2] for motion in scene.motion]
     return steps.index(max(steps)), max(steps)
 
 

@@ -11,6 +11,8 @@ from evfem.errors import InputError, quoted
 
 Hold = Literal["indentation", "force"]
 
+#: decades that the times of a wait with logarithmic steps span
+DECADES = 3.0
 #: a voltage (V) that is not known before the run
 UNKNOWN_VOLTAGE = 10_000.0
 
@@ -89,7 +91,7 @@ class Course:
         """Whether any time passes."""
         return self.speed is not None or self.duration > 0.0
 
-    def seconds(self, steps: int = 1, start: float = 0.0) -> float:
+    def seconds(self, steps: float = 1, start: float = 0.0) -> float:
         """Seconds of each of so many equal steps, from the indentation `start` (mm).
 
         >>> Course(indentation=1.5, speed=2.0).seconds(steps=10, start=0.5)
@@ -110,6 +112,12 @@ class Motion(Named):
     def course(self) -> Course:
         """What it does."""
         raise NotImplementedError
+
+    def part(self, step: int) -> tuple[float, float, float]:
+        """Shares of it, 0 to 1, that are done before and after a step (from 1 on), and how many of such
+        steps it would have.
+        """
+        return (step - 1) / self.steps, step / self.steps, self.steps
 
     def _check_one_of(self, *names: str) -> None:
         given = [name for name in names if getattr(self, name) is not None]
@@ -227,10 +235,22 @@ class Wait(Motion, kind="wait"):
     duration: Annotated[float, _DURATION, "how long it stays"]
     steps: Steps = 100
     hold: Held = "indentation"
+    spacing: Annotated[
+        str,
+        one_of("even", "log"),
+        "log: steps that grow, from 1/1000 of it on, for tissue that relaxes",
+    ] = "even"
 
     @property
     def course(self) -> Course:
         return Course(duration=self.duration, hold=self.hold)
+
+    def part(self, step: int) -> tuple[float, float, float]:
+        if self.spacing == "even":
+            return super().part(step)
+        ends = [10.0 ** (DECADES * (k / self.steps - 1.0)) for k in (step - 1, step)]
+        begun, reached = ends if step > 1 else (0.0, ends[1])
+        return begun, reached, 1.0 / (reached - begun)
 
 
 MOTIONS = Motion.kinds

@@ -327,9 +327,10 @@ def _check_dynamics(scene: Scene) -> None:
     if not solver.timed:
         return
     _check_speeds(scene, f"dynamics = {solver.dynamics}")
-    own = [getattr(law, "viscosity", None) or 0.0 for law in scene.finger.materials.values()]
-    if not solver.inertial and not max([scene.finger.viscosity, *own]) > 0.0:
-        allowed = f"a relaxation time in s, larger than 0, with dynamics = {solver.dynamics}"
+    givers = (scene.finger, *scene.finger.materials.values())
+    timed = any(getattr(one, "viscosity", None) or getattr(one, "relaxation", None) for one in givers)
+    if not solver.inertial and not timed:
+        allowed = f"a relaxation time in s, larger than 0, or relaxation, with dynamics = {solver.dynamics}"
         raise InputError("finger.viscosity", 0.0, allowed)
 
 

@@ -107,7 +107,9 @@ def _in_time(part: Part) -> Floats:
     way, dynamics = new.u - old.u, part.model.body.dynamics
     held = np.array([0.5 * body.drag_dissipation(old.u + s * way) for s in PLACES])
     if dynamics is not None and dynamics.step > 0.0:
-        held = held + 0.5 * dynamics.dissipation(new.u) * PLACES**2
+        held = held + 0.5 * dynamics.damping(new.u) * PLACES**2
+        if dynamics.branches is not None:
+            held = held + [dynamics.branches.potential(old.u + s * way) for s in PLACES]
         speed = way / dynamics.step
         held = held + [dynamics.kinetic_energy(s * speed - old.velocity) for s in PLACES]
     return held - held[0]

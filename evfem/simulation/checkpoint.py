@@ -28,7 +28,7 @@ from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
 from evfem.solver.state import Reusable, State, TangentPoint
 
-CHECKPOINT_FORMAT = "evfem-checkpoint-5"
+CHECKPOINT_FORMAT = "evfem-checkpoint-6"
 ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
@@ -47,7 +47,9 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """What a solver takes with it to the next step; of the same shapes with and without a factorisation."""
     at, status = carried.tangent_point, state.status
     begun = np.zeros_like(state.u)
-    nowhere = TangentPoint(begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status))
+    nowhere = TangentPoint(
+        begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status), inner=state.inner
+    )
     made_at = {
         f"factor_{spec.name}": np.asarray(getattr(at or nowhere, spec.name)) for spec in fields(nowhere)
     }

@@ -96,7 +96,7 @@ def make_model(scene: Scene) -> Model:
     ]
     dynamics = None
     if needed.has("time"):
-        dynamics = make_dynamics(space, laws, scene.finger.viscosity, solver.dynamics)
+        dynamics = make_dynamics(space, laws, scene.finger, solver.dynamics)
     body = Body(space, laws, terms, dynamics)
     deepest = (
         0.0  # of a solid, whose dense compliance has three unknowns a node: candidates as they are needed

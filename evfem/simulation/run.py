@@ -234,9 +234,10 @@ class Run:
             if let_go and done <= first and (said := unheld(self.model, self.state, self.rows)):
                 notices.warn(f"motion {index}: {said}")
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
-                seconds, now = course.seconds(motion.steps, start["indentation"]), self.time
-                begin = self._target(course, start, (k - 1) / motion.steps, now)
-                end = self._target(course, start, k / motion.steps, now + seconds)
+                begun, reached, steps = motion.part(k)
+                seconds, now = course.seconds(steps, start["indentation"]), self.time
+                begin = self._target(course, start, begun, now)
+                end = self._target(course, start, reached, now + seconds)
                 if first + k == 1 and not self._follows(seconds):
                     # the voltage acts in full; only a first step in parts raises it on the way
                     begin = replace(begin, drive=GivenVoltage(0.0))

@@ -23,7 +23,9 @@ The history has
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
-- ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
+- ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative, and what Maxwell branches
+  lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after which
+  they are at rest, loses all of it.
 
 Their difference is computed term by term without the work of the bone, so the balance is a check
 that the forces of the accepted states are in equilibrium:
@@ -169,7 +171,8 @@ class Part:
         springs = float(0.5 * np.sum(self.compliance * new.contact_force**2))
         if (hand := self.model.scene.hand) is not None:
             springs, kinetic = springs + hand.stored(new), kinetic + hand.kinetic(new)
-        return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
+        stored = body.energy(new.u) + (0.0 if body.dynamics is None else body.dynamics.branch_energy(new.u))
+        return Books(body.forces(new.u) - given, given, stored, springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
         """Contributions of the part to `SUMS`, N mm per mm of depth."""

@@ -356,9 +356,10 @@ class FactorisedBody:
         return found if found.cause == SLOPES and found.ratio > 1.0 else None
 
     def accepted(self, old: State, state: State) -> State:
-        """The converged state with its velocity and its increment."""
+        """The converged state with its velocity, its increment and what branches keep of it."""
         velocity, increment = self.body.velocity(state.u), state.u - old.u
-        return replace(state, velocity=velocity, last_increment=increment, pressure=NO_PRESSURE)
+        state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
+        return replace(state, pressure=NO_PRESSURE)
 
     def admit(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""

@@ -117,7 +117,7 @@ class Linearisation:
             self._outdated |= (
                 not SHORTER * self._made_at.duration <= duration <= LONGER * self._made_at.duration
             )
-        dynamics.begin(old.u, old.velocity, duration)
+        dynamics.begin(old.u, old.velocity, duration, old.inner)
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
@@ -198,10 +198,9 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        dynamics = self.body.dynamics
-        begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
+        begin, seconds, inner = self.body.beginning
         at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
-        self._made_at = TangentPoint(*at, state.status, state.pressure)
+        self._made_at = TangentPoint(*at, state.status, state.pressure, inner)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
@@ -226,7 +225,7 @@ class Linearisation:
         """Make the factorisation again that a run which goes on from `state` had made at `at`."""
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
-            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
+            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner)
         self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
 
     def _too_old(self, history: list[float]) -> bool:

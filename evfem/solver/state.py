@@ -10,6 +10,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import OPEN
 from evfem.solver.strategy import Strategy
+from evfem.tissue.dynamics import NO_BRANCHES
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
@@ -52,7 +53,8 @@ class State:
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
     pressure as an unknown, that (E, Q) in MPa (`evfem.solver.pressure`). With a law of friction other than
     Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
-    (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm.
+    (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. Maxwell
+    branches keep `inner` (`evfem.tissue.branches`).
     """
 
     u: Floats
@@ -68,6 +70,7 @@ class State:
     age: Floats = field(default_factory=lambda: NO_AGE)
     hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
+    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
 
     @property
     def touching(self) -> Any:
@@ -79,7 +82,8 @@ class State:
 class TangentPoint:
     """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,) when the
     step began, whether the attraction was frozen, the time step's displacements at its beginning (N, dim) and
-    its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if that is an unknown.
+    its seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, and
+    what branches kept when the step began.
     """
 
     u: Floats
@@ -90,6 +94,7 @@ class TangentPoint:
     duration: float
     status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
+    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.tissue.dynamics import Dynamics
+from evfem.tissue.dynamics import NO_BRANCHES, Dynamics
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
@@ -143,6 +143,22 @@ class Body:
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) at the end of a step that ends at u."""
         return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
+
+    @property
+    def beginning(self) -> tuple[Floats, float, Floats]:
+        """Displacements (N, dim) that the step began with, its seconds, and what branches had kept."""
+        if self.dynamics is None:
+            return np.zeros((self.space.size, self.space.dim)), 0.0, NO_BRANCHES
+        return self.dynamics.beginning
+
+    @property
+    def at_rest(self) -> Floats:
+        """What branches keep of the undeformed body."""
+        return NO_BRANCHES if self.dynamics is None else self.dynamics.at_rest
+
+    def inner(self, u: Floats) -> Floats:
+        """What branches keep of a step that ends at u (N, dim)."""
+        return NO_BRANCHES if self.dynamics is None else self.dynamics.inner(u)
 
     def energy(self, u: Floats) -> float:
         """Stored energy of the tissue: N mm, in the plane per mm of depth."""

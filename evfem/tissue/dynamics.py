@@ -9,7 +9,8 @@ before the step,
 
 Only the shear modulus enters the viscosity, so nothing locks. The step dissipates
 :math:`\int S_v : (E - E_0)`. A step that takes no time has neither term. The forms are
-`kelvin_voigt` and `mass` of `evfem.tissue.forms`.
+`kelvin_voigt` and `mass` of `evfem.tissue.forms`. Maxwell branches (`evfem.tissue.branches`) add their
+own; after a step without time they are at rest. Drag holds a body back that is released.
 """
 
 from __future__ import annotations
@@ -24,12 +25,15 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
+from evfem.tissue.branches import Branches, branches_of
 from evfem.tissue.forms import Parts, deformation_gradient, green_strain, kelvin_voigt, mass
 from evfem.tissue.kernels.blocks import LANES, loops, padded
 from evfem.tissue.laws import split
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space
 
+#: what branches keep where there are none
+NO_BRANCHES: Floats = np.zeros(0)
 #: `dynamics` of a scene -> its terms
 DYNAMICS: dict[str, Any] = {"quasistatic": None}
 
@@ -47,22 +51,38 @@ class Dynamics:
     def __init_subclass__(cls, name: str) -> None:
         DYNAMICS[name] = cls
 
-    def __init__(self, space: Space, viscosity: Floats | None, density: Floats | None) -> None:
+    def __init__(
+        self,
+        space: Space,
+        viscosity: Floats | None,
+        density: Floats | None,
+        branches: Branches | None = None,
+    ) -> None:
         """`viscosity` (E,) eta in MPa s per cell, `density` (E,) in t/mm3 per cell; None leaves
         the term out.
         """
-        self.space = space
+        self.space, self.branches = space, branches
         self.viscosity = viscosity
         self.mass = None if density is None else Componentwise(mass_matrices(space) * density[:, None, None])
         self._inertia = None if self.mass is None else assembled(space, self.mass.matrices)
         self.loops = loops(space.dim) if viscosity is not None else None
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, space.dim))
+        self._inner0 = self.at_rest
         self._strain0: Any = None
 
-    def begin(self, u: Floats, velocity: Floats, step: float) -> None:
-        """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N, dim)."""
-        self.step, self._u0, self._v0 = step, u, velocity
+    @property
+    def at_rest(self) -> Floats:
+        """What the branches keep of the undeformed body."""
+        return NO_BRANCHES if self.branches is None else self.branches.at_rest
+
+    def begin(self, u: Floats, velocity: Floats, step: float, inner: Floats = NO_BRANCHES) -> None:
+        """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N,
+        dim), and what the branches kept.
+        """
+        self.step, self._u0, self._v0, self._inner0 = step, u, velocity, inner
+        if self.branches is not None:
+            self.branches.begin(u, inner, step)
         if step > 0.0 and self.viscosity is not None:
             self._strain0 = self._strain(u)
             if self.loops is None:
@@ -79,9 +99,9 @@ class Dynamics:
         )
 
     @property
-    def beginning(self) -> tuple[Floats, float]:
-        """Displacements (N, dim) that the step began with, and its seconds."""
-        return self._u0, self.step
+    def beginning(self) -> tuple[Floats, float, Floats]:
+        """Displacements (N, dim) that the step began with, its seconds, and what the branches had kept."""
+        return self._u0, self.step, self._inner0
 
     def forces(self, u: Floats) -> Floats:
         """Nodal forces (N, dim)."""
@@ -94,6 +114,8 @@ class Dynamics:
             total += self._damping.forces(u)
         if self._inertia is not None:
             total += self._inertia @ (self.slope * ((u - self._u0) / self.step**2 - self._v0 / self.step))
+        if self.branches is not None:
+            total += self.branches.forces(u)
         return total
 
     def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
@@ -106,6 +128,8 @@ class Dynamics:
             self._damping.add_tangent(u, pattern, data)
         if self.mass is not None:
             data += self.slope * self.mass.data(pattern) / self.step**2
+        if self.branches is not None:
+            self.branches.add_tangent(u, pattern, data)
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) in mm/s at the end of the step; zero when no time passes."""
@@ -113,8 +137,21 @@ class Dynamics:
             return np.zeros_like(u)
         return self.slope * (u - self._u0) / self.step + (1.0 - self.slope) * self._v0
 
+    def inner(self, u: Floats) -> Floats:
+        """What the branches keep of a step that ends at u (N, dim)."""
+        return NO_BRANCHES if self.branches is None else self.branches.inner(u)
+
+    def branch_energy(self, u: Floats) -> float:
+        """What the branches store at the end of the step: N mm, in the plane per mm of depth."""
+        return 0.0 if self.branches is None else self.branches.energy(u)
+
     def dissipation(self, u: Floats) -> float:
-        """Viscous dissipation in the step: N mm, in the plane per mm of depth."""
+        """What tissue loses in the step: N mm, in the plane per mm of depth."""
+        damped = self.damping(u)
+        return damped if self.branches is None else damped + self.branches.dissipation(u)
+
+    def damping(self, u: Floats) -> float:
+        """The share of the Kelvin-Voigt stress in `dissipation`."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
         if self.loops is not None:
@@ -173,19 +210,23 @@ def mass_matrices(space: Space) -> Floats:
     return np.ascontiguousarray(form.cell_tangents(np.zeros((space.size, dim)))[:, ::dim, ::dim])
 
 
-def make_dynamics(space: Space, laws: Mapping[str, Any], viscosity: float, name: str) -> Dynamics | None:
+def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str) -> Dynamics | None:
     """The time-dependent terms of `DYNAMICS` that the laws ask for, or None if there are none; `viscosity`
-    is the laws' default relaxation time (s).
+    (s) and `relaxation` of the `finger` are those of laws without their own.
     """
+    kind: type[Dynamics] | None = DYNAMICS[name]
+    if kind is None:
+        return None
     eta, density = np.zeros(len(space.nodes)), np.zeros(len(space.nodes))
     for region, law in laws.items():
         cells = space.mesh.cells_of(region)
         own = getattr(law, "viscosity", None)
-        tau = viscosity if own is None else own
+        tau = finger.viscosity if own is None else own
         if tau:
             eta[cells] = tau * split(law, space.dim).shear_modulus
         density[cells] = getattr(law, "density", 1e-9)
-    kind: type[Dynamics] | None = DYNAMICS[name]
-    if kind is None or not (eta.any() or kind.inertia):
+    rows = branches_of(space, laws, finger)
+    if not (eta.any() or rows or kind.inertia):
         return None
-    return kind(space, eta if eta.any() else None, density if kind.inertia else None)
+    branches = Branches(space, rows) if rows else None
+    return kind(space, eta if eta.any() else None, density if kind.inertia else None, branches)

@@ -8,8 +8,8 @@ As f is linear in v, its values at unit test functions are its fluxes s = df/d(v
 of one point are stacked in the order (r, i): r = 0 for the value, then one r for each direction X_r of the
 gradient, i the component; theta comes last. Only the parts that a form uses are there.
 
-`neo_hookean`, `hyperelastic`, `kelvin_voigt` and `mass` below are what runs where no compiled loop
-does; those loops are tested against them. The attraction's form stands beside its
+`neo_hookean`, `hyperelastic`, `kelvin_voigt`, `maxwell` and `mass` below are what runs where no
+compiled loop does; those loops are tested against them. The attraction's form stands beside its
 nodal rule, in `evfem.contact.attraction`.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 
 from evfem.errors import InputError, quoted
 from evfem.protocols import WeakForm
-from evfem.tensor import Array, ddot, dot, identity, mul, transpose
+from evfem.tensor import Array, ddot, det, dot, identity, inv, mul, transpose
 
 Integrand = Callable[[Any, Any, Any], Any]
 
@@ -176,6 +176,41 @@ def kelvin_voigt(u: Any, v: Any, w: Any) -> Any:
     F = deformation_gradient(u)
     S = 2.0 * w.eta / w.step * (green_strain(F) - w.strain0)
     return ddot(mul(F, S), grad(v))
+
+
+def in_space(F: Array) -> Array:
+    """F (3, 3, ...) in three dimensions of F (dim, dim, ...); F33 = 1 in the plane."""
+    if len(F) == 3:
+        return F
+    whole = np.zeros((3, 3, *F.shape[2:]), dtype=F.dtype)
+    whole[:2, :2], whole[2, 2] = F, 1.0
+    return whole
+
+
+def isochoric(F: Array) -> Array:
+    """(det F)^(-2/3) F^T F (3, 3, ...) of F (dim, dim, ...)."""
+    whole = in_space(F)
+    return det(F) ** (-2.0 / 3.0) * mul(transpose(whole), whole)
+
+
+@form
+def maxwell(u: Any, v: Any, w: Any) -> Any:
+    """P : grad v with P = J^(-2/3) F A - tr(Cbar A)/3 F^-T, where A is the sum of m C_i^-1 over the
+    branches and C_i what M = B + a Cbar is at determinant 1 (`evfem.tissue.branches`); and the pressure
+    K (theta - theta_v) of those of the bulk.
+    """
+    F = deformation_gradient(u)
+    bar = isochoric(F)
+    A: Any = 0.0
+    q: Any = 0.0
+    for branch in w.branches:
+        M = branch.before + branch.share * bar
+        A = A + branch.shear * det(M) ** (1.0 / 3.0) * inv(M)
+        if w.has_bulk:
+            q = q + branch.bulk * ((1.0 - branch.theta_share) * u.theta - branch.theta_before)
+    inside = A[: len(F), : len(F)]
+    P = det(F) ** (-2.0 / 3.0) * mul(F, inside) - ddot(bar, A) / 3.0 * transpose(inv(F))
+    return ddot(P, grad(v)) + (q * v.theta if w.has_bulk else 0.0)
 
 
 @form

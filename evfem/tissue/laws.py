@@ -30,7 +30,9 @@ from evfem.common.checks import Within, check_fields, number
 from evfem.tensor import Array, ddot, det, identity, inv, outer, transpose
 from evfem.tissue.ogden import (
     POSITIVE,
+    Branches,
     Bulk,
+    BulkRelaxes,
     Density,
     Isotropic,
     Ogden,
@@ -166,6 +168,8 @@ class Yeoh(_InvariantLaw):
     bulk: Bulk = None
     viscosity: Relaxation = None
     density: Density = 1e-9
+    relaxation: Branches = None
+    bulk_relaxation: BulkRelaxes = False
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -267,3 +267,10 @@ def test_a_mistake_in_a_file_names_the_probe(line):
     with pytest.raises(ev.InputError) as error:
         scenefile.loads(head + line + "\n" + tail)
     assert str(error.value).startswith(TABLES[line])
+
+
+def test_probes_of_tissue_that_relaxes_say_what_they_lack():
+    pad = ev.FingerPad(resolution="coarse", relaxation=[(0.5, 0.1)])
+    output, press = ev.Output(probes={"deep": [[0.0, -5.0]]}), ev.Press(indentation=0.1, steps=1, speed=1.0)
+    scene = ev.Scene(pad, ev.Display(), motion=[press], output=output, solver=ev.Solver(dynamics="viscous"))
+    assert any("without what its branches add" in said for said in ev.plan(scene).warnings)

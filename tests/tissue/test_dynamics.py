@@ -2,6 +2,8 @@
 in time.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tools.grids import CELLS, rectangle, solve, tangent_of
@@ -138,7 +140,7 @@ def test_free_fall():
     """
     space = rectangle("q1_fbar", (2, 2), jitter=0.2)
     law, gravity, dt = NeoHookean(E=0.05, nu=0.48), -9810.0, 1e-3
-    term = make_dynamics(space, {"lower": law}, 1e-3, "inertial")
+    term = make_dynamics(space, {"lower": law}, SimpleNamespace(viscosity=1e-3), "inertial")
     body = Sum(Tissue(space, {"lower": law}), term)
     weight = np.zeros((space.size, 2))
     np.add.at(weight[:, 1], space.nodes, gravity * law.density * mass_matrices(space).sum(axis=2))
@@ -165,16 +167,16 @@ def test_only_what_is_asked_for():
         "lower": NeoHookean(E=0.26, nu=0.3, viscosity=0.0, density=2e-9),
         "upper": NeoHookean(E=2.6, nu=0.3),
     }
-    assert make_dynamics(space, laws, 0.0, "viscous") is None
-    viscous = make_dynamics(space, laws, 0.5, "viscous")
+    assert make_dynamics(space, laws, SimpleNamespace(viscosity=0.0), "viscous") is None
+    viscous = make_dynamics(space, laws, SimpleNamespace(viscosity=0.5), "viscous")
     np.testing.assert_allclose(viscous.viscosity, [0.0, 0.0, 0.5, 0.5])  # tau times mu = 1 MPa
     assert viscous.mass is None
-    inertial = make_dynamics(space, laws, 0.0, "inertial")
+    inertial = make_dynamics(space, laws, SimpleNamespace(viscosity=0.0), "inertial")
     assert inertial.viscosity is None
     np.testing.assert_allclose(
         inertial.mass.matrices.sum(axis=(1, 2)), 0.25 * np.array([2e-9, 2e-9, 1e-9, 1e-9])
     )
-    both = make_dynamics(space, laws, 0.5, "inertial")
+    both = make_dynamics(space, laws, SimpleNamespace(viscosity=0.5), "inertial")
     u = wavy(space.mesh.points)
     both.begin(0 * u, 0 * u, 0.0)
     K = tangent_of(space, u, both)

@@ -1,0 +1,241 @@
+r"""Maxwell branches at finite strain: the overstress of tissue that relaxes, over one step in closed form.
+
+A branch has the modulus m, a share of the law's initial shear modulus at rest, the relaxation time
+:math:`\tau` and an inner variable :math:`C_i` (symmetric, of determinant 1). With
+:math:`\bar C = J^{-2/3} F^T F`, J the point's own det F and F33 = 1 in the plane,
+
+.. math:: \psi_i = \tfrac{m}{2}(\mathrm{tr}\,\bar C C_i^{-1} - 3), \qquad
+          \dot C_i = [\bar C - \tfrac{1}{3}\mathrm{tr}(\bar C C_i^{-1})\,C_i]/\tau, \qquad
+          D = \tfrac{m}{2\tau}\,\mathrm{tr}[\mathrm{dev}(C_i^{-1}\bar C)^2] \ge 0 .
+
+A step of :math:`x = \Delta t/\tau` ends at :math:`C_i = M/\det(M)^{1/3}`, M = B + a C with
+
+.. math:: B = e^{-y} C_{i,0} + \frac{f - e^{-y}}{h}\,\bar C_0, \quad a = \frac{1 - f}{h}, \quad
+          f = \frac{1 - e^{-y}}{y}, \quad y = h x, \quad h = \tfrac{1}{3}\mathrm{tr}\,\bar C_0 C_{i,0}^{-1} .
+
+This is of second order, exact for small strain that grows evenly or is held, and stable for any step;
+its forces have the potential :math:`\tfrac{3m}{2a}\det(B + a\bar C)^{1/3}`. Their form is `maxwell` of
+`evfem.tissue.forms`. Where the bulk relaxes too, a number :math:`\theta_v` follows the element's volume
+measure in the same way, with the pressure :math:`K_i(\theta - \theta_v)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.errors import InputError
+from evfem.tensor import Array, det, inv, mul, trace
+from evfem.tissue.assembly import Integral, points_of
+from evfem.tissue.forms import Field, Parts, deformation_gradient, isochoric, maxwell
+from evfem.tissue.ogden import shares_of
+from evfem.tissue.pattern import Pattern
+from evfem.tissue.space import Space
+from evfem.tissue.splitlaw import split
+
+#: entries of a symmetric matrix that are kept, in the plane without those out of it, which are 0
+KEPT = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One branch over the cells (E,): moduli in MPa of shear and bulk, 0 where a region has none, and
+    relaxation times in s.
+    """
+
+    shear: Floats
+    bulk: Floats
+    time: Floats
+
+
+def branches_of(space: Space, laws: Mapping[str, Any], finger: Any) -> list[Branch]:
+    """The branches of the laws on a space; a law without its own has those of the `finger`."""
+    found: list[Branch] = []
+    for name, law in laws.items():
+        own = getattr(law, "relaxation", None)
+        giver = finger if own is None else law
+        rows = shares_of(f"finger.materials.{name}.relaxation", getattr(giver, "relaxation", None) or ())
+        bulk = _bulk_modulus(name, law) if rows and getattr(giver, "bulk_relaxation", False) else 0.0
+        cells = space.mesh.cells_of(name)
+        for i, (share, time) in enumerate(rows):
+            if i == len(found):
+                none = np.zeros(len(space.nodes))
+                found.append(Branch(none, none.copy(), np.ones_like(none)))
+            found[i].shear[cells] = share * split(law, space.dim).shear_modulus
+            found[i].bulk[cells], found[i].time[cells] = share * bulk, time
+    return found
+
+
+def _bulk_modulus(name: str, law: Any) -> float:
+    """Initial bulk modulus (MPa) of a law whose bulk relaxes."""
+    if hasattr(law, "bulk_modulus"):
+        return float(law.bulk_modulus)
+    raise InputError(f"finger.materials.{name}", type(law).__name__, "a law with bulk_modulus")
+
+
+class Branches:
+    """The branches' forces, energy and loss in one step; `begin` sets the step.
+
+    What a step leaves behind is `inner` (n, k, C, Q) of n branches in the C cells that have any: k - 1
+    entries of C_i, `KEPT`, and theta_v.
+    """
+
+    def __init__(self, space: Space, branches: list[Branch]) -> None:
+        self.space = space
+        cells = np.flatnonzero(sum(branch.shear for branch in branches))
+        self.shear, self.bulk, self.time = (
+            np.array([getattr(branch, name)[cells, None] for branch in branches])
+            for name in ("shear", "bulk", "time")
+        )
+        parts = Parts(space.dim, grad=True, theta=bool(self.bulk.any()))
+        w = SimpleNamespace(branches=(), has_bulk=parts.theta)
+        self.integral = Integral(maxwell, points_of(space, cells), parts, w, at_once=True)
+        self.step = 0.0
+
+    @cached_property
+    def at_rest(self) -> Floats:
+        """`inner` of the undeformed body."""
+        return self._relaxed(np.zeros((self.space.size, self.space.dim)))
+
+    def begin(self, u: Floats, inner: Floats, step: float) -> None:
+        """Start a step of `step` seconds (0: it ends at rest) from displacements (N, dim) and `inner`."""
+        self.step, self._inner0 = step, inner
+        self._bar0, self._theta0 = self._strain(u)
+        self.integral.w.branches = [self._branch(i) for i in range(len(inner))] if step > 0.0 else []
+
+    def _branch(self, i: int) -> SimpleNamespace:
+        """Branch i over the step: B and a, both over 1 + a, so that no length of a step overflows."""
+        Ci, theta_v = self._unpacked(self._inner0[i])
+        x = self.step / self.time[i]
+        h = trace(mul(self._bar0, inv(Ci))) / 3.0
+        f, rest, decay = _mean(h * x)
+        a = rest / h
+        before = decay * Ci + (f - decay) / h * self._bar0
+        f, rest, decay = _mean(x)
+        return SimpleNamespace(
+            shear=self.shear[i],
+            bulk=self.bulk[i],
+            before=(before / (1.0 + a))[:, :, None],
+            share=a / (1.0 + a),
+            theta_before=decay * theta_v + (f - decay) * self._theta0,
+            theta_share=rest,
+        )
+
+    def forces(self, u: Floats) -> Floats:
+        """Nodal forces (N, dim)."""
+        # without travel, whose rounding would outweigh small forces
+        return self.integral.forces(u - u[:1]) if self.step > 0.0 else np.zeros_like(u)
+
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        """Add the tangent to the `data` of a pattern."""
+        if self.step > 0.0:
+            self.integral.add_tangent(u - u[:1], pattern, data)
+
+    def inner(self, u: Floats) -> Floats:
+        """`inner` at the end of a step that ends at u (N, dim)."""
+        if self.step == 0.0:
+            return self._relaxed(u)
+        bar, theta = self._strain(u)
+        ends = []
+        for branch in self.integral.w.branches:
+            M = branch.before[:, :, 0] + branch.share * bar
+            theta_v = branch.theta_before + branch.theta_share * theta
+            ends.append(self._packed(M / _root(M), theta_v))
+        return np.array(ends)
+
+    def energy(self, u: Floats) -> float:
+        """Energy stored at the end of a step that ends at u: N mm, in the plane per mm of depth."""
+        return 0.0 if self.step == 0.0 else self._stored(self._strain(u), self.inner(u))
+
+    def potential(self, u: Floats) -> float:
+        """What `forces` are the derivative of: N mm, in the plane per mm of depth."""
+        bar, theta = self._strain(u)
+        total: Any = 0.0
+        for branch in self.integral.w.branches:
+            root = _root(branch.before[:, :, 0] + branch.share * bar)
+            total = total + 1.5 * branch.shear / branch.share * root
+            held = (1.0 - branch.theta_share) * theta - branch.theta_before
+            total = total + 0.5 * branch.bulk / (1.0 - branch.theta_share) * held**2
+        return float(np.sum(total * self.integral.points.weight))
+
+    def dissipation(self, u: Floats) -> float:
+        """What is lost in the step, exact at small strain; all that was stored where no time passes."""
+        if self.step == 0.0:
+            return self._stored((self._bar0, self._theta0), self._inner0)
+        end, inner = self._strain(u), self.inner(u)
+        total: Any = 0.0
+        for i in range(len(inner)):
+            x = self.step / self.time[i]
+            before, after = (
+                self._overstrain(strain, kept[i])
+                for strain, kept in (((self._bar0, self._theta0), self._inner0), (end, inner))
+            )
+            shear, bulk = (_lost(x, e0, e1) for e0, e1 in zip(before, after, strict=True))
+            total = total + 2.0 * self.shear[i] * shear + self.bulk[i] * bulk
+        return float(np.sum(total * self.integral.points.weight))
+
+    # -- at the points
+
+    def _strain(self, u: Floats) -> tuple[Array, Array]:
+        """Cbar (3, 3, C, Q) and the volume measure (C, Q), 0 where the bulk does not relax."""
+        field: Field = self.integral.field(u - u[:1])
+        bar = isochoric(deformation_gradient(field))
+        return bar, field.theta if self.integral.parts.theta else np.zeros(bar.shape[2:])
+
+    def _stored(self, strain: tuple[Array, Array], inner: Floats) -> float:
+        total: Any = 0.0
+        for m, K, kept in zip(self.shear, self.bulk, inner, strict=True):
+            Ci, theta_v = self._unpacked(kept)
+            total = total + 0.5 * m * (trace(mul(strain[0], inv(Ci))) - 3.0)
+            total = total + 0.5 * K * (strain[1] - theta_v) ** 2
+        return float(np.sum(total * self.integral.points.weight))
+
+    def _overstrain(self, strain: tuple[Array, Array], kept: Floats) -> tuple[Array, Array]:
+        """dev(C_i^-1 Cbar)/2 (3, 3, C, Q), and theta - theta_v (1, 1, C, Q)."""
+        Ci, theta_v = self._unpacked(kept)
+        product = mul(inv(Ci), strain[0])
+        mean = trace(product) / 3.0
+        return 0.5 * (product - mean * np.eye(3)[:, :, None, None]), (strain[1] - theta_v)[None, None]
+
+    def _relaxed(self, u: Floats) -> Floats:
+        one = self._packed(*self._strain(u))
+        return np.repeat(one[None], len(self.shear), axis=0)
+
+    def _packed(self, Ci: Array, theta_v: Array) -> Floats:
+        return np.stack([*(Ci[i, j] for i, j in KEPT[self.space.dim]), theta_v])
+
+    def _unpacked(self, kept: Floats) -> tuple[Floats, Floats]:
+        Ci = np.zeros((3, 3, *kept.shape[1:]))
+        for (i, j), entry in zip(KEPT[self.space.dim], kept, strict=False):
+            Ci[i, j] = Ci[j, i] = entry
+        return Ci, kept[-1]
+
+
+def _root(M: Array) -> Array:
+    """Cube root of the determinant."""
+    return det(M) ** (1.0 / 3.0)
+
+
+def _mean(y: Floats) -> tuple[Floats, Floats, Floats]:
+    """f = (1 - e^-y)/y, 1 - f and e^-y of y > 0, with the digits that 1 - f loses at small y."""
+    decay, f = np.exp(-y), -np.expm1(-y) / y
+    series = y / 2.0 * (1.0 - y / 3.0 * (1.0 - y / 4.0 * (1.0 - y / 5.0)))
+    return f, np.where(y < 1e-3, series, 1.0 - f), decay
+
+
+def _lost(x: Floats, e0: Array, e1: Array) -> Array:
+    """Integral of tr(e e)/tau over the step of x relaxation times, e from e0 to e1 (n, n, C, Q) as under a
+    strain that grows evenly.
+    """
+    g, q = -np.expm1(-x), -0.5 * np.expm1(-2.0 * x)
+    series = x**3 / 3.0 * (1.0 - x * (0.75 - 0.35 * x))
+    rest = np.where(x < 1e-3, series, x - 2.0 * g + q)
+    r = (e1 - np.exp(-x) * e0) / g
+    twice = 2.0 * np.where(x < 1e-6, 0.5 * x * x, g - q)
+    return q * trace(mul(e0, e0)) + twice * trace(mul(e0, r)) + rest * trace(mul(r, r))
