@@ -266,7 +266,7 @@ def test_a_line_for_each_point_of_each_probe_over_its_steps():
         np.testing.assert_array_equal(line.get_ydata(), numbers[:, point, at])
     assert first.get_color() == second.get_color() != deep.get_color()
     assert ax.get_ylabel() == "Cauchy stress xy (MPa)"
-    with pytest.raises(InputError, match=r"quantity: given .*allowed: displacement_x"):
+    with pytest.raises(InputError, match=r"quantity: given .*allowed: cauchy_stress_xz. .displacement_x"):
         probes(result, "cauchy_stress_xw")
     with pytest.raises(InputError, match="a run without probes"):
         probes(fake_result())

@@ -107,5 +107,5 @@ def test_what_is_no_map_gets_a_sentence():
         sweep_map(table(GRID), GAP, LAW, OUT)
     with pytest.raises(InputError, match="several points at one place"):
         sweep_map(table(GRID), GAP, GAP, OUT)
-    with pytest.raises(InputError, match=r'column: given "motion.1.gap"; allowed: point, motion.0.gap'):
+    with pytest.raises(InputError, match=r'given "motion.1.gap"; allowed: motion.0.gap. .point, '):
         sweep(table(GRID), "motion.1.gap", OUT)

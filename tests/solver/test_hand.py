@@ -164,7 +164,7 @@ def test_a_scene_file_says_it_and_what_cannot_be_is_refused():
         loads(dump(scene).replace("stiffness = 0.1", "stiffness = 0.0"))
     with pytest.raises(InputError, match=r"motion\[1\].speed"):
         slab(ev.Hand(K, mass=M), slid(1.0, 5, None))
-    with pytest.raises(InputError, match="wished friction force"):
+    with pytest.raises(InputError, match="target friction force"):
         ev.Scene(
             SLAB, ev.Display(), ev.Kaczmarek(), ev.FollowForce([0.0, 1.0], [0.0, 0.01], 100.0),
             [ev.Press(force=N), slid(1.0, 5)], hand=ev.Hand(K),

@@ -86,13 +86,20 @@ NEVER = {
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 } | dict.fromkeys(("finger.ridge_pixel", "finger.ridge_dark", "finger.ridge_scan"), "of a print alone")
 #: keys that the generator leaves to other tests
-LATER = ("friction_law", "depth")
+LATER = ("friction_law", "depth", "relaxation", "bulk_relaxation", "spacing", "probes", "boundaries")
+APART = (
+    "finger.materials",
+    "finger.boundaries",
+    "surface.friction_law",
+    "electrostatics.roughness",
+    "output.probes",
+)
 
 
 def keys_of_a_scene_file():
     """Every key of every table but those of materials, friction laws and roughness."""
     for one in sections():
-        if not one.name.startswith(("finger.materials", "surface.friction_law", "electrostatics.roughness")):
+        if not one.name.startswith(APART):
             yield from (f"{one.name}.{key.name}".lstrip(".") for key in one.keys if key.name not in LATER)
 
 

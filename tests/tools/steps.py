@@ -1,6 +1,7 @@
 """States of a pad that obey every law of contact, changed at one node, and what a solver makes of them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from evfem.solver.interface import Interface
 from evfem.solver.state import Balance, Limits, Record
 from evfem.solver.strategy import Strategy
 from evfem.surface.pad import make_pad
+from evfem.tissue.dynamics import NO_BRANCHES
 from tools.meshes import block
 
 TOLERANCE, MU = 1e-6, 0.5
@@ -33,6 +35,7 @@ class Script:
     def __init__(self, states, residuals):
         self.size, self.record = len(MESH.points), Record()
         self.states, self.residuals, self.left = states, residuals, None
+        self.body = SimpleNamespace(at_rest=NO_BRANCHES)
 
     def known(self, old, target):
         return None
