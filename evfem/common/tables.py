@@ -256,7 +256,10 @@ def _separator(line: str) -> str | None:
 def _cells(line: str, separator: str | None) -> list[str]:
     if separator is None:
         return re.sub(r"\s+(?=[\[(])", "", line).split()
-    (cells,) = csv.reader([line], delimiter=separator)
+    try:
+        (cells,) = csv.reader([line], delimiter=separator)
+    except (csv.Error, ValueError):  # a carriage return within, or nothing
+        cells = line.split(separator)
     return [cell.strip() for cell in cells]
 
 
