@@ -122,6 +122,7 @@ def grouped(path):
     mesh.write(path)
 
 
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")  # of an older netCDF4
 @pytest.mark.parametrize(
     ("name", "regions", "boundaries"),
     [
