@@ -154,7 +154,7 @@ def hovering(quick: bool) -> dict[tuple[str, str, str], Floats]:
     for ridges in ("none", "along"):
         kind = "smooth" if ridges == "none" else "ridged"
         for name in names:
-            finger = ev.Fingertip.participant(name, "coarse", ridges)
+            finger = ev.Fingertip.participant(name, "coarse", ridges=ridges)
             mesh = finger.mesh()
             skin = make_skin(mesh)
             for law in LAWS:
