@@ -91,7 +91,10 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
             forces = linearised(problem, found)
         except np.linalg.LinAlgError:
             break
-        after = _passing(found, Projected.of(problem, forces))
+        key = found.status.tobytes()
+        after = Projected.of(problem, forces)
+        if not (late or key in met):
+            after = _passing(found, after)
         changed = after.status != found.status
         rest = changed if problem.dim == 2 else changed | (after.status == SLIP)
         if not np.isfinite(after.miss).all():
@@ -99,7 +102,7 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
         if not (after.miss[rest] > ROUNDING).any():
             return forces, found, solves, softest
         if changed.any():
-            key, softest = found.status.tobytes(), np.where(changed, OPEN, found.status)
+            softest = np.where(changed, OPEN, found.status)
             late = late or key in met  # a cycle: from here on change the node that is furthest off alone
             if key in alone:  # and that has led back too
                 break
@@ -170,7 +173,9 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
 
 
 def _passing(before: Projected, after: Projected) -> Projected:
-    """The same; in the plane closing nodes and changes of the slip's side pass through slip, or stick."""
+    """The same; in the plane closing nodes and changes of the slip's side pass through slip, or stick: that
+    is quicker, but under a steep bound of friction a node may stick that can neither slip nor open.
+    """
     if after.z.shape[1] == 2:
         return after
     way = after.z[:, 0]

@@ -15,10 +15,11 @@ What is left are the errors of a cohesive zone that a few nodes resolve: the edg
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import traction_derivative
 from evfem.electrostatics.roughness import Cored, roughness_of
 from evfem.electrostatics.signals import FollowForce
@@ -76,103 +77,130 @@ class Core:
         )
 
 
-def electrics_of(scene: Scene, mesh: Mesh) -> Electrics:
-    """The attraction between the nodes of the pad and the electrode."""
-    nodes = np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
-    return scene.electrics.above(scene.finger.electrical, mesh, nodes)
+@dataclass(frozen=True, eq=False)
+class Closing:
+    """The attraction of a scene where faces close, on its mesh."""
+
+    scene: Scene
+    mesh: Mesh
+
+    @cached_property
+    def electrics(self) -> Electrics:
+        """The attraction between the nodes of the pad and the electrode."""
+        return self.scene.electrics.above(self.scene.finger.electrical, self.mesh, self._nodes)
+
+    @property
+    def core(self) -> Core | None:
+        """The core that takes the law's place in a run, None where there is none or it does not fit."""
+        return self.found if self.found is not None and self.found.fits else None
+
+    @cached_property
+    def found(self) -> Core | None:
+        """The core, or None where the law needs none or can have none: where only touching nodes carry force
+        the work is none, charges that flow and the full field have laws of their own, and a voltage that is
+        found asks for forces that go with its square.
+        """
+        scene, wanted, voltage = self.scene, self.scene.solver.core, self.scene.electrics.largest_voltage
+        found = isinstance(scene.voltage, FollowForce) or any(one.gap is not None for one in scene.courses)
+        has_none = self._charged or found or not scene.air_layer
+        if wanted == "off" or not scene.electrics.acts or has_none or self._full:
+            return None
+        if isinstance(wanted, str) and not self.snaps:
+            return None
+        (law, layers), (stiffness, distance, height) = self.electrics.attraction, self._local
+        first = height <= height.min() + FIRST * np.ptp(self.mesh.points[:, 1])
+        given = None if isinstance(wanted, str) else wanted
+        cored = Cored(law, self._closed, RESOLVED * stiffness, given)
+        length = np.max((cored.line(voltage, layers).end - self._closed)[first])
+        ratio = np.max(self._slope[first] / (RESOLVED * stiffness[first]))
+        work = np.max(cored.adhesion(voltage, layers))
+        fits = given is not None or float(length) <= SEEN * self._gap
+        return Core(cored, float(ratio), float(length), float(np.max(distance[first])), float(work), fits)
+
+    @cached_property
+    def snaps(self) -> bool:
+        """Whether the law itself is steeper than the mesh resolves, so that a node can snap by itself."""
+        stiffness, _, height = self._local
+        low = height <= height.min() + LOW * np.ptp(self.mesh.points[:, 1])
+        return bool((self._slope > RESOLVED * stiffness)[low].any())
+
+    @property
+    def trapped(self) -> bool:
+        """Whether nodes snap one by one in a run without time, for want of a core; nodes that are attracted
+        only while they touch do not.
+        """
+        scene = self.scene
+        still = scene.air_layer and not scene.solver.timed and not self._charged
+        return bool(still and scene.electrics.acts and self.core is None and self.snaps)
+
+    @property
+    def _charged(self) -> bool:
+        """Whether charges flow in time."""
+        return self.scene.drive is not None and self.scene.drive.resolved
+
+    @property
+    def _nodes(self) -> Ints:
+        """Nodes of the pad (P,)."""
+        mesh = self.mesh
+        return np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
+
+    @cached_property
+    def _closed(self) -> float:
+        """The gap (mm) of closed faces, that of rough ones without pressure."""
+        rough = roughness_of(self.scene.roughness_gap)
+        return 0.0 if rough is None else float(rough.separation(0.0))
+
+    @cached_property
+    def _slope(self) -> Floats:
+        """How fast the traction falls with the gap of closed faces under the largest voltage (P,), MPa/mm."""
+        law, layers = self.electrics.attraction
+        slope = traction_derivative(law, self._closed, self.scene.electrics.largest_voltage, layers)
+        return -np.broadcast_to(slope, self._nodes.shape)
+
+    @cached_property
+    def _local(self) -> tuple[Floats, Floats, Floats]:
+        """Of each node of the pad (P,) the least E*/h (MPa/mm), the largest h (mm) and its height (mm); cells
+        of no stiffness of their own have another's, and resolve everything.
+        """
+        mesh, laws = self.mesh, self.scene.finger.materials
+        sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
+        on_pad = np.isin(sides, self._nodes)
+        cell, side = np.nonzero(on_pad.all(axis=2))
+        nodes, place = np.unique(sides[cell, side], return_inverse=True)
+        corners = mesh.points[sides[cell, side][:, : 2 * (mesh.dim - 1)]]
+        longest = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2).max(axis=1) / mesh.order
+        modulus = np.full(mesh.region.max() + 1, RIGID)
+        for name, law in laws.items():
+            if (found := plane_modulus(split(law, mesh.dim), mesh.dim)) > 0.0:
+                modulus[mesh.region_names[name]] = found
+        stiffness, distance = np.full(nodes.size, np.inf), np.zeros(nodes.size)
+        for each in place.reshape(len(cell), -1).T:
+            np.minimum.at(stiffness, each, modulus[mesh.region[cell]] / longest)
+            np.maximum.at(distance, each, longest)
+        return stiffness, distance, mesh.points[nodes, 1]
+
+    @property
+    def _full(self) -> bool:
+        """Whether the attraction is that of the full field."""
+        if self.scene.field == "local":
+            return False
+        from evfem.planning.fieldchoice import chosen_field
+
+        return chosen_field(self.scene, self.mesh).full
+
+    @property
+    def _gap(self) -> float:
+        """The smallest gap (mm) at which a finger hovers; inf if none does."""
+        heights = (one.indentation or 0.0 for one in self.scene.courses)
+        return min((-low for low in heights if low < 0.0), default=np.inf)
 
 
-def core_of(scene: Scene, mesh: Mesh) -> Core | None:
-    """The core of a scene's attraction, or None where it needs none or can have none: where only touching
-    nodes carry force the work is none, charges that flow and the full field have laws of their own, and a
-    voltage that is found asks for forces that go with its square.
-    """
-    wanted, voltage = scene.solver.core, scene.electrics.largest_voltage
-    charged = scene.drive is not None and scene.drive.resolved
-    found = isinstance(scene.voltage, FollowForce) or any(one.gap is not None for one in scene.courses)
-    has_none = charged or found or not scene.air_layer
-    if wanted == "off" or not scene.electrics.acts or has_none or _full(scene, mesh):
-        return None
-    (law, layers), closed = electrics_of(scene, mesh).attraction, _closed(scene)
-    stiffness, distance, height = _local(scene, mesh)
-    first = height <= height.min() + FIRST * np.ptp(mesh.points[:, 1])
-    slope = _slope(scene, mesh)
-    if isinstance(wanted, str) and not snaps(scene, mesh):
-        return None
-    cored = Cored(law, closed, RESOLVED * stiffness, None if isinstance(wanted, str) else wanted)
-    length = np.max((cored.line(voltage, layers).end - closed)[first])
-    ratio = np.max(slope[first] / (RESOLVED * stiffness[first]))
-    work = np.max(cored.adhesion(voltage, layers))
-    fits = not isinstance(wanted, str) or float(length) <= SEEN * _gap(scene)
-    return Core(cored, float(ratio), float(length), float(np.max(distance[first])), float(work), fits)
-
-
-def snaps(scene: Scene, mesh: Mesh) -> bool:
-    """Whether a node of the pad can snap by itself under the law itself, steeper than the mesh resolves; one
-    that is attracted only while it touches cannot.
-    """
-    if not scene.air_layer:
-        return False
-    stiffness, _, height = _local(scene, mesh)
-    low = height <= height.min() + LOW * np.ptp(mesh.points[:, 1])
-    return bool((_slope(scene, mesh) > RESOLVED * stiffness)[low].any())
-
-
-def _closed(scene: Scene) -> float:
-    """The gap (mm) of closed faces, that of rough ones without pressure."""
-    rough = roughness_of(scene.roughness_gap)
-    return 0.0 if rough is None else float(rough.separation(0.0))
-
-
-def _slope(scene: Scene, mesh: Mesh) -> Floats:
-    """How fast the traction falls with the gap of closed faces under the largest voltage (P,), MPa/mm."""
-    law, layers = electrics_of(scene, mesh).attraction
-    slope = traction_derivative(law, _closed(scene), scene.electrics.largest_voltage, layers)
-    nodes = np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
-    return -np.broadcast_to(slope, nodes.shape)
-
-
-def _local(scene: Scene, mesh: Mesh) -> tuple[Floats, Floats, Floats]:
-    """Of each node of the pad (P,) the least E*/h (MPa/mm), the largest h (mm) and its height (mm); cells of
-    no stiffness of their own have another's, and resolve everything.
-    """
-    sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
-    on_pad = np.isin(sides, np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad")))
-    cell, side = np.nonzero(on_pad.all(axis=2))
-    nodes, place = np.unique(sides[cell, side], return_inverse=True)
-    corners = mesh.points[sides[cell, side][:, : 2 * (mesh.dim - 1)]]
-    longest = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2).max(axis=1) / mesh.order
-    modulus = np.full(mesh.region.max() + 1, RIGID)
-    for name, law in scene.finger.materials.items():
-        if (found := plane_modulus(split(law, mesh.dim), mesh.dim)) > 0.0:
-            modulus[mesh.region_names[name]] = found
-    stiffness, distance = np.full(nodes.size, np.inf), np.zeros(nodes.size)
-    for each in place.reshape(len(cell), -1).T:
-        np.minimum.at(stiffness, each, modulus[mesh.region[cell]] / longest)
-        np.maximum.at(distance, each, longest)
-    return stiffness, distance, mesh.points[nodes, 1]
-
-
-def _full(scene: Scene, mesh: Mesh) -> bool:
-    """Whether the attraction is that of the full field."""
-    if scene.field == "local":
-        return False
-    from evfem.planning.fieldchoice import chosen_field
-
-    return chosen_field(scene, mesh).full
-
-
-def _gap(scene: Scene) -> float:
-    """The smallest gap (mm) at which a finger hovers; inf if none does."""
-    return min((-low for one in scene.courses if (low := one.indentation or 0.0) < 0.0), default=np.inf)
-
-
-def unseen(scene: Scene, mesh: Mesh) -> str | None:
+def unseen(closing: Closing) -> str | None:
     """A sentence for a core that is long beside the depth of a texture, else None."""
-    core, surface = core_of(scene, mesh), scene.ground
-    if core is None or not core.fits or surface.is_flat:
+    core, surface = closing.core, closing.scene.ground
+    if core is None or surface.is_flat:
         return None
-    depth = float(np.ptp(surface.height(path_points(scene, mesh, core.distance))))
+    depth = float(np.ptp(surface.height(path_points(closing.scene, closing.mesh, core.distance))))
     if core.length <= SEEN * depth or depth == 0.0:
         return None
     return (

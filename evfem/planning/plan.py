@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from os import PathLike
 from typing import Any
@@ -18,7 +18,7 @@ from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
-from evfem.planning.core import core_of, unseen
+from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
 from evfem.planning.pathdependence import steps_line
@@ -64,6 +64,7 @@ class Plan:
     steps: int
     terms: tuple[Term, ...]
     solver: tuple[str, ...]
+    closing: Closing = field(repr=False, compare=False)
     warnings: tuple[str, ...] = ()
 
     @property
@@ -163,11 +164,12 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law, mesh.dim).shear_modulus for name, law in scene.finger.materials.items()}
+    closing = Closing(scene, mesh)
     others = (
         unresolved(scene, mesh),
         too_fast(scene),
         left_out(scene),
-        unseen(scene, mesh),
+        unseen(closing),
         probed(scene),
         *oscillating(scene, mesh),
         *drifting(scene, mesh, moduli),
@@ -177,7 +179,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         _tissue(scene, mesh, moduli),
         _contact(scene),
         _friction(scene),
-        _electricity(scene, mesh),
+        _electricity(closing),
         *_field(scene, mesh),
         *_drive(scene),
         _time(scene),
@@ -195,6 +197,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         terms=terms,
         solver=_solver(scene, mesh, terms),
         warnings=(*implausible(scene, mesh, moduli), *locked, *filter(None, others)),
+        closing=closing,
     )
 
 
@@ -230,7 +233,8 @@ def _friction(scene: Scene) -> Term:
     return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}{falling}")
 
 
-def _electricity(scene: Scene, mesh: Mesh) -> Term:
+def _electricity(closing: Closing) -> Term:
+    scene = closing.scene
     if not scene.electrics.acts:
         return Term("electricity", False, "no law or no voltage")
     air = "with the air layer" if scene.air_layer else "only touching nodes"
@@ -239,7 +243,7 @@ def _electricity(scene: Scene, mesh: Mesh) -> Term:
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
     how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
-    traction, core = touching_traction(scene), core_of(scene, mesh)
+    traction, core = touching_traction(scene), closing.found
     pull = "" if traction is None else f", up to {traction:.2g} MPa where it touches"
     cored = "" if core is None else f"; {core}"
     return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")

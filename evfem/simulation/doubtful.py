@@ -59,6 +59,7 @@ def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
         _dissipated(scene, rows),
         _gained(rows),
         _snapped(rows),
+        _climbed(rows),
     )
     return [sentence for one in told for sentence in one] if rows else []
 
@@ -132,6 +133,17 @@ def _snapped(rows: Sequence[Row]) -> Iterator[str]:
         yield (
             f"in step {rows[worst]['step']} the finger snaps and loses {freed[worst]:.0%} of the energy of "
             "the run: other states are stable too, and the way decides which; `evfem check` compares"
+        )
+
+
+def _climbed(rows: Sequence[Row]) -> Iterator[str]:
+    """Rows in time that a barrier of the energy does not stop however short their parts are."""
+    climbed = (np.diff(_column(rows, "time"), prepend=0.0) > 0.0) & (_column(rows, "jumps") > 0.0)
+    if climbed.any():
+        first, count = rows[int(climbed.argmax())]["step"], int(climbed.sum())
+        yield (
+            f"{count} steps in time, the first of them step {first}, pass a barrier of the energy that their "
+            "speed does not carry them over: shorter steps may end elsewhere"
         )
 
 

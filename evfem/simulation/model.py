@@ -17,7 +17,7 @@ from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.planning.core import Core, core_of, electrics_of, snaps
+from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
@@ -39,9 +39,7 @@ from evfem.tissue.weakform import check_laws
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The parts of a scene; `surface` is placed, `first_gap` (mm) is the smallest vertical gap at the start,
-    and `trapped` says whether nodes of the pad snap one by one, for want of a core.
-    """
+    """The parts of a scene; `surface` is placed, `first_gap` (mm) the smallest vertical gap at the start."""
 
     scene: Scene
     mesh: Mesh
@@ -51,8 +49,7 @@ class Model:
     attraction: Attraction | None
     equilibrium: Equilibrium
     first_gap: float
-    core: Core | None = None
-    trapped: bool = False
+    closing: Closing
 
     @cached_property
     def shear_modulus(self) -> Floats:
@@ -86,9 +83,8 @@ def make_model(scene: Scene) -> Model:
     space = make_space(mesh, element)
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
-    core = core_of(scene, mesh)
-    core = core if core is not None and core.fits else None
-    attraction = make_attraction(scene, mesh, pad, surface, core) if needed.has("electricity") else None
+    closing = needed.closing
+    attraction = make_attraction(closing, pad, surface) if needed.has("electricity") else None
     solver, laws = scene.solver, scene.finger.materials
     terms = [
         make_term(space, term.form, term.on.name, isinstance(term.on, Boundary), laws.get(term.on.name))
@@ -105,15 +101,13 @@ def make_model(scene: Scene) -> Model:
         deepest = max(0.0, *(course.indentation or 0.0 for course in scene.courses))
     limits = Limits(solver.tolerance, solver.strategy, solver.threads, deepest)
     interface = make_interface(scene, mesh, pad, surface)
-    if core is not None and attraction is not None:
+    if closing.core is not None and attraction is not None:
         interface.restored = attraction.restored
-    if core is not None or not isinstance(scene.friction_law, Coulomb):
+    if closing.core is not None or not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
     factorised = FactorisedBody(body, interface, attraction, limits)
     equilibrium = Equilibrium(factorised, interface, attraction, limits)
-    timed = solver.timed or (scene.drive is not None and scene.drive.resolved)
-    trapped = not timed and core is None and attraction is not None and snaps(scene, mesh)
-    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, core, trapped)
+    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, closing)
 
 
 def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:
@@ -141,19 +135,17 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
     return surface, max(g0, 0.0)
 
 
-def make_attraction(
-    scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any, core: Core | None = None
-) -> Attraction:
+def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attraction:
     """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
-    electrics = electrics_of(scene, mesh)
+    scene, mesh, electrics = closing.scene, closing.mesh, closing.electrics
     if isinstance(scene.voltage, FollowForce):
         _check_quadratic(scene)
     law, layers = electrics.attraction
     rough, charging = roughness_of(scene.roughness_gap), None
     if scene.drive is not None and scene.drive.resolved:
         charging = Charging(electrics.sandwich, pad.nodes.size)
-    if core is not None:
-        law = core.law
+    if closing.core is not None:
+        law = closing.core.law
     local = (law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
     if scene.field == "local":
         return Attraction(*local)

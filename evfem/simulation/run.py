@@ -171,7 +171,7 @@ class Run:
             allowed=allowed_error(scene),
             rise=lambda old, new, target: rise(Part(self.model, old, new), target),
         )
-        if self.model.trapped and self.voltage_at(0.0, 0.0) != 0.0:
+        if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
         self.probes: Probes | None = None
@@ -394,7 +394,7 @@ class Run:
         if self.stepper.allowed is not None:
             solver["path_error"] = self.stepper.path_error
         about = provenance(self.scene, self.model.mesh, solver)
-        if (core := self.model.core) is not None:
+        if (core := self.model.closing.core) is not None:
             about["core"] = core.told
         about["warnings"] = [*through(self.model, self.sunk), *doubtful(self.scene, self.rows)]
         probes = None if self.probes is None else self.probes.histories(self.probed)

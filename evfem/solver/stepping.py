@@ -262,13 +262,17 @@ class Stepper:
     def solve(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium that the body can reach from `state` without climbing, found from `start` (default
         `state`). Where iterations come to one behind a barrier the body is held (`evfem.solver.hold`); in a
-        step that takes time or is part of a release already, it fails.
+        release the part fails; in time it fails down to `RELEASED` of a step, and then counts as a snap.
         """
         new = self._found(state, target, start)
         if not self._climbs(target, state, new):
             return new
         self.barriers += 1
-        if self.body is None or self.releasing or not self._relaxation(self.body).applies(target):
+        timed = self.body is None or not self._relaxation(self.body).applies(target)
+        if timed and not self.releasing and self.substep < RELEASED:
+            self.snaps += 1
+            return new
+        if self.body is None or timed or self.releasing:
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
         new = Hold(self.body, self._reached, self.equilibrium.strategy.hold).follow(state, target)
         self.held += 1

@@ -10,7 +10,6 @@ same branch. Different ones show that the answer depends on the way.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -100,8 +99,11 @@ def check(scene: Scene | str | Path) -> Checked:
         own = simulate(given)
     rows = [_row("the scene", own, own)]
     for way, other in _others(given, own):
-        with notices.status(way), other_solver() if way.startswith("sparse") else nullcontext():
+        with notices.status(way):
             rows.append(_ended(way, other, own))
+    with other_solver() as name:
+        if name:
+            rows.append(_ended(f"sparse solver {name}", given, own))
     return Checked(rows)
 
 
@@ -116,17 +118,13 @@ def _ended(way: str, scene: Scene, own: Result) -> dict[str, Any]:
 
 
 def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
-    """The ways, each with its scene."""
-
+    """The ways but for the other sparse solver, each with its scene."""
     twice = [_in_twice(motion) for motion in scene.motion]
     yield "twice the steps", replace(scene, motion=twice)
     strategy = scene.solver.strategy
     for share in HOLDS if own.provenance["solver"]["barriers"] else ():
         hold = replace(strategy, hold=share * strategy.hold)
         yield f"held by {share:g} of the drag", replace(scene, solver=replace(scene.solver, strategy=hold))
-    with other_solver() as name:
-        if name:
-            yield f"sparse solver {name}", scene
     if (changed := _changed(scene)) is not None:
         yield f"an input changed by {PERTURBATION:g}", changed
 

@@ -105,6 +105,7 @@ def _power_law(knobs: Knobs, exponent: float) -> tuple[Array, Array]:
 
 
 def phases(seed: int, size: int) -> Array:
+    """Angles (size,) from 0 to 2 pi."""
     draw = random.Random(seed)  # its numbers are the same in every version of Python
     return np.array([2.0 * np.pi * draw.random() for _ in range(size)])
 

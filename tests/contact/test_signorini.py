@@ -304,6 +304,16 @@ def test_a_circle_of_all_violated_nodes_is_left_through_the_worst_one():
     np.testing.assert_allclose(found.force[::2], 1.0 / 3.0, rtol=1e-12)
 
 
+def test_a_node_that_can_neither_slip_nor_open_sticks():
+    """Painleve: under a steep bound of friction slip pulls the node into the surface."""
+    compliance = np.array([[1.0, 0.9], [0.9, 1.0]])
+    problem = ContactProblem(np.array([-1.0, 0.5]), compliance, np.array([8.0]))
+    for status in (OPEN, STICK, FORWARD, BACKWARD):
+        found = solve_contact(problem, np.array([status]))
+        assert found.status[0] == STICK
+        assert found.force == pytest.approx(-np.linalg.solve(compliance, problem.start))
+
+
 def test_nothing_touches_nothing_pushes():
     problem = ContactProblem(np.array([0.5, 0.0, 0.1, 0.3]), np.eye(4), np.full(2, 0.3))
     found = solve_contact(problem, closed(2))
