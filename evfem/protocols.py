@@ -11,6 +11,7 @@ electrostatic law      ``Scene(law=...)``                        `ForceLaw`
 rough faces            ``Scene(roughness_gap=...)``              `RoughnessLaw`
 material               ``FingerPad(materials={region: ...})``    `StressLaw`, `EnergyLaw` or a `WeakForm`
 surface                ``Scene(surface=...)``                    `Surface`
+elastic surface        ``Flat(elastic=...)``, any surface        `Elastic`
 friction               ``Scene(friction_law=...)``               `FrictionLaw`
 voltage over time      ``Scene(voltage=...)``                    `TimeSignal`
 weak form              ``Scene.with_term(form(...), on=...)``    `WeakForm`
@@ -90,12 +91,28 @@ class Surface(Protocol):
 
     Optional attributes: `friction`, a number or a table [[x, coefficient], ...] (without it 0);
     `y`, the height (mm) at which the profile lies (without it or None: first touch); `insulator`,
-    a `Layer`. Optional methods of x: `slope` and `curvature`, which are derived otherwise;
+    a `Layer`; `elastic`, an `Elastic`. Optional methods of x: `slope` and `curvature`, which are derived otherwise;
     `friction_coefficient`, instead of `friction`.
     """
 
     def height(self, x: Any) -> Any:
         """Height (mm) of the profile at x (mm, any shape)."""
+
+
+@runtime_checkable
+class Elastic(Protocol):
+    """How a surface gives way under forces on strips of it, linear and quasi-static.
+
+    Optional: `compliance_slope(x, lengths)` (2n, 2n), its derivative by the place of the displaced strip;
+    otherwise it is differenced.
+    """
+
+    def compliance(self, x: Any, lengths: Any) -> Any:
+        """Mean displacements of n strips by forces on them, (2n, 2n) in mm per N/mm, symmetric and positive.
+
+        `x` and `lengths` (n,) are their middles and lengths in mm; first the n displacements into the
+        surface, then the n along +x; columns in the same order, forces on the surface into it and along +x.
+        """
 
 
 @runtime_checkable
@@ -111,6 +128,10 @@ class CompleteSurface(Surface, Protocol):
     @property
     def insulator(self) -> Any:
         """Layer over the electrode, or None."""
+
+    @property
+    def elastic(self) -> Any:
+        """How the surface gives way, or None."""
 
     @property
     def is_flat(self) -> bool:

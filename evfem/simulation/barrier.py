@@ -46,6 +46,8 @@ def rise(part: Part, target: Target) -> float:
     tissue = np.array([body.energy(old.u + s * way) for s in PLACES])
     springs = [float(0.5 * np.sum(part.compliance * state.contact_force**2)) for state in (old, new)]
     stored = tissue + springs[0] + (springs[1] - springs[0]) * PLACES**2
+    before, between, after = part.yielded
+    stored = stored + (1.0 - PLACES) ** 2 * before + (1.0 - PLACES) * PLACES * between + PLACES**2 * after
     carried = _carried(part, target)
     given = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
     given = given - float(np.sum(body.given_forces(new.u) * way))
@@ -70,7 +72,7 @@ def _pulled(part: Part, carried: Floats) -> Floats:
     attraction, old, new = part.model.attraction, part.old, part.new
     if attraction is None or not attraction.acts(new.voltage):
         return np.zeros_like(PLACES)
-    along = (new.u - old.u)[part.model.pad.nodes] - carried
+    along = part.way - carried
     begin = part.model.equilibrium.interface.resting(old) + carried
     begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
     with part.charges_held():
@@ -95,7 +97,7 @@ def _lifted(part: Part) -> Floats:
     touching = old.touching & new.touching
     if model.surface.is_flat or not touching.any():
         return np.zeros_like(PLACES)
-    begin, end = (model.equilibrium.positions(state.u)[touching] for state in (old, new))
+    begin, end = (model.equilibrium.places(state)[touching] for state in (old, new))
     normal = new.contact_force[touching, 0]
     lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in PLACES]
     return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES

@@ -71,6 +71,9 @@ class History:
         metadata=column("mm", "sum of what touches, between edges", whole="mm2")
     )
     min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
+    surface_sink: Floats = field(
+        metadata=column("mm", "largest displacement of an elastic surface into it, 0 of a rigid one")
+    )
     peak_contact_pressure: Floats = field(metadata=column("MPa", "largest contact pressure of a node"))
     mean_contact_pressure: Floats = field(metadata=column("MPa", "pressing forces over what touches"))
     external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))

@@ -48,7 +48,7 @@ class Ledger:
         """The forces, widths and energies of a state; costs are added by the caller."""
         model, end = self.model, self.end
         assert end is not None
-        position = model.equilibrium.positions(state.u)
+        position = model.equilibrium.places(state)
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
@@ -70,6 +70,7 @@ class Ledger:
             "electrostatic_force_x": float(attraction[0]),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
+            "surface_sink": max(0.0, float(state.given[:, 1].max(initial=0.0))),
             "peak_contact_pressure": float((pressing / shares(model, position)).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
@@ -132,7 +133,7 @@ def _positive(share: Floats) -> Floats:
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
     size, nodes = model.body.space.size, model.pad.nodes
-    position, withheld = model.equilibrium.positions(state.u), model.equilibrium.interface.withheld(state)
+    position, withheld = model.equilibrium.places(state), model.equilibrium.interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
     pulled = share if model.attraction is None else _positive(model.attraction.weights(position))

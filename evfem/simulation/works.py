@@ -16,7 +16,8 @@ The history has
   turn: their shear force changes while they stick and stays while they slip;
 - ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
-- ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
+- ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface, of
+  an elastic surface :math:`F\cdot C F/2` (`evfem.contact.bed`, relative to which ways and slips then are);
   with a hand that of its spring (and ``kinetic_energy``, ``viscous_dissipation`` and the work of the
   drive have its mass and damper);
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
@@ -168,7 +169,7 @@ class Part:
         body, new = self.model.body, self.new
         given = body.given_forces(new.u)
         kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
-        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2))
+        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2) + self.yielded[-1])
         if (hand := self.model.scene.hand) is not None:
             springs, kinetic = springs + hand.stored(new), kinetic + hand.kinetic(new)
         stored = body.energy(new.u) + (0.0 if body.dynamics is None else body.dynamics.branch_energy(new.u))
@@ -186,7 +187,7 @@ class Part:
         lost = _mean_work(begin.forces, end.forces, moved) - viscous
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
         lost -= self._contact() + friction
-        lost += turned + pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        lost += turned + pulled - _mean_work(old.attraction, new.attraction, self.way) + self._sunk()
         if (hand := self.model.scene.hand) is not None:
             more, damped = hand.given(old, new), hand.dissipation(old, new, self._seconds)
             given, viscous, lost = given + more, viscous + damped, lost + more - damped
@@ -213,9 +214,10 @@ class Part:
 
     def electrostatic(self) -> float:
         """Work of the attraction W_e, N mm per mm of depth."""
-        model, old, new = self.model, self.old, self.new
-        moved = (new.u - old.u)[model.pad.nodes]
-        trapezoidal = _mean_work(old.attraction, new.attraction, moved)
+        model, old, new, moved = self.model, self.old, self.new, self.way
+        tilt = model.equilibrium.interface.untilted
+        before, after = (tilt(state, state.attraction) for state in (old, new))
+        trapezoidal = _mean_work(before, after, moved)
         if model.attraction is not None and model.attraction.charging is not None:
             return self._work_of_charged(model.attraction.charging, moved)
         if model.attraction is None or (old.voltage == 0.0 and new.voltage == 0.0):
@@ -230,7 +232,7 @@ class Part:
         if not (along[:, 1].any() or model.attraction.direction == "normal"):
             return trapezoidal
         voltages = (old.voltage, new.voltage)
-        ends = _mean_work(old.attraction, new.attraction, along)
+        ends = _mean_work(before, after, along)
         if model.attraction.has_fringes:
             ends = float(np.mean(self.pulls(along, ENDS, voltages)))
         return trapezoidal + self._on_the_way(along, voltages) - ends
@@ -325,7 +327,13 @@ class Part:
         part, places = (self.old, self.new), x0 + way * (x1 - x0)
         resists = self.model.equilibrium.interface.resistance
         limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
-        return float(PART @ np.sum(limit * length, axis=1))
+        return float(PART @ np.sum(limit * self._stretched(length), axis=1))
+
+    def _stretched(self, length: Floats) -> Floats:
+        """Ways (P,) along an elastic surface, as long as it is stretched."""
+        if not self.new.strain.size:
+            return length
+        return np.asarray(length * (1.0 - 0.5 * (self.old.strain + self.new.strain)[:, 0]))
 
     @property
     def _seconds(self) -> float:
@@ -335,8 +343,35 @@ class Part:
     @cached_property
     def x(self) -> tuple[Floats, Floats]:
         """x of the pad nodes (P,) before and after."""
-        x0, x1 = (self.model.equilibrium.positions(state.u)[:, 0] for state in (self.old, self.new))
+        x0, x1 = (self.model.equilibrium.places(state)[:, 0] for state in (self.old, self.new))
         return x0, x1
+
+    @cached_property
+    def way(self) -> Floats:
+        """How far the pad's nodes have moved relative to the surface (P, dim) in mm."""
+        places = self.model.equilibrium.places
+        return np.asarray(places(self.new) - places(self.old))
+
+    @cached_property
+    def yielded(self) -> Floats:
+        """Energy of an elastic surface before, between (forces of one end, places of the other) and after."""
+        (old, new), forces = (self.old, self.new), self._on_surface
+        pairs = ((0, old), (0, new), (1, old), (1, new)) if new.given.size else ()
+        found = [0.5 * float(np.sum(forces[i] * state.given)) for i, state in pairs] or [0.0] * 4
+        return np.array([found[0], found[1] + found[2], found[3]])
+
+    @property
+    def _on_surface(self) -> tuple[Floats, Floats]:
+        """Forces between finger and surface (P, dim) before and after."""
+        contact = self.model.equilibrium.contact_forces
+        before, after = (contact(state) + state.attraction for state in (self.old, self.new))
+        return before, after
+
+    def _sunk(self) -> float:
+        """Trapezoidal work of the forces on what an elastic surface gives way by."""
+        if not self.new.given.size:
+            return 0.0
+        return _mean_work(*self._on_surface, self.new.given - self.old.given)
 
     @cached_property
     def compliance(self) -> Floats:
@@ -372,7 +407,7 @@ class Part:
         """Trapezoidal work of the contact forces, N mm per mm of depth."""
         equilibrium = self.model.equilibrium
         before, after = (equilibrium.contact_forces(state) for state in (self.old, self.new))
-        return _mean_work(before, after, (self.new.u - self.old.u)[self.model.pad.nodes])
+        return _mean_work(before, after, self.way)
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
         """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
@@ -397,7 +432,7 @@ class Part:
         if model.attraction is not None:
             at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
             work += float(np.sum((at[1] - at[0]) * along))
-        x = model.equilibrium.positions(carried.u)[:, 0]
+        x = model.equilibrium.places(carried)[:, 0]
         less = self._coefficient(x) - self._coefficient(self.x[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 

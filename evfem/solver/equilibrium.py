@@ -33,7 +33,7 @@ from evfem.electrostatics.signals import Seen
 from evfem.solver.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface
-from evfem.solver.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
+from evfem.solver.state import NO_AGE, NO_BED, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
 from evfem.solver.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
@@ -70,13 +70,15 @@ class Equilibrium:
             age=NO_AGE if self.interface.law is None else np.zeros(nodes),
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
+            given=NO_BED if self.interface.bed is None else zero,
+            strain=NO_BED if self.interface.bed is None else zero,
         )
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
 
-    def positions(self, u: Floats) -> Floats:
-        """Current positions of the pad nodes (P, 2)."""
-        return self.interface.positions(u)
+    def places(self, state: State) -> Floats:
+        """Current positions of the pad nodes (P, dim) relative to the surface."""
+        return self.interface.places(state)
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
@@ -86,7 +88,8 @@ class Equilibrium:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
+        found = Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
+        return self.interface.tilted(state, found)
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""
@@ -184,7 +187,7 @@ class Equilibrium:
             if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
-            self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
+            self.interface.pins.watch(self.places(state)[:, 0], state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 

@@ -25,6 +25,7 @@ from evfem.common.constants import (
     SHORTEST_LENGTH,
     SMALLEST_FORCE,
 )
+from evfem.contact.bed import Bed
 from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.protocols import FrictionLaw
@@ -120,7 +121,7 @@ class Interface:
     are far by now are let go.
     """
 
-    _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
+    _seen: tuple[tuple[Floats, Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -132,6 +133,8 @@ class Interface:
         # coefficients of friction may change over x in three dimensions, but not jump
         jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
         self.pins = Pins(jumps, pad.nodes.size)
+        elastic = getattr(surface, "elastic", None)
+        self.bed = None if elastic is None else Bed(elastic, pad, SHORTEST_LENGTH * self.length)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
         self._returned = Returned(pad.nodes.size)
@@ -140,7 +143,7 @@ class Interface:
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
-        self.pins.begin(self.positions(old.u)[:, 0])
+        self.pins.begin(self.places(old)[:, 0])
         self._returned = Returned(self.pad.nodes.size)
         self.duration = duration
 
@@ -148,18 +151,49 @@ class Interface:
         """Current positions of the pad nodes (P, dim) for displacements u (N, dim)."""
         return self.points + u[self.pad.nodes]
 
+    def places(self, state: State) -> Floats:
+        """Current positions of the pad nodes (P, dim) relative to the surface, as if it were rigid."""
+        return self.positions(state.u) if self.bed is None else self.positions(state.u) + state.given
+
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states, which many ask for."""
-        for u, found in self._seen:
-            if u is state.u:
+        for u, given, found in self._seen:
+            if u is state.u and given is state.given:
                 return found
-        found = surface_state(self.surface, self.positions(state.u))
-        self._seen = ((state.u, found), *self._seen[:1])
+        found = surface_state(self.surface, self.places(state))
+        if self.bed is not None:
+            shortened, sunk = state.strain.T
+            found = replace(found, slope=(found.slope - sunk) / (1.0 - shortened))
+        self._seen = ((state.u, state.given, found), *self._seen[:1])
         return found
+
+    def tilted(self, state: State, force: Floats) -> Floats:
+        """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
+        if self.bed is None:
+            return force
+        (shortened, sunk), (along, up) = state.strain.T, force.T
+        return np.stack([(along + sunk * up) / (1.0 - shortened), up], axis=1)
+
+    def untilted(self, state: State, force: Floats) -> Floats:
+        """The same attraction as above a surface that has not sunk, whose work is that of the field."""
+        if self.bed is None:
+            return force
+        (shortened, sunk), (along, up) = state.strain.T, force.T
+        return np.stack([along * (1.0 - shortened) - sunk * up, up], axis=1)
+
+    def unyielded(self, state: State, force: Floats) -> float:
+        """By how much, over the tolerances' lengths, what an elastic surface gives way by misses what the
+        forces on the nodes (P, 2) ask for; 0 of a rigid one.
+        """
+        if self.bed is None:
+            return 0.0
+        below = self.bed.below(self.places(state))
+        missing = np.abs(below.given(force) - state.given).max() / self.length
+        return float(max(missing, np.abs(below.change(force) - state.strain).max()))
 
     def resting(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""
-        position = self.positions(state.u)
+        position = self.places(state)
         touching = state.status != OPEN
         position[touching, 1] -= self.surface_at(state).gap[touching]
         return position
@@ -175,8 +209,8 @@ class Interface:
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes (P, dim - 1) in mm, along the profile and along z."""
-        position = self.positions(state.u)
-        moved = (position - self.positions(old.u))[:, ::2]
+        position = self.places(state)
+        moved = (position - self.places(old))[:, ::2]
         moved[:, 0] = self.surface_at(state).stretch * (position[:, 0] - self._origin(old))
         return moved
 
@@ -184,7 +218,7 @@ class Interface:
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
         """What the contact problem has to know of candidates c; of all nodes their attraction's change."""
-        position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
+        position, surface = self.places(state)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
         friction = self.friction(old, c, np.where(self.pins.held[c], self.pins.x[c], position[:, 0]))
@@ -257,7 +291,7 @@ class Interface:
 
     def shares(self, state: State) -> Floats:
         """The same of a state."""
-        return self.lengths(self.positions(state.u))
+        return self.lengths(self.places(state))
 
     def shares_at(self, part: tuple[State, State], x: Floats) -> Floats:
         """The same at x (P,), on a part between two states; in space its mean over the part."""
@@ -287,7 +321,7 @@ class Interface:
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
-        return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
+        return np.where(self.pins.held, self.pins.x, self.places(old)[:, 0])
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
@@ -325,7 +359,7 @@ class Interface:
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
-        position, surface = self.positions(state.u), self.surface_at(state)
+        position, surface = self.places(state), self.surface_at(state)
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self._weak(state)

@@ -121,7 +121,7 @@ class Linearisation:
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
-        position = self.interface.positions(state.u)
+        position = self.interface.places(state)
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
@@ -200,12 +200,12 @@ class Linearisation:
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         begin, seconds, inner = self.body.beginning
         at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
-        self._made_at = TangentPoint(*at, state.status, state.pressure, inner)
+        self._made_at = TangentPoint(*at, state.status, state.pressure, inner, state.given, state.strain)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
         """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
-        most = HELD * self.softest * self.pad.tributary(self.interface.positions(state.u))
+        most = HELD * self.softest * self.pad.tributary(self.interface.places(state))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
         weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
@@ -226,7 +226,8 @@ class Linearisation:
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
             self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner)
-        self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
+        there = replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure)
+        self.factorise(replace(there, given=at.given, strain=at.strain))
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:

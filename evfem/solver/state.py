@@ -18,6 +18,8 @@ NO_PRESSURE: Floats = np.zeros((0, 0))
 NO_HAND: Floats = np.zeros(0)
 #: the time since a node touched where nothing depends on it
 NO_AGE: Floats = np.zeros(0)
+#: what a rigid surface gives way by, and its change along x
+NO_BED: Floats = np.zeros((0, 2))
 #: the charges where the voltage is not resolved in time
 NO_CHARGES: Floats = np.zeros((2, 0))
 
@@ -54,7 +56,8 @@ class State:
     pressure as an unknown, that (E, Q) in MPa (`evfem.solver.pressure`). With a law of friction other than
     Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
     (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. Maxwell
-    branches keep `inner` (`evfem.tissue.branches`).
+    branches keep `inner` (`evfem.tissue.branches`). What an elastic surface adds to the places of the pad's
+    nodes relative to it is `given` (P, 2) in mm, and its derivative along x `strain` (P, 2).
     """
 
     u: Floats
@@ -71,6 +74,8 @@ class State:
     hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    given: Floats = field(default_factory=lambda: NO_BED)
+    strain: Floats = field(default_factory=lambda: NO_BED)
 
     @property
     def touching(self) -> Any:
@@ -95,6 +100,8 @@ class TangentPoint:
     status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    given: Floats = field(default_factory=lambda: NO_BED)
+    strain: Floats = field(default_factory=lambda: NO_BED)
 
 
 @dataclass(frozen=True, eq=False)
