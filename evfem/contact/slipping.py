@@ -2,7 +2,7 @@ r"""Nodes that go to and fro under a law of friction, in the iterations of one s
 
 The contact problem takes a law by its tangent at the iterate. If the law rises steeply from rest and
 levels off, or has a kink, a node may come back to where it has been: Newton's iterations cycle. The
-values of the law found so far take the place of its tangents then (`Returned`).
+values of the law found so far take the place of its tangents then (`OscillatingNodes`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from evfem.surface.friction import Linearised, Slipping
 HALVINGS = 60
 
 
-class Returned:
+class OscillatingNodes:
     """Nodes that have slipped and stick again, or whose speed goes to and fro: `nodes` (P,) bool.
 
     The tangent of a law that rises steeply from rest and levels off overestimates static friction: the node

@@ -89,7 +89,7 @@ class Relaxation:
 
     def _follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
         end, held = target, self._held(state, target)
-        pace, begin = Pace(), state.u + self._imperfection
+        pace, begin = DragSchedule(), state.u + self._imperfection
         for _ in range(DRAG_STEPS):
             new = self._dragged(state, held, begin, pace)
             if new is None:
@@ -113,12 +113,12 @@ class Relaxation:
 
     def _held(self, state: State, target: Target) -> Target:
         """The loads of the steps with drag: a snap takes no time, but where hand or charge have their own."""
-        if target.drive.follows:
-            target = replace(target, drive=GivenVoltage(state.voltage))
+        if target.voltage.follows:
+            target = replace(target, voltage=GivenVoltage(state.voltage))
         timed = self.charged or (target.hand is not None and target.hand.hand.timed)
         return target if timed else replace(target, duration=0.0)
 
-    def _dragged(self, state: State, target: Target, begin: Floats, pace: Pace) -> State | None:
+    def _dragged(self, state: State, target: Target, begin: Floats, pace: DragSchedule) -> State | None:
         """The equilibrium with drag that holds the body at `begin` (N, dim); None, and slower, if failed."""
         self.body.release(begin, pace.rate)
         try:
@@ -169,12 +169,12 @@ def pull(state: State, target: Target) -> float:
 
 
 @dataclass
-class Pace:
+class DragSchedule:
     """How a release goes on: the `rate` of drag of the next step, the factor by which it rises if that
     fails, the last step's `speed` (mm) and its `growth` over the step before. At rates below `quiet` the
     body may be at rest without drag.
 
-    >>> pace = Pace()
+    >>> pace = DragSchedule()
     >>> pace.went(0.5), pace.choose(), pace.went(0.25), pace.rate, pace.growth
     (None, None, None, 0.5, 0.25)
     >>> pace.failed(), pace.rate, pace.failed(), pace.rate
