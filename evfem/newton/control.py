@@ -33,7 +33,7 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
-from evfem.electrostatics.signals import Reading, Seen, electrode_charge, smallest_gap
+from evfem.electrostatics.signals import PadState, Reading, electrode_charge, smallest_gap
 from evfem.newton.hand import HandControl
 from evfem.newton.state import State, StepFailed
 
@@ -118,7 +118,7 @@ class VoltageProblem:
     """What a voltage control may ask for: the present squared voltage (kV^2), a solved contact problem, state
     for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
     `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
-    the residual and by forces with such a state; what is `seen`.
+    the residual and by forces with such a state; the present state of the `pad`.
     """
 
     squared: float
@@ -126,7 +126,7 @@ class VoltageProblem:
     unit: Callable[[], tuple[Floats, Floats]]
     pushed: Any = None
     measured: Any = None
-    seen: Any = None
+    pad: Any = None
 
 
 @dataclass(frozen=True)
@@ -156,11 +156,11 @@ class VoltageControl:
         """Force on the bone along x (N/mm) that the control's equation lacks at these reactions (2,)."""
         return 0.0
 
-    def lacking(self, seen: Seen) -> float:
+    def lacking(self, pad: PadState) -> float:
         """Relative residual of an equation that is no balance of forces."""
         return 0.0
 
-    def held(self, seen: Seen) -> float:
+    def held(self, pad: PadState) -> float:
         """The voltage (V) if the pad stays where it is."""
         return self.voltage
 
@@ -204,18 +204,18 @@ class ConstrainedVoltage(VoltageControl):
 
     free = True
 
-    def read(self, seen: Seen) -> tuple[Reading, float]:
+    def read(self, pad: PadState) -> tuple[Reading, float]:
         """The quantity and its prescribed value."""
         raise NotImplementedError
 
-    def unit(self, seen: Seen) -> Floats:
+    def unit(self, pad: PadState) -> Floats:
         """Forces (P, dim) on the pad nodes per unit of the voltage's unknown."""
         raise NotImplementedError
 
     def unknown(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, Floats]:
         """The unknown, and the part of the backward solve that a unit of it adds."""
-        reading, prescribed = self.read(problem.seen)
-        saved, push = problem.pushed(self.unit(problem.seen))
+        reading, prescribed = self.read(problem.pad)
+        saved, push = problem.pushed(self.unit(problem.pad))
         row, still, own = problem.measured(reading.by_position, saved)
         travels = [row[unknown.axis - step.body.dim] for unknown in step.unknowns]
         gains = np.array([*travels, reading.by_voltage + own])
@@ -236,21 +236,21 @@ class KeptCharge(ConstrainedVoltage):
 
     charge: float | None = None
 
-    def read(self, seen: Seen) -> tuple[Reading, float]:
-        charging = seen.attraction.charging
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        charging = pad.attraction.charging
         kept = charging.electrode_charge(charging.old) if self.charge is None else self.charge
-        return electrode_charge(seen), kept
+        return electrode_charge(pad), kept
 
-    def unit(self, seen: Seen) -> Floats:
-        return seen.slope
+    def unit(self, pad: PadState) -> Floats:
+        return pad.slope
 
-    def lacking(self, seen: Seen) -> float:
-        wanted = self.held(seen)
-        return abs(wanted - seen.voltage) / max(abs(wanted), abs(seen.voltage), TINY)
+    def lacking(self, pad: PadState) -> float:
+        wanted = self.held(pad)
+        return abs(wanted - pad.voltage) / max(abs(wanted), abs(pad.voltage), TINY)
 
-    def held(self, seen: Seen) -> float:
-        reading, kept = self.read(seen)
-        return self.after(seen.voltage, (kept - reading.value) / reading.by_voltage)
+    def held(self, pad: PadState) -> float:
+        reading, kept = self.read(pad)
+        return self.after(pad.voltage, (kept - reading.value) / reading.by_voltage)
 
     def after(self, voltage: float, change: float) -> float:
         return voltage + KILOVOLT * change
@@ -262,19 +262,19 @@ class GivenGap(ConstrainedVoltage):
 
     gap: float
 
-    def read(self, seen: Seen) -> tuple[Reading, float]:
-        return smallest_gap(seen), self.gap
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        return smallest_gap(pad), self.gap
 
-    def unit(self, seen: Seen) -> Floats:
-        return seen.forces(KILOVOLT)
+    def unit(self, pad: PadState) -> Floats:
+        return pad.forces(KILOVOLT)
 
-    def lacking(self, seen: Seen) -> float:
-        return abs(smallest_gap(seen).value / self.gap - 1.0)
+    def lacking(self, pad: PadState) -> float:
+        return abs(smallest_gap(pad).value / self.gap - 1.0)
 
     def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
         found = super().solve(step, problem)
         if problem.squared == 0.0 and found.change < 0.0:
-            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(problem.seen).value), [])
+            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(problem.pad).value), [])
         return found
 
 

@@ -29,7 +29,7 @@ from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import StabilityRatio
-from evfem.electrostatics.signals import Seen
+from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
@@ -51,7 +51,7 @@ class Equilibrium:
         self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record
         self.tolerance, self.strategy = limits.tolerance, limits.strategy
-        self._seen: tuple[State, Balance] | None = None
+        self._iterate: tuple[State, Balance] | None = None
 
     def rest(self, bone: Floats, voltage: float) -> State:
         """The undeformed body, translated by `bone` (dim,)."""
@@ -86,12 +86,12 @@ class Equilibrium:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
+        return PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""
-        seen = Seen.of(self.attraction, self.interface, state, old.touching)
-        return GivenVoltage(target.voltage.held(seen))
+        pad = PadState.of(self.attraction, self.interface, state, old.touching)
+        return GivenVoltage(target.voltage.held(pad))
 
     def step(
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
@@ -157,7 +157,7 @@ class Equilibrium:
             kind = Folded if isinstance(error, Folded) else StepFailed
             failed = kind(reason, self.record.residuals)
             failed.unstable = isinstance(error, Unstable)
-            failed.findings = "" if self._seen is None else self.body.findings(*self._seen)
+            failed.findings = "" if self._iterate is None else self.body.findings(*self._iterate)
             raise failed from error
 
     def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
@@ -171,7 +171,7 @@ class Equilibrium:
         for iteration in range(self.strategy.iterations):
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
-            self._seen = state, balance
+            self._iterate = state, balance
             reached = target.reached(state.bone)
             residuals.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):

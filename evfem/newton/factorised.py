@@ -37,7 +37,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
-from evfem.electrostatics.signals import Seen
+from evfem.electrostatics.signals import PadState
 from evfem.newton.anderson import Anderson
 from evfem.newton.control import Target, VoltageProblem
 from evfem.newton.interface import Interface
@@ -153,7 +153,7 @@ class FactorisedBody:
         if target.hand is not None:
             missing.append(target.hand.unbalanced(float(state.bone[0]), reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
-        return max(float(free / largest), target.voltage.lacking(self._seen(state)))
+        return max(float(free / largest), target.voltage.lacking(self._pad_state(state)))
 
     def _rounding(self, state: State) -> float:
         """Forces (N/mm) below which the balance is rounding: of displacements, stresses and attraction."""
@@ -224,7 +224,7 @@ class FactorisedBody:
     def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
         factor = self.linearisation.factor
-        saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
+        saved, residual = factor.forward(-balance.of_tangent(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
         driven = target.voltage.solve(step, self._problem(saved, state))
         found, bone = self.travel.limited(step, driven.solution, state, target)
@@ -268,12 +268,12 @@ class FactorisedBody:
         self._scaled_down = found.reduced
         return found
 
-    def _seen(self, state: State) -> Seen:
-        return Seen.of(self.attraction, self.interface, state, self.linearisation.touching)
+    def _pad_state(self, state: State) -> PadState:
+        return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
 
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
         """What a voltage control has; `saved` is the residual's state for the backward solve."""
-        factor, seen, nodes = self.linearisation.factor, self._seen(state), self.pad.nodes
+        factor, pad, nodes = self.linearisation.factor, self._pad_state(state), self.pad.nodes
 
         def pushed(forces: Floats) -> tuple[Floats, Floats]:
             nodal = np.zeros_like(state.u)
@@ -286,8 +286,8 @@ class FactorisedBody:
             still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
             return row, still, own
 
-        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(seen.forces(KILOVOLT))
-        return VoltageProblem(squared, self._solve, unit, pushed, measured, seen)
+        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.forces(KILOVOLT))
+        return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""

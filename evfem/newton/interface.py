@@ -120,7 +120,7 @@ class Interface:
     are far by now are let go.
     """
 
-    _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
+    _surfaces: tuple[tuple[Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -150,11 +150,11 @@ class Interface:
 
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states, which many ask for."""
-        for u, found in self._seen:
+        for u, found in self._surfaces:
             if u is state.u:
                 return found
         found = surface_state(self.surface, self.positions(state.u))
-        self._seen = ((state.u, found), *self._seen[:1])
+        self._surfaces = ((state.u, found), *self._surfaces[:1])
         return found
 
     def resting(self, state: State) -> Floats:
@@ -205,8 +205,8 @@ class Interface:
         """The candidates c under a law of friction other than Coulomb's.
 
         Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
-        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem knows the part of F
-        that does not grow with dx; seen with that, slip and yielding are (1 + K C) times as large.
+        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem has the part of F
+        that does not grow with dx; with it, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])
@@ -237,9 +237,9 @@ class Interface:
         """These pad nodes (k,) as a law of friction sees them, with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         length = self.tributary(state)[nodes]
-        seen = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
+        nodal = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
         found = self.restored(state.voltage)
-        return seen if found is None else replace(seen, withheld=found[0][nodes], left=found[1][nodes])
+        return nodal if found is None else replace(nodal, withheld=found[0][nodes], left=found[1][nodes])
 
     def withheld(self, state: State) -> Floats:
         """Part of attraction and pressing force of closed nodes (P,) that a core takes away, N/mm."""
@@ -282,8 +282,8 @@ class Interface:
         mu = self.friction(old, np.arange(x.size), x)
         if self.law is None:
             return np.asarray(mu * normal)
-        seen = self._slipping(old, new, np.arange(x.size), mu, slip)
-        return replace(seen, normal=normal, length=self.tributary_at(part, x)).bound(self.law)
+        nodal = self._slipping(old, new, np.arange(x.size), mu, slip)
+        return replace(nodal, normal=normal, length=self.tributary_at(part, x)).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""

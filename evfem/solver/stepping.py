@@ -48,17 +48,17 @@ from evfem.tissue.body import Body
 BARRIER = "the equilibrium that was found lies behind a barrier, which the finger would not climb"
 #: a climb that is rounding, as a share of the stored energy
 CLIMB = 1e-3
-#: from the fraction of the way that is done (0 to 1) and the next one to the target there
+#: from the fraction of a step that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
 #: steps that were solved one after the other: their targets and ends
 Solved = list[tuple[Target, State]]
 
 
 class Accounts(Protocol):
-    """Receives every accepted part: the bookkeeping of works and energies."""
+    """Receives every accepted substep: the bookkeeping of works and energies."""
 
     def accept(self, old: State, new: State) -> object:
-        """A part was accepted, from `old` to `new`; says whether stability was lost in it."""
+        """A substep from `old` to `new` was accepted; returns whether stability was lost in it."""
 
     def mark(self) -> Any:
         """Present state of the accounts."""
@@ -69,7 +69,7 @@ class Accounts(Protocol):
 
 @dataclass(frozen=True)
 class Substep:
-    """A part of a step, from `begin` to `end` (0 to 1), and the target there."""
+    """A fraction of a step, from `begin` to `end` (0 to 1), and the target there."""
 
     begin: float
     end: float
@@ -78,9 +78,8 @@ class Substep:
 
 @dataclass
 class Release:
-    """Below which part of the present step the body is released, and the part that worked last; and
-    whether a part from the present state failed because the body gives way the more, the more it is
-    loaded: shorter ones may fail otherwise.
+    """`least`: substep length below which the body is released; `trusted`: length that worked last;
+    `unstable`: a substep from the present state failed because the tangent was not positive definite.
     """
 
     least: float

@@ -11,7 +11,7 @@ import pytest
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.signals import Seen, electrode_charge, smallest_gap
+from evfem.electrostatics.signals import PadState, electrode_charge, smallest_gap
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.barrier import rise
 from evfem.simulation.run import Run
@@ -189,7 +189,9 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
 
     def seen(place, voltage=120.0):
         below = surface_state(attraction.surface, place)
-        return Seen(attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool))
+        return PadState(
+            attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool)
+        )
 
     for measure in (electrode_charge, smallest_gap):
         reading, step = measure(seen(position)), 1e-6
