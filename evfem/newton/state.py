@@ -159,8 +159,8 @@ class Balance:
         """The residual of the unknowns that are iterated."""
         return self.residual if self.mixed is None else self.mixed.residual
 
-    def seen(self, here: bool) -> Floats:
-        """The forces (n,) that a tangent has to remove which was made `here`, or elsewhere."""
+    def of_tangent(self, here: bool) -> Floats:
+        """The forces (n,) that a tangent made at this iterate (`here`), or elsewhere, has to remove."""
         return self.forces if here or self.mixed is None else self.mixed.forces
 
 

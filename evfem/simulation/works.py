@@ -156,7 +156,7 @@ def unloaded(state: State) -> State:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class SubstepWork:
     """One accepted part of a run of `model`, from `old` to `new`."""
 
     model: Model
