@@ -24,6 +24,8 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.surface.pad import Pad
 
+#: nodes with no force below which the surface counts, up to so many node distances above it
+NEAR = 10.0
 #: step (mm) of the slope of a compliance that does not say its own
 STEP = 1e-4
 
@@ -53,22 +55,25 @@ class Yielding:
 
 
 class Bed:
-    """An elastic surface, `elastic`, below a `pad`; `least` is the shortest length (mm) of a node."""
+    """An elastic surface, `elastic`, below a `pad` with this `spacing` (mm); `least` is the shortest length (mm)
+    of a node. Below nodes without force that are high above, it is left out; under an attraction there are none.
+    """
 
-    def __init__(self, elastic: Any, pad: Pad, least: float) -> None:
+    def __init__(self, elastic: Any, pad: Pad, spacing: float, least: float) -> None:
         self.elastic, self.pad, self.least = elastic, pad, least
+        self.reach = NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
 
-    def below(self, position: Floats) -> Yielding:
-        """The surface below nodes at (P, 2); kept, as many ask for it."""
-        key = position[:, 0].tobytes()
+    def below(self, position: Floats, height: Floats) -> Yielding:
+        """The surface below nodes at (P, 2), so `height` (P,) above the surface at rest; kept, as many ask."""
+        key = position[:, 0].tobytes() + height.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self._made(position)
+            self._last = key, self._made(position, height <= self.reach)
         return self._last[1]
 
-    def _made(self, position: Floats) -> Yielding:
+    def _made(self, position: Floats, near: Any) -> Yielding:
         length = self.pad.tributary(position)
-        over = np.flatnonzero(length > 0.0)
+        over = np.flatnonzero((length > 0.0) & near)
         x, length, n = position[over, 0], np.maximum(length[over], self.least), over.size
         # forces on the surface are into it and along +x: F_y and -F_x of those on the finger
         rows = np.concatenate([2 * over + 1, 2 * over])

@@ -27,7 +27,7 @@ layer). Units: mm, N, MPa; compliances are mm per N/mm.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -38,7 +38,9 @@ from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
 
 #: the table of a kernel: so many distances, up to so many lengths over which it falls off
-TABULATED, FARTHEST = 2000, 36.0
+TABULATED, FARTHEST = 1500, 36.0
+#: the table's places are end sinh(t) / sinh(SPREAD), with even t
+SPREAD = 8.0
 #: largest wavenumber (over the top thickness) and layers of it that one exponential resolves
 HIGHEST, RESOLVED = 45.0, 2.0
 #: strips shorter than this share of the top thickness take the kernel's quadratic, and far ones whose
@@ -180,74 +182,52 @@ def _on_top(layer: ElasticLayer, k: Floats, below: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel over the distance in thicknesses of the top layer: a singular part, and a spline of the rest on
-    [0, `end`]; beyond it is nothing. `jump` None: even, -ln|x| and the rest; else odd, half of the jump at 0.
+    """A kernel over the distance in thicknesses of the top layer: a singular part, and a spline of the rest,
+    up to where it is nothing. `jump` None: even, -ln|x| and the rest; else odd, half of the jump at 0.
     """
 
     rest: Any
-    end: float
     jump: float | None = None
 
-    @cached_property
-    def _integrals(self) -> tuple[Any, ...]:
-        """First and second integral of the rest, and the derivatives that its own quadratic needs."""
-        more = [self.rest.derivative(order) for order in (1, 2, 3)]
-        return self.rest.antiderivative(1), self.rest.antiderivative(2), self.rest, *more
+    def odd(self, order: int) -> bool:
+        """Whether the kernel's integral of this order, 0 for itself, -1 for its derivative, is odd."""
+        return (order % 2 == 1) != (self.jump is not None)
 
-    def _singular(self, x: Floats, order: int) -> Floats:
-        """Integral of so many orders of the singular part at x above 0."""
+    def singular(self, x: Floats, log: Floats, order: int) -> Floats:
+        """First or second integral of the singular part at x above 0, with its logarithm."""
         if self.jump is not None:
             return np.asarray(self.jump * (x if order == 1 else 0.5 * x**2))
-        log = np.log(np.where(x > 0.0, x, 1.0))
         return np.asarray(x - x * log if order == 1 else 0.75 * x**2 - 0.5 * x**2 * log)
 
-    def _integral(self, x: Floats, order: int) -> Floats:
-        """First or second integral of the kernel from 0 to x of either sign."""
-        size, (once, twice, *_) = np.abs(x), self._integrals
-        at = np.minimum(size, self.end)
-        found = self._singular(at, order) + (once if order == 1 else twice)(at)
-        if order == 2 and (size > self.end).any():
-            found = found + (size - at) * (self._singular(np.array(self.end), 1) + once(self.end))
-        odd = (order == 1) != (self.jump is not None)
-        return np.asarray(np.sign(x) * found if odd else found)
-
-    def mean(self, x: Floats, a: Floats, b: Floats, slope: bool = False) -> Floats:
-        """Means of the kernel, or of its `slope`, over strips a and b whose middles are x apart."""
-        order, middle, half = 2 - slope, 0.5 * np.abs(a - b), 0.5 * (a + b)
-        ends = ((x + half, 1.0), (x + middle, -1.0), (x - middle, -1.0), (x - half, 1.0))
-        found = sum(sign * self._integral(at, order) for at, sign in ends) / (a * b)
-        small = (half < SHORT) & ((half < FAR * np.abs(x)) | (self.jump is not None))
-        if small.any():
-            found[small] = self._quadratic(x[small], (a[small] ** 2 + b[small] ** 2) / 24.0, int(slope))
-        return np.where(np.abs(x) - half > self.end, 0.0, found)
-
-    def _quadratic(self, x: Floats, share: Floats, order: int) -> Floats:
-        """Kernel (order 0) or slope (1) at x, and `share` times its second derivative."""
-        size, rest = np.minimum(np.abs(x), self.end), self._integrals[2:]
-        found = rest[order](size) + share * rest[order + 2](size)
+    def quadratic(self, x: Floats, share: Floats, order: int) -> Floats:
+        """Kernel (order 0) or slope (-1) at x, and `share` times its second derivative."""
+        size = np.minimum(np.abs(x), self.rest.x[-1])
+        found = self.rest(size, -order) + share * self.rest(size, 2 - order)
         if self.jump is None:
             near = np.maximum(size, 1e-300)
             found = found - (1.0 / near + 2.0 * share / near**3 if order else np.log(near) - share / near**2)
         elif order == 0:
             found = found + self.jump
-        odd = (order == 1) != (self.jump is not None)
-        return np.asarray(np.sign(x) * found if odd else found)
+        return np.asarray(np.sign(x) * found if self.odd(order) else found)
 
 
-@dataclass(frozen=True)
 class Kernels:
     """Normal, tangential and coupling kernels of a stack, with their sizes in mm per N/mm, over the distance in
-    units of mm.
+    units of mm; `spread` is the parameter of the table's places, sinh(t) from 0 to it.
     """
 
-    unit: float
-    kernels: tuple[Kernel, Kernel, Kernel]
-    sizes: tuple[float, float, float]
+    def __init__(self, unit: float, kernels: tuple[Kernel, ...], sizes: Floats, spread: float) -> None:
+        self.unit, self.kernels, self.sizes, self.spread = unit, kernels, sizes, spread
+        self.places = kernels[0].rest.x
+        # polynomials of all first and second integrals, (pieces, 3 kernels x 2 orders) for each power
+        integrals = [one.rest.antiderivative(order).c for one in kernels for order in (1, 2)]
+        self._powers = [np.stack([c[max(k + len(c) - 6, 0)] * (k + len(c) >= 6) for c in integrals], axis=1)
+                        for k in range(6)]
+        self._last: tuple[bytes, Floats] | None = None
 
     def compliance(self, x: Floats, lengths: Floats) -> Floats:
         """`Layered.compliance` (2n, 2n)."""
-        i, j = np.triu_indices(x.size)
-        normal, tangent, cross = (self._means(which, x, lengths, i, j) for which in range(3))
+        (i, j), (normal, tangent, cross) = np.triu_indices(x.size), self._means(x, lengths)[:, 1]
         found = np.zeros((2, x.size, 2, x.size))
         found[0, i, 0, j] = found[0, j, 0, i] = normal
         found[1, i, 1, j] = found[1, j, 1, i] = tangent
@@ -257,8 +237,7 @@ class Kernels:
 
     def slope(self, x: Floats, lengths: Floats) -> Floats:
         """`Layered.compliance_slope` (2n, 2n)."""
-        i, j = np.triu_indices(x.size)
-        normal, tangent, cross = (self._means(which, x, lengths, i, j, slope=True) for which in range(3))
+        (i, j), (normal, tangent, cross) = np.triu_indices(x.size), self._means(x, lengths)[:, 0] / self.unit
         found = np.zeros((2, x.size, 2, x.size))
         found[0, i, 0, j], found[0, j, 0, i] = normal, -normal
         found[1, i, 1, j], found[1, j, 1, i] = tangent, -tangent
@@ -266,12 +245,45 @@ class Kernels:
         found[1, i, 0, j] = found[1, j, 0, i] = -cross
         return found.reshape(2 * x.size, 2 * x.size)
 
-    def _means(
-        self, which: int, x: Floats, lengths: Floats, i: Any, j: Any, slope: bool = False
-    ) -> Floats:
-        apart, long = (x[i] - x[j]) / self.unit, lengths / self.unit
-        size = self.sizes[which] / (self.unit if slope else 1.0)
-        return np.asarray(size * self.kernels[which].mean(apart, long[i], long[j], slope))
+    def _means(self, x: Floats, lengths: Floats) -> Floats:
+        """Of the three kernels the slope and the mean over each pair of strips, (3, 2, pairs); the last kept."""
+        key = x.tobytes() + lengths.tobytes()
+        if self._last is None or self._last[0] != key:
+            i, j = np.triu_indices(x.size)
+            long = lengths / self.unit
+            found = self._over_strips((x[i] - x[j]) / self.unit, long[i], long[j])
+            self._last = key, self.sizes[:, None, None] * found
+        return self._last[1]
+
+    def _over_strips(self, x: Floats, a: Floats, b: Floats) -> Floats:
+        """Slopes and means (3, 2, k) of the kernels over strips a and b whose middles are x apart."""
+        middle, half = 0.5 * np.abs(a - b), 0.5 * (a + b)
+        ends = ((x + half, 1.0), (x + middle, -1.0), (x - middle, -1.0), (x - half, 1.0))
+        found = np.asarray(sum(sign * self._integrals(at) for at, sign in ends)) / (a * b)
+        short = half < SHORT
+        for kernel, both in zip(self.kernels, found, strict=True):
+            small = np.flatnonzero(short & ((half < FAR * np.abs(x)) | (kernel.jump is not None)))
+            if small.size:
+                share = (a[small] ** 2 + b[small] ** 2) / 24.0
+                both[:, small] = [kernel.quadratic(x[small], share, order) for order in (-1, 0)]
+        return np.where(np.abs(x) - half > self.places[-1], 0.0, found)
+
+    def _integrals(self, x: Floats) -> Floats:
+        """First and second integrals (3, 2, k) of the kernels from 0 to x of either sign."""
+        size, end = np.abs(x), self.places[-1]
+        at = np.minimum(size, end)
+        piece = (np.arcsinh(at / end * np.sinh(self.spread)) * ((self.places.size - 1) / self.spread)).astype(int)
+        piece = np.minimum(piece, self.places.size - 2)
+        way, log = (at - self.places[piece])[:, None], np.log(np.where(at > 0.0, at, 1.0))
+        found = self._powers[0][piece]
+        for power in self._powers[1:]:
+            found = found * way + power[piece]
+        rests = found.T.reshape(len(self.kernels), 2, -1)
+        for kernel, (once, twice) in zip(self.kernels, rests, strict=True):
+            once += kernel.singular(at, log, 1)
+            twice += kernel.singular(at, log, 2) + (size - at) * once
+            (twice if kernel.odd(2) else once)[x < 0.0] *= -1.0
+        return rests
 
 
 @lru_cache(maxsize=32)
@@ -288,7 +300,7 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     normal, tangent, cross = (each * mu * s / unit for each in transfer(layers, s / unit))
     rests = np.stack([normal / (1.0 - top.nu) - np.tanh(s), tangent / (1.0 - top.nu) - np.tanh(s)])
     turned = 2.0 * cross - free * (1.0 - 1.0 / np.cosh(s))
-    x = end * np.sinh(np.linspace(0.0, 8.0, TABULATED)) / np.sinh(8.0)
+    x = end * np.sinh(np.linspace(0.0, SPREAD, TABULATED)) / np.sinh(SPREAD)
     even, odd = np.zeros((2, x.size)), np.zeros(x.size)
     for part in np.array_split(np.arange(s.size), s.size // 1000 + 1):
         angle = np.outer(s[part], x)
@@ -299,7 +311,7 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     odd -= 2.0 * free * np.arctan(ramp)
     kernels = (_kernel(x, even[0]), _kernel(x, even[1]), _kernel(x, odd, 0.5 * np.pi * free))
     own = (1.0 - top.nu) / (np.pi * mu)
-    return Kernels(unit, kernels, (own, own, 0.5 / (np.pi * mu)))
+    return Kernels(unit, kernels, np.array([own, own, 0.5 / (np.pi * mu)]), SPREAD)
 
 
 def _kernel(x: Floats, rest: Floats, jump: float | None = None) -> Kernel:
@@ -307,4 +319,4 @@ def _kernel(x: Floats, rest: Floats, jump: float | None = None) -> Kernel:
     from scipy.interpolate import CubicSpline
 
     ends = ((1, 0.0), (1, 1.0 / x[-1])) if jump is None else ((2, 0.0), (1, 0.0))
-    return Kernel(CubicSpline(x, rest, bc_type=ends), float(x[-1]), jump)
+    return Kernel(CubicSpline(x, rest, bc_type=ends), jump)

@@ -22,7 +22,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
-from evfem.solver.state import State
+from evfem.newton.state import State
 
 #: what of a state is combined, beside the squared voltage
 MIXED = ("u", "contact_force", "bone", "pressure", "given", "strain")
