@@ -21,6 +21,7 @@ _NAMES = {
     "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
     "calibration.parameters": ("Parameter",),
     "calibration.result": ("FitResult",),
+    "surface.elastic": ("ElasticLayer", "ElasticStack"),
     "surface.friction": (
         "AdhesiveFriction",
         "AgeingFriction",

@@ -27,7 +27,7 @@ from evfem.surface.pad import Pad
 #: nodes with no force below which the surface counts, up to so many node distances above it
 NEAR = 10.0
 #: step (mm) of the slope of a compliance that does not say its own
-STEP = 1e-4
+STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)

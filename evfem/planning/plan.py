@@ -217,7 +217,17 @@ def _contact(scene: Scene) -> Term:
     if cells := getattr(scene.finger, "ridge_cells", 0.0):
         error = f"{100.0 * area_error(cells):.2g} %"
         shape += f"; with {cells:g} cells per ridge the real contact area is known to {error}"
-    return Term("contact", True, shape)
+    return Term("contact", True, shape + _giving_way(scene))
+
+
+def _giving_way(scene: Scene) -> str:
+    """What an elastic surface is made of, in words; empty for a rigid one."""
+    elastic = scene.ground.elastic
+    if elastic is None:
+        return ""
+    layers = getattr(elastic, "layers", ())
+    made = ", ".join(f"{one.E:g} MPa over {one.thickness:g} mm" for one in layers) or type(elastic).__name__
+    return f"; it gives way: {made}, its compliance added to the tissue's"
 
 
 def _friction(scene: Scene) -> Term:

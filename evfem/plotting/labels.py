@@ -33,7 +33,7 @@ TEXTS = {
     "min_gap": "smallest gap",
 }
 #: fields of a frame: unit if it is not MPa, and name where the underscores alone do not make one
-FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
+FIELD_UNITS = {"displacement": "mm", "gap": "mm", "surface_sink": "mm", "contact_status": "", "J": ""}
 FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
 FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
 #: quantity of a probe -> its unit if it is not MPa

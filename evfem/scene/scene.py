@@ -20,6 +20,7 @@ from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.newton.hand import Hand
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
@@ -121,6 +122,7 @@ class Scene:
             _check_electrostatics,
             check_drive,
             _check_friction,
+            _check_elastic,
             _check_hand,
             _check_motion,
             _check_time,
@@ -289,6 +291,15 @@ def _check_friction(scene: Scene) -> None:
         raise InputError("surface.friction_law", quoted(law), allowed)
     if getattr(law, "timed", False):
         _check_speeds(scene, type(law).__name__)
+
+
+def _check_elastic(scene: Scene) -> None:
+    if scene.ground.elastic is None:
+        return
+    found = isinstance(scene.voltage, (FollowForce, OpenCircuit, ChargeControl))
+    if found or any(course.gap is not None for course in scene.courses):
+        allowed = "a rigid surface, or a voltage that is given: it is not sought above an elastic surface"
+        raise InputError("surface.elastic", "an elastic surface under a voltage that is sought", allowed)
 
 
 def _check_motion(scene: Scene) -> None:

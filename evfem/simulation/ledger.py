@@ -154,6 +154,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
         shear_traction=on_pad(_shear(state) / share, 0.0),
         electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
+        surface_sink=on_pad(state.given[:, 1] if state.given.size else 0.0, 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),
         von_mises=_von_mises(stress),
         cauchy_stress=stress,

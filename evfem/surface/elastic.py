@@ -221,8 +221,10 @@ class Kernels:
         self.places = kernels[0].rest.x
         # polynomials of all first and second integrals, (pieces, 3 kernels x 2 orders) for each power
         integrals = [one.rest.antiderivative(order).c for one in kernels for order in (1, 2)]
-        self._powers = [np.stack([c[max(k + len(c) - 6, 0)] * (k + len(c) >= 6) for c in integrals], axis=1)
-                        for k in range(6)]
+        self._powers = [
+            np.stack([c[max(k + len(c) - 6, 0)] * (k + len(c) >= 6) for c in integrals], axis=1)
+            for k in range(6)
+        ]
         self._last: tuple[bytes, Floats] | None = None
 
     def compliance(self, x: Floats, lengths: Floats) -> Floats:
@@ -272,7 +274,9 @@ class Kernels:
         """First and second integrals (3, 2, k) of the kernels from 0 to x of either sign."""
         size, end = np.abs(x), self.places[-1]
         at = np.minimum(size, end)
-        piece = (np.arcsinh(at / end * np.sinh(self.spread)) * ((self.places.size - 1) / self.spread)).astype(int)
+        piece = (np.arcsinh(at / end * np.sinh(self.spread)) * ((self.places.size - 1) / self.spread)).astype(
+            int
+        )
         piece = np.minimum(piece, self.places.size - 2)
         way, log = (at - self.places[piece])[:, None], np.log(np.where(at > 0.0, at, 1.0))
         found = self._powers[0][piece]
