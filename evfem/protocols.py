@@ -9,6 +9,7 @@ part                   goes to                                   needs
 =====================  ========================================  =======================================
 electrostatic law      ``Scene(law=...)``                        `ForceLaw`
 rough faces            ``Scene(roughness_gap=...)``              `RoughnessLaw`
+adhesion               ``Scene(adhesion=...)``                   `AdhesionLaw`
 material               ``FingerPad(materials={region: ...})``    `StressLaw`, `EnergyLaw` or a `WeakForm`
 surface                ``Scene(surface=...)``                    `Surface`
 elastic surface        ``Flat(elastic=...)``, any surface        `Elastic`
@@ -39,6 +40,17 @@ class ForceLaw(Protocol):
         `layers.reduced` is the sum of thickness / permittivity of the solid layers,
         `layers.thickness` that of their thicknesses, in mm. Complex-safe, or it is differenced.
         """
+
+
+@runtime_checkable
+class AdhesionLaw(Protocol):
+    """Adhesion without a voltage. Optional: `traction_derivative` (MPa/mm) of the same argument."""
+
+    def traction(self, gap: Any) -> Any:
+        """Attraction in MPa, not negative and not growing, at gaps in mm. Complex-safe, or it is differenced."""
+
+    def potential(self, gap: Any) -> Any:
+        """Potential in N/mm, whose derivative by the gap is the traction, 0 far away."""
 
 
 @runtime_checkable

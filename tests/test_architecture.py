@@ -44,10 +44,10 @@ ROOMS = {
         {"numpy", "scipy", "skfem"},
         "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "friction elastic surfaces textures usersurface pad skin"),
+    "surface": ({"numpy", "scipy"}, "friction adhesion elastic surfaces textures usersurface pad skin"),
     "contact": (
         {"numpy", "scipy"},
-        "charging attraction bed fullfield drivenfield signorini slipping solve follower condensed stability",
+        "charging attraction adhesive bed fullfield drivenfield signorini slipping solve follower condensed stability",
     ),
     "newton": (
         {"numpy", "scipy", "pypardiso"},
@@ -61,7 +61,7 @@ ROOMS = {
     ),
     "planning": (
         {"numpy"},
-        "resolution loaddrift partchecks parts plausibility fieldchoice core timescales pathdependence plan",
+        "resolution loaddrift partchecks parts plausibility fieldchoice core adhesion timescales pathdependence plan",
     ),
     "simulation": (
         {"numpy", "scipy"},

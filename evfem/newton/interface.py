@@ -134,7 +134,9 @@ class Interface:
         jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
         self.jumps = FrictionJumps(jumps, pad.nodes.size)
         elastic, least = getattr(surface, "elastic", None), SHORTEST_LENGTH * self.length
-        self.bed = None if elastic is None else Bed(elastic, pad, self.length, least)
+        self.bed: Bed | None = None
+        if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
+            self.bed = Bed(elastic, pad, self.length, least)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
         self._oscillating = OscillatingNodes(pad.nodes.size)

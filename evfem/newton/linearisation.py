@@ -298,7 +298,9 @@ class Linearisation:
         None without attraction, or where they are faint: a symmetric compliance takes a third of
         the time. None with charges too, so that a factorisation does not depend on the step.
         """
-        if self.attraction is None or state.voltage == 0.0 or self.frozen or self.attraction.charging:
+        if self.attraction is None or self.frozen or self.attraction.charging:
+            return None
+        if not self.attraction.acts(state.voltage):
             return None
         position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
         pressing = state.contact_force[:, 0]

@@ -34,6 +34,7 @@ from evfem.scene.keys import VERSION, at, check_size, kind_of, read, read_kind, 
 from evfem.scene.motion import MOTIONS, Motion
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.serialiser import dump
+from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.elastic import ElasticLayer, ElasticStack
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.surface.surfaces import Display
@@ -115,6 +116,9 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
         with mistakes.of_a_part():
             if (table := getattr(top, key)) is not None:
                 parts[key] = read(cls, table, key, homes=HOMES)
+    with mistakes.of_a_part():
+        if top.adhesion is not None:
+            parts["adhesion"] = read_kind(top.adhesion, "adhesion", ADHESIONS, tag="law", homes=HOMES)
     mistakes.report()
     return Scene(**parts, name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")))
 

@@ -34,6 +34,7 @@ from evfem.scene.scene import (
     Solver,
 )
 from evfem.surface import textures
+from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.surfaces import Flat, Friction, GivesWay, Insulator, Profile, Shift
 
 Table = Mapping[str, Any]
@@ -69,6 +70,11 @@ class SceneTable:
     ]
     electrostatics: Annotated[
         Table | None, _table("electrostatics"), "insulator, voltage and force law; without it no attraction"
+    ] = None
+    adhesion: Annotated[
+        Table | None,
+        _table("adhesion", f" with a law: {' | '.join(ADHESIONS)}"),
+        "what attracts without a voltage; without it nothing",
     ] = None
     hand: Annotated[
         Table | None, _table("hand"), "between drive and bone; without it the drive moves the bone itself"

@@ -23,11 +23,12 @@ from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.newton.hand import Hand
-from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
+from evfem.protocols import AdhesionLaw, CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive, without_field
 from evfem.scene.motion import MOTIONS, VOLTAGE, Course, Motion, Press, Slide
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
+from evfem.surface.adhesion import ADHESION, adhesion_of
 from evfem.surface.friction import Coulomb
 from evfem.surface.usersurface import completed
 from evfem.tissue.forms import Form
@@ -46,6 +47,7 @@ FieldChoice = Annotated[
     str, one_of(*FIELDS), "full: Poisson's problem, not column by column; auto: where it matters"
 ]
 Grounded = Annotated[bool, yes_or_no(), "false: the finger has no charge; with field full"]
+Adhesion = Annotated[AdhesionLaw | None, {"allowed": ADHESION, "check": adhesion_of}]
 Coupling = Annotated[str, one_of(*COUPLINGS), "staggered_once: the paper's, once in each step"]
 
 
@@ -87,7 +89,7 @@ class Scene:
     bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it alternate, or leak. `law`
     None and `voltage` 0: no electrostatics. Only where the field is full may the finger be not `grounded`:
     without a charge, above electrodes of different voltages. `friction_law` says what the surface's
-    coefficient means (`Coulomb`, ... or one's own). A `hand` is between drive and bone: motions then say
+    coefficient means (`Coulomb`, ... or one's own), `adhesion` what attracts without a voltage. A `hand` is between drive and bone: motions then say
     where the drive goes. `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. Raises InputError
     for anything that does not fit together.
     """
@@ -102,6 +104,7 @@ class Scene:
     coupling: Coupling = field(default="monolithic", kw_only=True)
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: RoughnessGap = field(default=0.0, kw_only=True)
+    adhesion: Adhesion = field(default=None, kw_only=True)
     friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
     hand: Hand | None = field(default=None, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
@@ -228,8 +231,8 @@ def _check_parts(scene: Scene) -> None:
 
 def _check_electrostatics(scene: Scene) -> None:
     check_fields(scene, "electrostatics.")
-    if scene.law is None and scene.roughness_gap != 0.0:
-        allowed = "only with a law of attraction: without one it changes nothing"
+    if scene.law is None and scene.adhesion is None and scene.roughness_gap != 0.0:
+        allowed = "only with a law of attraction, or adhesion: without one it changes nothing"
         raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
@@ -317,7 +320,7 @@ def _check_motion(scene: Scene) -> None:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"
             )
-        if course.force == 0.0 and scene.law is None:
+        if course.force == 0.0 and scene.law is None and scene.adhesion is None:
             raise InputError(f"{key}.force", 0.0, "larger than 0 when nothing else pulls the finger down")
 
 

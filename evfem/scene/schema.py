@@ -25,6 +25,7 @@ from evfem.scene.keys import VERSION
 from evfem.scene.motion import MOTIONS
 from evfem.scene.probes import Probe
 from evfem.scene.scene import Output, Solver
+from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.elastic import ElasticLayer
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.tissue.laws import LAWS
@@ -163,6 +164,7 @@ def sections() -> list[Section]:
             "how the gap depends on a node's contact pressure",
             "law",
         ),
+        *kinds("adhesion", ADHESIONS, "which law", "law"),
         section("hand", Hand),
         section("solver", Solver),
         section("solver.strategy", Strategy),
@@ -200,6 +202,7 @@ def schema() -> Schema:
             signal={"$ref": "#/definitions/signal"},
             roughness_gap={"anyOf": [{"type": "number"}, one_of["electrostatics.roughness_gap"]]},
         ),
+        "adhesion": one_of["adhesion"],
         "hand": tables["hand"][0].schema(),
         "solver": tables["solver"][0].schema(strategy=tables["solver.strategy"][0].schema()),
         "output": tables["output"][0].schema(probes={"type": "object", "additionalProperties": probe}),

@@ -23,6 +23,7 @@ from evfem.errors import InputError
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
+from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.elastic import ElasticLayer, ElasticStack
 from evfem.surface.friction import KINDS, Coulomb
 from evfem.surface.surfaces import Display, Profile
@@ -55,6 +56,9 @@ def dump(scene: Scene) -> str:
         "finger": _finger(scene.finger) | ({} if scene.depth is None else {"depth": scene.depth}),
         "surface": surface,
         "electrostatics": {} if scene.law is None else _electrostatics(scene),
+        "adhesion": (
+            {} if scene.adhesion is None else _of_kind(scene.adhesion, ADHESIONS, "adhesion", "law")
+        ),
         "hand": {} if scene.hand is None else _keys(scene.hand, "hand"),
         "solver": _keys(scene.solver, "solver"),
         "output": _keys(scene.output, "output"),

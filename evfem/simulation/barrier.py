@@ -76,10 +76,29 @@ def _pulled(part: SubstepWork, carried: Floats) -> Floats:
     begin = part.model.equilibrium.interface.resting(old) + carried
     begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
     with part.charges_held():
-        power = part.pulls(along, FINE, (new.voltage, new.voltage), begin)
+        exact = attraction.adhesive is not None and part.model.surface.is_flat
+        one = attraction.electric if exact else attraction
+        power = np.zeros_like(FINE)
+        if one is not None:
+            power = part.pulls(along, FINE, (new.voltage, new.voltage), begin, one)
     work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(FINE)))
+    if exact:
+        work = work + _adhered(part, begin)
     fringes = float(np.sum(new.attraction * along)) - float(power[-1]) if attraction.has_fringes else 0.0
     return np.interp(PLACES, FINE, work) + fringes * PLACES
+
+
+def _adhered(part: SubstepWork, begin: Floats) -> Floats:
+    """Work of adhesion up to `FINE` above a flat surface, by its potential: its reach may be short."""
+    assert part.model.attraction is not None
+    adhesive = part.model.attraction.adhesive
+    assert adhesive is not None
+    end = part.model.equilibrium.interface.resting(part.new)
+    ends = [surface_state(part.model.surface, place).gap for place in (begin, end)]
+    gaps = np.maximum(np.outer(1.0 - FINE, ends[0]) + np.outer(FINE, ends[1]), 0.0)
+    length = 0.5 * (adhesive.weights(begin) + adhesive.weights(end))
+    energy = np.asarray(adhesive.law.potential(gaps)) @ length
+    return np.asarray(energy[0] - energy)
 
 
 def _rubbed(part: SubstepWork) -> float:

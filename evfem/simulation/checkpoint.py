@@ -35,7 +35,7 @@ LAST_STATUS = 3
 #: name of what was found at the points of all probes after each step (S, P, K)
 PROBES = "probes"
 #: arrays whose size a run that has just been set up does not know
-OF_ANY_SIZE = ("candidates", "factor_pressure", PROBES)
+OF_ANY_SIZE = ("candidates", "factor_pressure", "came_off", PROBES)
 
 
 def state_arrays(state: State) -> dict[str, Any]:
@@ -73,6 +73,7 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
         "sums": np.array([ledger.sums[name] for name in SUMS]),
         "internal_forces": end.forces,
         "given_forces": end.given,
+        "pulls": np.array([ledger.pull, ledger.came_off]),
         "energies": np.array([end.stored, end.springs, end.kinetic]),
     }
 
@@ -81,7 +82,7 @@ def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
     """The ledger from the arrays of a checkpoint."""
     sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
     end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
-    return Ledger(model, sums, end)
+    return Ledger(model, sums, end, *arrays["pulls"].tolist())
 
 
 def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:

@@ -53,6 +53,13 @@ def through(model: Model, sunk: Floats) -> Iterator[str]:
         )
 
 
+def off(found: Floats, dim: int) -> Iterator[str]:
+    """Where adhesion let go of the finger: rows (k, 2) of the step and the pull."""
+    unit = "N" if dim == 3 else "N/mm"
+    for step, pull in found:
+        yield f"in step {int(step)} the finger came off: adhesion held it up to a pull of {pull:.3g} {unit}"
+
+
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
     """A sentence for everything that the rows of a scene's run say of their own worth."""
     told = (

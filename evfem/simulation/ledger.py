@@ -15,26 +15,41 @@ from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import Books, SubstepWork, tells_source, unloaded
+from evfem.surface.adhesion import ON
 from evfem.surface.pad import Pad, reach, surface_state
 
 
 @dataclass
 class Ledger:
-    """Running sums of a run by the history's columns, and the books at the end of its last part."""
+    """Running sums of a run by the history's columns, and the books at the end of its last part; the `pull`
+    (N/mm) on a touching finger that adhesion holds, and that at which it `came_off` last, 0 if it did not.
+    """
 
     model: Model
     sums: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SUMS, 0.0))
     end: Books | None = None
+    pull: float = 0.0
+    came_off: float = 0.0
 
     def accept(self, old: State, new: State) -> bool:
         """Add the works of one converged part; says whether stability was lost in it."""
-        part = SubstepWork(self.model, old if self.end else unloaded(old), new)
+        part = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
+        self._watch(old, new)
         begin = self.end or Books.nothing(old.u.shape)
         self.end = part.end()
         works = part.works(begin, self.end)
         for name, work in works.items():
             self.sums[name] += work
         return works["snap_dissipation"] > 0.0
+
+    def _watch(self, old: State, new: State) -> None:
+        """Remember the pull at which a finger that adhesion holds comes off: that of the last equilibrium."""
+        if self.model.scene.adhesion is None:
+            return
+        if old.touching.any() and not new.touching.any() and self.pull > 0.0:
+            self.came_off, self.pull = self.pull, 0.0
+        elif new.touching.any() and self.model.body.drag_rate == 0.0:
+            self.pull = max(0.0, float(new.reaction[1]))
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
         """Present sums and energy balance."""
@@ -52,6 +67,7 @@ class Ledger:
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
+        adhesion, kept = self._adhesion(state, withheld)
         real, extent = _extent(model, state, position, contact)
         pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
         return {
@@ -66,8 +82,9 @@ class Ledger:
             "applied_tangential_force": float(state.reaction[along] @ forward),
             "normal_force": float(contact[1] + withheld.sum()),
             "tangential_force": float(0.0 - contact[along] @ forward),
-            "electrostatic_force": float(withheld.sum() - attraction[1]),
-            "electrostatic_force_x": float(attraction[0]),
+            "electrostatic_force": float((withheld - kept).sum() - attraction[1] + adhesion[1]),
+            "electrostatic_force_x": float(attraction[0] - adhesion[0]),
+            "adhesive_force": float(kept.sum() - adhesion[1]),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
             "surface_sink": max(0.0, float(state.given[:, 1].max(initial=0.0))),
@@ -78,6 +95,16 @@ class Ledger:
             "kinetic_energy": end.kinetic,
             "field_energy": self._field_energy(state),
         }
+
+    def _adhesion(self, state: State, withheld: Floats) -> tuple[Floats, Floats]:
+        """Adhesion on the whole pad (dim,), and its part (P,) of what cores withhold."""
+        model = self.model
+        if model.attraction is None or (adhesive := model.attraction.adhesive) is None:
+            return np.zeros(state.bone.size), np.zeros_like(withheld)
+        found = SubstepWork(model, state, state).adhesion_at(state)
+        own, both = adhesive.restored(ON), model.attraction.restored(state.voltage)
+        share = 0.0 if own is None or both is None else own[0] / np.where(both[0] > 0.0, both[0], np.inf)
+        return model.equilibrium.interface.tilted(state, found).sum(axis=0), np.asarray(share * withheld)
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
         """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""

@@ -14,6 +14,7 @@ The history has
 - ``external_work`` :math:`W = \bar r\cdot\Delta b - \bar f_u\cdot\Delta u + W_t`, given by bone and user's
   forms; :math:`W_t = -\tfrac{1}{2}\sum \Delta\lambda_t\,s` is of nodes that begin to slip in the part, or
   turn: their shear force changes while they stick and stays while they slip;
+- ``adhesive_work`` of adhesion, by the same rules as
 - ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
 - ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface, of
@@ -70,7 +71,7 @@ Under another law these columns are 0. Kaczmarek's is the work of a source with 
 eps_0 V ln[(g + D)/(g + s)]/(D - s), but leaves a closed gap a voltage across no thickness: with a leak no
 displacement is both that of the law and that of layers that conduct.
 
-The first part begins without any load: voltage and user's forms count as raised within it.
+The first part begins without any load: voltage, adhesion and user's forms count as raised within it.
 """
 
 from __future__ import annotations
@@ -84,12 +85,14 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging, Flow
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
 from evfem.simulation.history import SUMS
 from evfem.simulation.model import Model
+from evfem.surface.adhesion import ON
 
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5
@@ -158,11 +161,12 @@ def unloaded(state: State) -> State:
 
 @dataclass(frozen=True, eq=False)
 class SubstepWork:
-    """One accepted part of a run of `model`, from `old` to `new`."""
+    """One accepted part of a run of `model`, from `old` to `new`; the `first` begins without any load."""
 
     model: Model
     old: State
     new: State
+    first: bool = False
 
     def end(self) -> Books:
         """Energies at the end of the part, its loads held."""
@@ -182,7 +186,8 @@ class SubstepWork:
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
         given -= _mean_work(begin.given, end.given, moved)
         given += (turned := self._turned())
-        pulled, friction = self.electrostatic(), self.friction()
+        (electrostatic, adhesive), friction = self.pulled(), self.friction()
+        pulled = electrostatic + adhesive
         viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
         lost = _mean_work(begin.forces, end.forces, moved) - viscous
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
@@ -199,7 +204,7 @@ class SubstepWork:
         if tells_source(self.model):
             flow, stretched = self._flow(), self._stretching()
         source = (flow.source_work, flow.leakage, stretched)
-        added = (given, pulled, friction, viscous, *snapped, *source)
+        added = (given, electrostatic, adhesive, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
 
     def _turned(self) -> float:
@@ -212,37 +217,62 @@ class SubstepWork:
         begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > 0.0))
         return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
 
-    def electrostatic(self) -> float:
-        """Work of the attraction W_e, N mm per mm of depth."""
+    def pulled(self) -> tuple[float, float]:
+        """Works of the attraction by a voltage W_e and of adhesion, N mm per mm of depth."""
+        attraction, states, untilted = self.model.attraction, (self.old, self.new), self.model.equilibrium
+        before, after = (untilted.interface.untilted(state, state.attraction) for state in states)
+        if attraction is None:
+            return 0.0, 0.0
+        voltages = (self.old.voltage, self.new.voltage)
+        if (adhesive := attraction.adhesive) is None:
+            return self._work_of(attraction, before, after, voltages), 0.0
+        on = (0.0 if self.first else ON, ON)
+        held, holds = (self.adhesion_at(*each) for each in zip(states, on, strict=True))
+        work = self._work_of(adhesive, held, holds, on)
+        if attraction.electric is None:
+            return 0.0, work
+        return self._work_of(attraction.electric, before - held, after - holds, voltages), work
+
+    def adhesion_at(self, state: State, strength: float = ON) -> Floats:
+        """Adhesion alone (P, dim) on the pad's nodes in a state."""
+        assert self.model.attraction is not None
+        adhesive = self.model.attraction.adhesive
+        assert adhesive is not None
+        place = self.model.equilibrium.interface.resting(state)
+        return adhesive.forces(place, strength, state.touching, state.contact_force[:, 0])
+
+    def _work_of(
+        self, attraction: Attraction, before: Floats, after: Floats, voltages: tuple[float, float]
+    ) -> float:
+        """Work of an attraction by its forces (P, dim) and voltages at both ends."""
         model, old, new, moved = self.model, self.old, self.new, self.way
-        tilt = model.equilibrium.interface.untilted
-        before, after = (tilt(state, state.attraction) for state in (old, new))
         trapezoidal = _mean_work(before, after, moved)
-        if model.attraction is not None and model.attraction.charging is not None:
-            return self._work_of_charged(model.attraction.charging, moved)
-        if model.attraction is None or (old.voltage == 0.0 and new.voltage == 0.0):
+        if attraction.charging is not None:
+            return self._work_of_charged(attraction.charging, moved)
+        if not any(voltages):
             return trapezoidal
-        if model.attraction.has_energy:
+        if attraction.has_energy:
             begin, end = (model.equilibrium.interface.resting(state) for state in (old, new))
-            own: Any = model.attraction
-            return trapezoidal + own.beyond_trapezoidal(begin, end, (old.voltage, new.voltage))
+            own: Any = attraction
+            return trapezoidal + own.beyond_trapezoidal(begin, end, voltages)
         open_ = ~(old.touching | new.touching)
         # trapezoidal only on the way with the bone, and only where that is not stopped by the surface
         along = moved - np.where(open_[:, None], new.bone - old.bone, 0.0)
-        if not (along[:, 1].any() or model.attraction.direction == "normal"):
+        if not (along[:, 1].any() or attraction.direction == "normal"):
             return trapezoidal
-        voltages = (old.voltage, new.voltage)
         ends = _mean_work(before, after, along)
-        if model.attraction.has_fringes:
+        if attraction.has_fringes:
             ends = float(np.mean(self.pulls(along, ENDS, voltages)))
-        return trapezoidal + self._on_the_way(along, voltages) - ends
+        return trapezoidal + self._on_the_way(along, voltages, attraction) - ends
 
-    def _on_the_way(self, along: Floats, voltages: tuple[float, float]) -> float:
-        """Work of the attraction along `along` (P, dim) of the straight way between two voltages."""
-        values = self.pulls(along, WAY, voltages)
+    def _on_the_way(
+        self, along: Floats, voltages: tuple[float, float], attraction: Attraction | None = None
+    ) -> float:
+        """Work of an attraction along `along` (P, dim) of the straight way between two voltages."""
+        values = self.pulls(along, WAY, voltages, attraction=attraction)
         size = np.abs(_LEGENDRE @ values)
         if size[-2:].max() > SEEN * size.max():
-            return float(FINE_SHARE @ self.pulls(along, FINE_WAY, voltages))
+            return float(FINE_SHARE @ self.pulls(along, FINE_WAY, voltages, attraction=attraction))
         return float(SHARE @ values)
 
     def _work_of_charged(self, charging: Charging, moved: Floats) -> float:
@@ -298,13 +328,18 @@ class SubstepWork:
         return work
 
     def pulls(
-        self, along: Floats, ways: Floats, voltages: tuple[float, float], begin: Floats | None = None
+        self,
+        along: Floats,
+        ways: Floats,
+        voltages: tuple[float, float],
+        begin: Floats | None = None,
+        attraction: Attraction | None = None,
     ) -> Floats:
-        """Attraction, where there are fringes that of the columns, times the way `along` (P, dim) at the
+        """All attraction, or one, where there are fringes that of the columns, times the way `along` (P, dim) at the
         parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
         growing evenly: (w,) in N mm per mm of depth.
         """
-        attraction, old, new = self.model.attraction, self.old, self.new
+        attraction, old, new = attraction or self.model.attraction, self.old, self.new
         assert attraction is not None
         begin = self.model.equilibrium.interface.resting(old) if begin is None else begin
         end = self.model.equilibrium.interface.resting(new)
@@ -349,8 +384,8 @@ class SubstepWork:
     @cached_property
     def way(self) -> Floats:
         """How far the pad's nodes have moved relative to the surface (P, dim) in mm."""
-        places = self.model.equilibrium.places
-        return np.asarray(places(self.new) - places(self.old))
+        moved = (self.new.u - self.old.u)[self.model.pad.nodes]
+        return moved if not self.new.given.size else moved + self.new.given - self.old.given
 
     @cached_property
     def yielded(self) -> Floats:

@@ -125,7 +125,7 @@ class ElasticStack(Layered):
 def elastic_of(given: Any, key: str = "surface.elastic") -> Any:
     """How a surface gives way: an object that says so, or None; InputError for anything else."""
     if isinstance(given, (list, tuple)):
-        return ElasticStack(given)
+        return ElasticStack(tuple(given))
     if given is not None and (isinstance(given, type) or not isinstance(given, Elastic)):
         raise InputError(key, quoted(given), ELASTIC)
     return given
