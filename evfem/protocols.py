@@ -47,7 +47,7 @@ class AdhesionLaw(Protocol):
     """Adhesion without a voltage. Optional: `traction_derivative` (MPa/mm) of the same argument."""
 
     def traction(self, gap: Any) -> Any:
-        """Attraction in MPa, not negative and not growing, at gaps in mm. Complex-safe, or it is differenced."""
+        """Attraction in MPa, never negative or growing, at gaps in mm. Complex-safe, or differenced."""
 
     def potential(self, gap: Any) -> Any:
         """Potential in N/mm, whose derivative by the gap is the traction, 0 far away."""
@@ -103,8 +103,8 @@ class Surface(Protocol):
 
     Optional attributes: `friction`, a number or a table [[x, coefficient], ...] (without it 0);
     `y`, the height (mm) at which the profile lies (without it or None: first touch); `insulator`,
-    a `Layer`; `elastic`, an `Elastic`. Optional methods of x: `slope` and `curvature`, which are derived otherwise;
-    `friction_coefficient`, instead of `friction`.
+    a `Layer`; `elastic`, an `Elastic`. Optional methods of x: `slope` and `curvature`, which are derived
+    otherwise; `friction_coefficient`, instead of `friction`.
     """
 
     def height(self, x: Any) -> Any:

@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices checks views pools digest storage manifest tables pictures",
+        "arrays quadrature constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -47,7 +47,8 @@ ROOMS = {
     "surface": ({"numpy", "scipy"}, "friction adhesion elastic surfaces textures usersurface pad skin"),
     "contact": (
         {"numpy", "scipy"},
-        "charging attraction adhesive bed fullfield drivenfield signorini slipping solve follower condensed stability",
+        "charging attraction adhesive bed fullfield drivenfield signorini slipping solve follower condensed "
+        "stability",
     ),
     "newton": (
         {"numpy", "scipy", "pypardiso"},
@@ -61,7 +62,8 @@ ROOMS = {
     ),
     "planning": (
         {"numpy"},
-        "resolution loaddrift partchecks parts plausibility fieldchoice core adhesion timescales pathdependence plan",
+        "resolution loaddrift partchecks parts plausibility fieldchoice core adhesion timescales "
+        "pathdependence plan",
     ),
     "simulation": (
         {"numpy", "scipy"},

@@ -1,6 +1,7 @@
 """Attraction by a voltage and by adhesion together: the sum of both, each of its own law.
 
-The solver sees one attraction. Adhesion is always on: its law takes the strength `ON` in the place of a voltage.
+The solver sees one attraction. Adhesion is always on: its law takes the strength `ON` in the place of a
+voltage.
 """
 
 from __future__ import annotations

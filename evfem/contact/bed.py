@@ -1,14 +1,15 @@
 r"""An elastic surface below the pad: how far it gives way under each node, and how it then slopes.
 
-Contact and attraction act on finger and surface, equal and opposite. With the nodal forces F on the finger and
-the surface's compliance C (`evfem.surface.elastic`) the surface gives way by -C F. Relative to it a node is
-where it would be above a rigid one at
+Contact and attraction act on finger and surface, equal and opposite. With the nodal forces F on the finger
+and the surface's compliance C (`evfem.surface.elastic`) the surface gives way by -C F. Relative to it a node
+is, as it would be above a rigid one, at
 
 .. math:: r_i = x_i + u_i + (C F)_i ,
 
 so that gaps, slips, the places of heights, friction and voltage, and the attraction are functions of r. The
-energy :math:`F \cdot C F / 2` depends on the places of the nodes too: so contact acts along the normal of the
-sunk surface, with the slope :math:`h' - w'`, and :math:`w'_i = \sum_j \partial_{x_i} C^z_{ij} F_j`.
+energy :math:`F \cdot C F / 2` depends on the places of the nodes too: so contact and attraction act along the
+normal of the sunk surface, whose tangent is :math:`(1 + u_x', h' - w')`, with
+:math:`(-u_x', w')_i = \sum_j \partial_{x_i} C_{ij} F_j`; a slip is as long as that tangent.
 
 Exact where the strain of the surface is small. A node's own length may change on the way, which moves the
 surface by less than the strain of the finger over the number of its nodes; no force belongs to that.
@@ -45,7 +46,7 @@ class Yielding:
         return (self.compliance @ force.ravel()).reshape(force.shape)
 
     def change(self, force: Floats) -> Floats:
-        """Derivatives along x (P, 2) of what the surface adds: its shortening, and the slope of its sinking."""
+        """Derivatives along x (P, 2) of what the surface adds: its shortening, and its sinking's slope."""
         return (self.slope @ force.ravel()).reshape(force.shape)
 
     def among(self, nodes: Any) -> Floats:
@@ -55,8 +56,9 @@ class Yielding:
 
 
 class Bed:
-    """An elastic surface, `elastic`, below a `pad` with this `spacing` (mm); `least` is the shortest length (mm)
-    of a node. Below nodes without force that are high above, it is left out; under an attraction there are none.
+    """An elastic surface, `elastic`, below a `pad` with this `spacing` (mm); `least` is the shortest length
+    (mm) of a node. Below nodes without force that are high above it is left out; under an attraction there
+    are none.
     """
 
     def __init__(self, elastic: Any, pad: Pad, spacing: float, least: float) -> None:
@@ -65,7 +67,7 @@ class Bed:
         self._last: tuple[bytes, Yielding] | None = None
 
     def below(self, position: Floats, height: Floats) -> Yielding:
-        """The surface below nodes at (P, 2), so `height` (P,) above the surface at rest; kept, as many ask."""
+        """The surface below nodes at (P, 2), `height` (P,) above it at rest; kept, as many ask."""
         key = position[:, 0].tobytes() + height.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self._made(position, height <= self.reach)

@@ -45,6 +45,7 @@ from evfem.newton.state import (
     StepFailed,
 )
 from evfem.newton.strategy import stuck
+from evfem.surface.adhesion import ON
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
@@ -100,6 +101,13 @@ class Equilibrium:
             return np.zeros_like(state.contact_force)
         found = PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
         return self.interface.tilted(state, found)
+
+    def adhesion_at(self, state: State, strength: float = ON) -> Floats:
+        """Adhesion alone on the pad nodes (P, dim) in `state`, 0 without any."""
+        adhesive = None if self.attraction is None else self.attraction.adhesive
+        if adhesive is None:
+            return np.zeros_like(state.contact_force)
+        return PadState.of(adhesive, self.interface, state, state.touching).forces(strength)
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""

@@ -11,8 +11,8 @@ from evfem.surface.adhesion import Softened
 
 
 def softened(closing: Closing) -> Softened:
-    """The scene's law with a line of the same work where it falls faster than the mesh of the nodes that touch
-    first resolves (`evfem.planning.core`), half as fast beside a voltage; core = "off": the law itself.
+    """The scene's law with a line of the same work where it falls faster than the mesh of the nodes that
+    touch first resolves (`evfem.planning.core`), half as fast beside a voltage; core = "off": the law itself.
     """
     scene = closing.scene
     steepest = np.inf if scene.solver.core == "off" else closing.resolved * closing.stiffness

@@ -123,8 +123,8 @@ def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
 
 
 def _strained(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
-    """An elastic surface whose strain, by Hertz's contact with the softest tissue (shear modulus in MPa, which
-    hardly changes volume), is too large for a linear one.
+    """An elastic surface whose strain, by Hertz's contact with the softest tissue (shear `modulus` in MPa,
+    hardly compressible), is too large for a linear one.
     """
     layers = getattr(scene.ground.elastic, "layers", ())
     if not layers or mesh.dim == 3:

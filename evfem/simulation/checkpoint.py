@@ -73,7 +73,8 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
         "sums": np.array([ledger.sums[name] for name in SUMS]),
         "internal_forces": end.forces,
         "given_forces": end.given,
-        "pulls": np.array([ledger.pull, ledger.came_off]),
+        "pull": np.array(ledger.pull),
+        "came_off": ledger.came_off,
         "energies": np.array([end.stored, end.springs, end.kinetic]),
     }
 
@@ -82,7 +83,7 @@ def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
     """The ledger from the arrays of a checkpoint."""
     sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
     end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
-    return Ledger(model, sums, end, *arrays["pulls"].tolist())
+    return Ledger(model, sums, end, float(arrays["pull"]), came_off=arrays["came_off"])
 
 
 def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
@@ -14,22 +14,30 @@ from evfem.newton.state import State
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, SubstepWork, tells_source, unloaded
+from evfem.simulation.works import Books, SubstepWork, tells_source
 from evfem.surface.adhesion import ON
 from evfem.surface.pad import Pad, reach, surface_state
+
+
+def unloaded(state: State) -> State:
+    """The state before the first part, without its voltage and what follows from it."""
+    attraction, reaction = np.zeros_like(state.attraction), np.zeros_like(state.reaction)
+    return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
 
 
 @dataclass
 class Ledger:
     """Running sums of a run by the history's columns, and the books at the end of its last part; the `pull`
-    (N/mm) on a touching finger that adhesion holds, and that at which it `came_off` last, 0 if it did not.
+    (N/mm) on a touching finger that adhesion holds, that at which it `let_go` in this step, 0 if it did not,
+    and rows (k, 2) of the steps and pulls at which it `came_off`.
     """
 
     model: Model
     sums: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SUMS, 0.0))
     end: Books | None = None
     pull: float = 0.0
-    came_off: float = 0.0
+    let_go: float = 0.0
+    came_off: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
     def accept(self, old: State, new: State) -> bool:
         """Add the works of one converged part; says whether stability was lost in it."""
@@ -47,7 +55,7 @@ class Ledger:
         if self.model.scene.adhesion is None:
             return
         if old.touching.any() and not new.touching.any() and self.pull > 0.0:
-            self.came_off, self.pull = self.pull, 0.0
+            self.let_go, self.pull = self.pull, 0.0
         elif new.touching.any() and self.model.body.drag_rate == 0.0:
             self.pull = max(0.0, float(new.reaction[1]))
 
@@ -63,6 +71,8 @@ class Ledger:
         """The forces, widths and energies of a state; costs are added by the caller."""
         model, end = self.model, self.end
         assert end is not None
+        if self.let_go:
+            self.came_off, self.let_go = np.vstack([self.came_off, [step, self.let_go]]), 0.0
         position = model.equilibrium.places(state)
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
@@ -101,7 +111,7 @@ class Ledger:
         model = self.model
         if model.attraction is None or (adhesive := model.attraction.adhesive) is None:
             return np.zeros(state.bone.size), np.zeros_like(withheld)
-        found = SubstepWork(model, state, state).adhesion_at(state)
+        found = model.equilibrium.adhesion_at(state)
         own, both = adhesive.restored(ON), model.attraction.restored(state.voltage)
         share = 0.0 if own is None or both is None else own[0] / np.where(both[0] > 0.0, both[0], np.inf)
         return model.equilibrium.interface.tilted(state, found).sum(axis=0), np.asarray(share * withheld)

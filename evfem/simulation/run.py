@@ -182,7 +182,7 @@ class Run:
         self.probed: list[Floats] = []
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
-        self.time, self.came_off = 0.0, np.zeros((0, 2))
+        self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
         if scene.hand is not None:
             self.state = replace(self.state, hand=AT_REST)
@@ -254,8 +254,8 @@ class Run:
         row = self.rows[rows_before - 1]
         start |= {name: row[name] for name in START if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
-        free = row["electrostatic_force"] == 0.0 and row["adhesive_force"] == 0.0
-        start["loose"] = float(row["normal_force"] <= least and free)
+        pulled = row["electrostatic_force"] != 0.0 or row["adhesive_force"] != 0.0
+        start["loose"] = float(row["normal_force"] <= least and not pulled)
         return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
 
     def _driven(self, rows_before: int) -> float:
@@ -360,9 +360,6 @@ class Run:
         row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
         row["relaxations"] = self.stepper.relaxations - released
         row["jumps"] = row["relaxations"] + self.stepper.snaps - snapped
-        if self.ledger.came_off:
-            self.came_off = np.vstack([self.came_off, [request.step, self.ledger.came_off]])
-            self.ledger.came_off = 0.0
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if self.probes is not None:
@@ -400,8 +397,8 @@ class Run:
         about = provenance(self.scene, self.model.mesh, solver)
         if (core := self.model.closing.core) is not None:
             about["core"] = core.told
-        told = (through(self.model, self.sunk), off(self.came_off, self.model.mesh.dim))
-        about["warnings"] = [*(one for each in told for one in each), *doubtful(self.scene, self.rows)]
+        said = (*through(self.model, self.sunk), *off(self.ledger.came_off, self.model.mesh.dim))
+        about["warnings"] = [*said, *doubtful(self.scene, self.rows)]
         probes = None if self.probes is None else self.probes.histories(self.probed)
         return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes)
 
@@ -415,7 +412,6 @@ class Run:
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
-            "came_off": self.came_off,
             **({} if self.probes is None else {PROBES: self.probes.stacked(self.probed)}),
             **ledger_arrays(self.ledger, self.state),
         }
@@ -426,9 +422,7 @@ class Run:
         self.model.equilibrium.resume(self.state, reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
-        self.came_off = arrays["came_off"]
-        self.rows = list(saved.rows)
-        self.probed = list(arrays.get(PROBES, ()))
+        self.rows, self.probed = list(saved.rows), list(arrays.get(PROBES, ()))
 
 
 def _check_observers(observers: Sequence[Observer]) -> None:

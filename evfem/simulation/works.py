@@ -14,13 +14,12 @@ The history has
 - ``external_work`` :math:`W = \bar r\cdot\Delta b - \bar f_u\cdot\Delta u + W_t`, given by bone and user's
   forms; :math:`W_t = -\tfrac{1}{2}\sum \Delta\lambda_t\,s` is of nodes that begin to slip in the part, or
   turn: their shear force changes while they stick and stays while they slip;
-- ``adhesive_work`` of adhesion, by the same rules as
 - ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
-- ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface, of
-  an elastic surface :math:`F\cdot C F/2` (`evfem.contact.bed`, relative to which ways and slips then are);
-  with a hand that of its spring (and ``kinetic_energy``, ``viscous_dissipation`` and the work of the
-  drive have its mass and damper);
+  ``adhesive_work`` likewise;
+- ``stored_energy`` :math:`\psi` of the tissue, with penalties of the springs of the interface, of an elastic
+  surface (`evfem.contact.bed`), relative to which ways then are, and with a hand of its spring
+  (``kinetic_energy``, ``viscous_dissipation`` and the work of the drive have its mass and damper);
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
@@ -85,6 +84,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.quadrature import ENDS, FINE_SHARE, FINE_WAY, LEGENDRE, PART, SEEN, SHARE, SLIDE, WAY
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging, Flow
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
@@ -98,34 +98,6 @@ from evfem.surface.adhesion import ON
 SNAP = 0.5
 #: share of the work of the internal forces, all counted positive, that is the solver's tolerance
 NOISE = 1e-7
-
-
-def _gauss(points: int) -> tuple[Floats, Floats]:
-    """Places and weights on (0, 1)."""
-    x, weight = np.polynomial.legendre.leggauss(points)
-    return 0.5 + 0.5 * x, 0.5 * weight
-
-
-def _along(ends: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Places and weights (with their derivative), eight between `ends`, dense where attraction changes."""
-    at, weight = _gauss(8)
-    begin, length = np.array(ends[:-1])[:, None], np.diff(ends)[:, None]
-    at, weight = (begin + length * at).ravel(), (length * weight).ravel()
-    return at**2 * (3.0 - 2.0 * at), 6.0 * at * (1.0 - at) * weight
-
-
-#: where the attraction is taken on the way, and where it is if that does not resolve it: the layers below a
-#: thin insulator's nodes are thinner than their ways by orders
-WAY, SHARE = _along((0.0, 1.0))
-FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, *np.linspace(1 / 8, 7 / 8, 7), 15 / 16, 63 / 64, 1.0))
-#: the places see an integrand whose highest Legendre coefficients are below this share of the largest
-SEEN = 1e-3
-#: its two ends
-ENDS = np.array([0.0, 1.0])
-#: Legendre coefficients (8,) over the way from the values at the places `WAY`
-_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * WAY - 1.0, WAY.size - 1))
-#: and where the friction coefficient is
-SLIDE, PART = _gauss(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,12 +123,6 @@ def tells_source(model: Model) -> bool:
     if attraction is None or attraction.charging is None:
         return False
     return bool(getattr(attraction.law, "of_a_field", False))
-
-
-def unloaded(state: State) -> State:
-    """The state before the first part, without its voltage and what follows from it."""
-    attraction, reaction = np.zeros_like(state.attraction), np.zeros_like(state.reaction)
-    return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,27 +185,21 @@ class SubstepWork:
 
     def pulled(self) -> tuple[float, float]:
         """Works of the attraction by a voltage W_e and of adhesion, N mm per mm of depth."""
-        attraction, states, untilted = self.model.attraction, (self.old, self.new), self.model.equilibrium
-        before, after = (untilted.interface.untilted(state, state.attraction) for state in states)
+        attraction, states = self.model.attraction, (self.old, self.new)
+        equilibrium = self.model.equilibrium
+        untilted = equilibrium.interface.untilted
+        before, after = (untilted(state, state.attraction) for state in states)
         if attraction is None:
             return 0.0, 0.0
         voltages = (self.old.voltage, self.new.voltage)
         if (adhesive := attraction.adhesive) is None:
             return self._work_of(attraction, before, after, voltages), 0.0
         on = (0.0 if self.first else ON, ON)
-        held, holds = (self.adhesion_at(*each) for each in zip(states, on, strict=True))
+        held, holds = (equilibrium.adhesion_at(*each) for each in zip(states, on, strict=True))
         work = self._work_of(adhesive, held, holds, on)
         if attraction.electric is None:
             return 0.0, work
         return self._work_of(attraction.electric, before - held, after - holds, voltages), work
-
-    def adhesion_at(self, state: State, strength: float = ON) -> Floats:
-        """Adhesion alone (P, dim) on the pad's nodes in a state."""
-        assert self.model.attraction is not None
-        adhesive = self.model.attraction.adhesive
-        assert adhesive is not None
-        place = self.model.equilibrium.interface.resting(state)
-        return adhesive.forces(place, strength, state.touching, state.contact_force[:, 0])
 
     def _work_of(
         self, attraction: Attraction, before: Floats, after: Floats, voltages: tuple[float, float]
@@ -270,7 +230,7 @@ class SubstepWork:
     ) -> float:
         """Work of an attraction along `along` (P, dim) of the straight way between two voltages."""
         values = self.pulls(along, WAY, voltages, attraction=attraction)
-        size = np.abs(_LEGENDRE @ values)
+        size = np.abs(LEGENDRE @ values)
         if size[-2:].max() > SEEN * size.max():
             return float(FINE_SHARE @ self.pulls(along, FINE_WAY, voltages, attraction=attraction))
         return float(SHARE @ values)
@@ -335,9 +295,9 @@ class SubstepWork:
         begin: Floats | None = None,
         attraction: Attraction | None = None,
     ) -> Floats:
-        """All attraction, or one, where there are fringes that of the columns, times the way `along` (P, dim) at the
-        parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
-        growing evenly: (w,) in N mm per mm of depth.
+        """Power of all attraction, or of one, in N mm per mm of depth (w,), on the way `along` (P, dim) at
+        the parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
+        growing evenly; of what has fringes that of the columns.
         """
         attraction, old, new = attraction or self.model.attraction, self.old, self.new
         assert attraction is not None
@@ -391,9 +351,10 @@ class SubstepWork:
     def yielded(self) -> Floats:
         """Energy of an elastic surface before, between (forces of one end, places of the other) and after."""
         (old, new), forces = (self.old, self.new), self._on_surface
-        pairs = ((0, old), (0, new), (1, old), (1, new)) if new.given.size else ()
-        found = [0.5 * float(np.sum(forces[i] * state.given)) for i, state in pairs] or [0.0] * 4
-        return np.array([found[0], found[1] + found[2], found[3]])
+        if not new.given.size:
+            return np.zeros(3)
+        found = [[0.5 * float(np.sum(force * state.given)) for state in (old, new)] for force in forces]
+        return np.array([found[0][0], found[0][1] + found[1][0], found[1][1]])
 
     @property
     def _on_surface(self) -> tuple[Floats, Floats]:

@@ -1,7 +1,8 @@
 r"""Adhesion: a traction of the gap between skin and surface that acts without a voltage.
 
-A law gives the traction p (MPa, positive where it attracts) at a gap g, and its potential :math:`\Pi` per area
-(N/mm), with :math:`p = d\Pi/dg` and :math:`\Pi = 0` far away, so that the work of adhesion is :math:`-\Pi(0)`.
+A law gives the traction p (MPa, positive where it attracts) at a gap g, and its potential :math:`\Pi` per
+area (N/mm), with :math:`p = d\Pi/dg` and :math:`\Pi = 0` far away, so that the work of adhesion is
+:math:`-\Pi(0)`.
 
 ============  ====================================================  ===========================
 law           p                                                     work
@@ -10,8 +11,8 @@ law           p                                                     work
 `Capillary`   2 gamma cos(theta) / film for g < film                2 gamma cos(theta)
 ============  ====================================================  ===========================
 
-The edge falls as a cubic over a tenth of the reach, around it, which leaves the work as it is. The second is a
-meniscus of a liquid as high as the film, whose pressure is Laplace's: neither evaporation nor viscosity.
+The edge falls as a cubic over a tenth of the reach, around it, which leaves the work as it is. The second is
+a meniscus of a liquid as high as the film, whose pressure is Laplace's: neither evaporation nor viscosity.
 
 What falls faster with the gap than the mesh resolves has a line of the same work around its steepest place
 (`Softened`), as the voltage's law has at closed faces (`evfem.electrostatics.roughness.Cored`).
@@ -38,7 +39,7 @@ from evfem.tensor import derivative
 
 #: the share of its reach over which a law's edge falls
 EDGE = 0.1
-#: gaps (mm) at which the steepest place is looked for, halvings for the line's ends, and a gap beyond all reach
+#: gaps at which the steepest place is looked for, halvings for the line's ends, a gap (mm) beyond all reach
 LOOKED, HALVINGS, BEYOND = 4000, 100, 1e3
 #: the shortest gap (mm) that is looked at
 NEAREST = 1e-7

@@ -6,8 +6,8 @@ give way by
 .. math:: u_z = a_n p - i\,c\,q, \qquad u_x = a_t q + i\,c\,p .
 
 The compliances :math:`a_n, a_t, c` of a stack follow from those of what lies below each layer, as the
-state :math:`(u_x, u_z, \sigma_{xz}, \sigma_{zz})` at its top is an exponential of the one at its bottom. Of one
-layer of thickness H, with s = kH, :math:`\kappa = 3 - 4\nu` and
+state :math:`(u_x, u_z, \sigma_{xz}, \sigma_{zz})` at its top is an exponential of the one at its bottom. Of
+one layer of thickness H, with s = kH, :math:`\kappa = 3 - 4\nu` and
 :math:`D = 2\kappa\cosh 2s + 1 + \kappa^2 + 4 s^2`, they are
 
 .. math:: a_{n,t} = \frac{1-\nu}{\mu k}\,\frac{2\kappa\sinh 2s \mp 4 s}{D}, \qquad
@@ -16,9 +16,9 @@ layer of thickness H, with s = kH, :math:`\kappa = 3 - 4\nu` and
 In space that are kernels of the distance x, which fall off exponentially. Their singular parts,
 :math:`-2\ln|x|/(\pi E^*)` and :math:`\mathrm{sgn}(x)(1-2\nu)/(4\mu)` with those of the top layer, are known;
 what is left is smooth and tabulated once (`Kernels`). Forces act on strips of given lengths, and
-displacements are means over the strips: second differences of the kernel's second integral. That makes the
-compliance symmetric and positive, as Galerkin's method does. A strip shorter than the table resolves takes the
-mean of the kernel's quadratic instead.
+displacements are means over the strips: second differences of the kernel's second integral. That makes
+the compliance symmetric and positive, as Galerkin's method does. A strip shorter than the table resolves
+takes the mean of the kernel's quadratic instead.
 
 Sources: K. L. Johnson, Contact Mechanics (1985), doi:10.1017/CBO9781139171731, ch. 2 and 5.8 (half-plane and
 layer). Units: mm, N, MPa; compliances are mm per N/mm.
@@ -212,8 +212,8 @@ class Kernel:
 
 
 class Kernels:
-    """Normal, tangential and coupling kernels of a stack, with their sizes in mm per N/mm, over the distance in
-    units of mm; `spread` is the parameter of the table's places, sinh(t) from 0 to it.
+    """Normal, tangential and coupling kernels of a stack over the distance in thicknesses of its top layer,
+    the `unit` (mm), with their `sizes` in mm per N/mm; places of the table go as sinh(t), t up to `spread`.
     """
 
     def __init__(self, unit: float, kernels: tuple[Kernel, ...], sizes: Floats, spread: float) -> None:
@@ -248,7 +248,7 @@ class Kernels:
         return found.reshape(2 * x.size, 2 * x.size)
 
     def _means(self, x: Floats, lengths: Floats) -> Floats:
-        """Of the three kernels the slope and the mean over each pair of strips, (3, 2, pairs); the last kept."""
+        """Slopes and means of the three kernels over each pair of strips, (3, 2, pairs); the last kept."""
         key = x.tobytes() + lengths.tobytes()
         if self._last is None or self._last[0] != key:
             i, j = np.triu_indices(x.size)

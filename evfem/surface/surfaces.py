@@ -1,4 +1,4 @@
-"""Counter-surfaces, rigid or elastic: height, slope and curvature of the outline, friction coefficient, insulator.
+"""Counter-surfaces, rigid or elastic: height, slope and curvature of the outline, friction, insulator.
 
 A surface is a function height(x) in mm; the finger is above it. The methods give the UNSHIFTED
 profile: the scene adds `y` (mm), and where `y` is None chooses it so that the smallest vertical
