@@ -108,8 +108,8 @@ class Closing:
             return None
         if isinstance(wanted, str) and not self.snaps:
             return None
-        (law, layers), (stiffness, distance, height) = self.electrics.attraction, self._local
-        first = height <= height.min() + FIRST * np.ptp(self.mesh.points[:, 1])
+        (law, layers), (stiffness, distance, _) = self.electrics.attraction, self._local
+        first = self.first
         given = None if isinstance(wanted, str) else wanted
         cored = Cored(law, self.closed, self.resolved * stiffness, given)
         length = np.max((cored.line(voltage, layers).end - self.closed)[first])
@@ -131,9 +131,15 @@ class Closing:
         return 0.5 * RESOLVED if both else RESOLVED
 
     @property
-    def stiffness(self) -> float:
-        """The least E*/h (MPa/mm) of the nodes that touch first."""
-        return float(self._local[0][self._low].min())
+    def stiffness(self) -> Floats:
+        """E*/h (P,) in MPa/mm of the nodes of the pad."""
+        return self._local[0]
+
+    @property
+    def first(self) -> Any:
+        """Nodes (P,) with which the finger touches first."""
+        height = self._local[2]
+        return height <= height.min() + FIRST * np.ptp(self.mesh.points[:, 1])
 
     @property
     def _low(self) -> Any:

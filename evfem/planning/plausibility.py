@@ -132,8 +132,10 @@ def _strained(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
     soft = min(layers, key=lambda one: one.E)
     surface, tissue = soft.E / (1.0 - soft.nu**2), INCOMPRESSIBLE * modulus
     both = surface * tissue / (surface + tissue)
-    x, y = mesh.points[mesh.node_sets["pad"]].T
-    radius = float(np.ptp(x)) ** 2 / (8.0 * float(np.ptp(y)))
+    width, depth = np.ptp(mesh.points[mesh.node_sets["pad"]], axis=0).tolist()
+    if depth == 0.0:
+        return
+    radius = width**2 / (8.0 * depth)
     deepest = max((one.indentation or 0.0 for one in scene.courses), default=0.0)
     load = max((one.force or 0.0 for one in scene.courses), default=0.0)
     half = max(math.sqrt(4.0 * load * radius / (math.pi * both)), math.sqrt(radius * max(deepest, 0.0)))

