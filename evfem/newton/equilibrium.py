@@ -107,7 +107,7 @@ class Equilibrium:
         return self._given_way(old, held, frozen, found) if found.touching.any() else found
 
     def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
-        """Where a finger without a force stands that is touched at `target`, from the iterate `touched`.
+        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`.
 
         Without mass every height above is an equilibrium too: its lowest node then just does not touch.
         """
@@ -133,7 +133,7 @@ class Equilibrium:
         assert other is not None
         held = self._try(old, replace(target, voltage=other), frozen, start)
         if not sticks(held):
-            raise StepFailed("the wished friction force was not found", self.record.residuals)
+            raise StepFailed("the prescribed friction force was not found", self.record.residuals)
         return held
 
     def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
@@ -179,7 +179,7 @@ class Equilibrium:
             if reached and balance.residual <= self.tolerance:
                 if self._accepts(old, state, target):
                     return self._accepted(old, state, target)
-                if iteration > changed:  # nodes were let go or admitted: what follows is another problem
+                if iteration > changed:  # other nodes are held or candidates: another problem begins
                     changed = iteration + 1
             if stuck(residuals[changed:]):
                 break

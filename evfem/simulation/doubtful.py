@@ -35,7 +35,7 @@ def outside(model: Model) -> Ints:
 
 
 def deepest(model: Model, nodes: Ints, u: Floats) -> Floats:
-    """How deep (mm) these nodes are inside the surface at most, and the number of the one that is: (2,)."""
+    """Largest penetration (mm) of these nodes into the surface, and the number of that node: (2,)."""
     gap = surface_state(model.surface, (model.mesh.points + u)[nodes]).gap
     return np.array([-gap.min(), nodes[gap.argmin()]], dtype=float) if gap.size else np.zeros(2)
 
@@ -99,12 +99,12 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _lost(rows: Sequence[Row], name: str) -> Floats:
-    """What a column of dissipation adds in each row (r,)."""
+    """Increments (r,) of a column of dissipation."""
     return np.diff(_column(rows, f"{name}_dissipation"), prepend=0.0)
 
 
 def _energy(rows: Sequence[Row]) -> float:
-    """What is stored at most, and all that is dissipated."""
+    """Largest stored energy plus all dissipation."""
     stored = (_column(rows, "stored_energy") + _column(rows, "kinetic_energy")).max()
     return (
         1e-300

@@ -1,4 +1,4 @@
-"""What is said of a failed step: which force wins and where, if no equilibrium is near, what to try."""
+"""The message of a failed step: largest force and its place, whether an equilibrium is near, advice."""
 
 from __future__ import annotations
 

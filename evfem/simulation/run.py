@@ -209,7 +209,7 @@ class Run:
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
     def _kept(self, time: float, begin: float) -> KeptCharge | None:
-        """What prescribes the electrode's charge at `time` (s) in a step from `begin`, if anything does."""
+        """Control of the electrode's charge at `time` (s) in a step from `begin`, or None."""
         voltage = self.scene.electrics.voltage
         if isinstance(voltage, ChargeControl):
             return KeptCharge(NANO * voltage.charge_at(time) / eps_0)
@@ -247,7 +247,7 @@ class Run:
                 yield Request(first + k, index, motion.kind, path, seconds)
 
     def _start_of(self, rows_before: int) -> dict[str, float]:
-        """Where a motion starts: bone, indentation, force, voltage, and whether the finger is loose."""
+        """Start of a motion: bone, indentation, force, voltage, and whether the finger is loose."""
         start = dict.fromkeys(START, 0.0)
         if rows_before == 0:
             return start | {"voltage": self.voltage_at(0.0, 0.0)}
@@ -310,7 +310,7 @@ class Run:
         return FollowFriction(float(wish(position)), wish.largest_voltage)
 
     def _path(self, start: Target, end: Target, begin: float, seconds: float) -> Path:
-        """Straight from one target, at time `begin`, to the next, with profile, signal or wished force."""
+        """Linearly from one target, at time `begin`, to the next, with profile, signal or given force."""
 
         def target(done: float, fraction: float) -> Target:
             duration = (fraction - done) * seconds
