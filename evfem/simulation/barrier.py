@@ -95,7 +95,7 @@ def _lifted(part: SubstepWork) -> Floats:
     touching = old.touching & new.touching
     if model.surface.is_flat or not touching.any():
         return np.zeros_like(PLACES)
-    begin, end = (model.equilibrium.positions(state.u)[touching] for state in (old, new))
+    begin, end = (model.equilibrium.interface.positions(state.u)[touching] for state in (old, new))
     normal = new.contact_force[touching, 0]
     lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in PLACES]
     return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES

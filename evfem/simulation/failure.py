@@ -32,7 +32,7 @@ def _lost(model: Model, failed: StepFailed) -> str:
     state, target = failed.last
     try:
         with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite
-            margin = model.equilibrium.stability_ratio(state, target)
+            margin = model.equilibrium.body.stability_ratio(state, target)
     except StepFailed:  # the tangent there is singular
         return ""
     # a trial far from equilibrium may give way too: alone that shows nothing
@@ -52,7 +52,7 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
 
     In three dimensions the last two `rows` tell: the voltage falls as the gap closes.
     """
-    margin = model.equilibrium.stability_ratio(state, Target.held(state.bone, state.voltage))
+    margin = model.equilibrium.body.stability_ratio(state, Target.held(state.bone, state.voltage))
     if margin is None and len(rows) > 1:
         ways = [rows[-1][name] - rows[-2][name] for name in ("voltage", "min_gap")]
         lost = abs(rows[-2]["voltage"]) > 0.0 and ways[0] * np.sign(state.voltage) * ways[1] > 0.0

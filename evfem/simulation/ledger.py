@@ -48,8 +48,8 @@ class Ledger:
         """The forces, widths and energies of a state; costs are added by the caller."""
         model, end = self.model, self.end
         assert end is not None
-        position = model.equilibrium.positions(state.u)
-        contact = model.equilibrium.contact_forces(state).sum(axis=0)
+        position = model.equilibrium.interface.positions(state.u)
+        contact = model.equilibrium.interface.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
         real, extent = _extent(model, state, position, contact)
@@ -131,8 +131,8 @@ def _positive(share: Floats) -> Floats:
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
-    size, nodes = model.body.space.size, model.pad.nodes
-    position, withheld = model.equilibrium.positions(state.u), model.equilibrium.interface.withheld(state)
+    size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
+    position, withheld = interface.positions(state.u), interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
     pulled = share if model.attraction is None else _positive(model.attraction.weights(position))

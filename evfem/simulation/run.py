@@ -387,7 +387,7 @@ class Run:
             "barriers": self.stepper.barriers,
             "held": self.stepper.held,
             "unsettled": self.stepper.unsettled,
-            "candidates": int(self.model.equilibrium.reusable().candidates.size),
+            "candidates": int(self.model.equilibrium.body.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",
         }
@@ -406,7 +406,7 @@ class Run:
         """Arrays from which the run can go on after its last converged step."""
         return {
             **state_arrays(self.state),
-            **reusable_arrays(self.state, self.model.equilibrium.reusable()),
+            **reusable_arrays(self.state, self.model.equilibrium.body.reusable()),
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
@@ -417,7 +417,7 @@ class Run:
     def _restore(self, saved: Saved) -> None:
         arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
         self.state = state_of(arrays)
-        self.model.equilibrium.resume(self.state, reusable_of(arrays))
+        self.model.equilibrium.body.resume(self.state, reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)

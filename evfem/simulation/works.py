@@ -335,7 +335,7 @@ class SubstepWork:
     @cached_property
     def x(self) -> tuple[Floats, Floats]:
         """x of the pad nodes (P,) before and after."""
-        x0, x1 = (self.model.equilibrium.positions(state.u)[:, 0] for state in (self.old, self.new))
+        x0, x1 = (self.model.equilibrium.interface.positions(state.u)[:, 0] for state in (self.old, self.new))
         return x0, x1
 
     @cached_property
@@ -371,7 +371,7 @@ class SubstepWork:
     def _contact(self) -> float:
         """Trapezoidal work of the contact forces, N mm per mm of depth."""
         equilibrium = self.model.equilibrium
-        before, after = (equilibrium.contact_forces(state) for state in (self.old, self.new))
+        before, after = (equilibrium.interface.contact_forces(state) for state in (self.old, self.new))
         return _mean_work(before, after, (self.new.u - self.old.u)[self.model.pad.nodes])
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
@@ -397,7 +397,7 @@ class SubstepWork:
         if model.attraction is not None:
             at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
             work += float(np.sum((at[1] - at[0]) * along))
-        x = model.equilibrium.positions(carried.u)[:, 0]
+        x = model.equilibrium.interface.positions(carried.u)[:, 0]
         less = self._coefficient(x) - self._coefficient(self.x[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 
