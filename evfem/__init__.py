@@ -51,6 +51,7 @@ _NAMES = {
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),
     "simulation.checkpoint": ("Checkpoint",),
+    "simulation.loop": ("Loop", "loop"),
     "simulation.result": ("Frame", "Result"),
     "simulation.run": ("simulate",),
     "simulation.spectrum": ("spectrum",),

@@ -72,6 +72,8 @@ from evfem.scene.terms import Boundary as Boundary
 from evfem.scene.terms import Region as Region
 from evfem.simulation import result as result
 from evfem.simulation.checkpoint import Checkpoint as Checkpoint
+from evfem.simulation.loop import Loop as Loop
+from evfem.simulation.loop import loop as loop
 from evfem.simulation.result import Frame as Frame
 from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate

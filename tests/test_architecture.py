@@ -64,7 +64,7 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "scipy"},
-        "provenance history result spectrum model doubtful works barrier ledger checkpoint failure run",
+        "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},

@@ -13,7 +13,7 @@ from evfem.errors import NotConverged
 from evfem.planning.plan import plan
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
-from evfem.simulation.failure import advice
+from evfem.simulation.doubtful import advice
 from evfem.simulation.run import Run, simulate
 from evfem.solver.control import Target
 from evfem.solver.state import Folded, LiftedOff, StepFailed
