@@ -12,12 +12,12 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CRITICAL, SOFTENED
 from evfem.errors import InputError
+from evfem.newton.control import Target
+from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.planning.plausibility import weakens
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 from evfem.simulation.model import Model
-from evfem.solver.control import Target
-from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.surface.pad import surface_state
 
 #: share of the energy of motions that take time that their finite steps may dissipate

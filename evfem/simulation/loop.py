@@ -19,13 +19,13 @@ from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.common.pools import blas_limits, loaded_blas
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import ABSENT, InputError, StopRun
+from evfem.newton.control import Target
 from evfem.planning.core import Closing
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import FORCE, INDENTATION, VOLTAGE, Course, Motion
 from evfem.scene.scene import SIGNALS, Scene
 from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import Request, Run, Start
-from evfem.solver.control import Target
 from evfem.solver.stepping import Path
 
 _PLACE = number("a place in mm between -1000 and 1000", Within(-1000.0, 1000.0), "mm")
