@@ -69,7 +69,7 @@ ROOMS = {
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
-        "samples file folder run check",
+        "samples file folder table run check",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
