@@ -22,7 +22,7 @@ from evfem.simulation.history import UNITS
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.run import Request, Run
 from evfem.simulation.works import Books
-from evfem.solver.state import State
+from evfem.newton.state import State
 
 #: share of a parameter between neighbours, their places in steps and the weights of the difference
 STEP = 1e-3

@@ -28,9 +28,9 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, sizes
 from evfem.simulation.model import Model
-from evfem.solver.control import Target, Unsupported
-from evfem.solver.interface import Interface
-from evfem.solver.state import State
+from evfem.newton.control import Target, Unsupported
+from evfem.newton.interface import Interface
+from evfem.newton.state import State
 
 #: shares of a force and of a length by which the bound of friction is differenced for the matrix
 SHARE = 1e-6

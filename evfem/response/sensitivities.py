@@ -53,9 +53,9 @@ from evfem.simulation.ledger import Ledger
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
 from evfem.simulation.works import Books
-from evfem.solver.condensation import Factorised, Singular
-from evfem.solver.control import FollowFriction, Target, Unsupported
-from evfem.solver.state import State
+from evfem.newton.condensation import Factorised, Singular
+from evfem.newton.control import FollowFriction, Target, Unsupported
+from evfem.newton.state import State
 
 #: why columns have no derivative
 COUNTED = "it counts, or is measured by, whole nodes, steps or seconds"
