@@ -67,7 +67,7 @@ ROOMS = {
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint failure run",
     ),
-    "response": ({"numpy", "scipy"}, "parameters parts lines sensitivities"),
+    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities"),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
         "samples file folder run check",

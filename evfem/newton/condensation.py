@@ -17,7 +17,6 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -267,30 +266,3 @@ def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso
     """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
     kind = Pardiso if _has_pardiso() and not _OTHER.get() else SuperLU
     return kind(pattern, kept, threads)
-
-
-class Factorised:
-    """A sparse unsymmetric matrix (m, m) factorised in double precision; `Singular` where that fails."""
-
-    def __init__(self, matrix: Any) -> None:
-        if not (_has_pardiso() and not _OTHER.get()):
-            from scipy.sparse.linalg import splu
-
-            try:
-                self._solve = splu(matrix.tocsc()).solve
-            except RuntimeError as error:
-                raise Singular(str(error)) from error
-            return
-        library: Any = type(pardiso_library())(mtype=11)
-        try:
-            library.factorize(matrix.tocsr())
-        except Exception as error:  # its own class, which tells a number
-            raise Singular(f"PARDISO: {error}") from error
-        kept = library.factorized_A
-        library.set_phase(33)
-        self._solve = lambda b: library._call_pardiso(kept, b)
-        weakref.finalize(self, library.free_memory, everything=True)
-
-    def solve(self, b: Floats) -> Floats:
-        """The solution (m,) for a right side (m,)."""
-        return np.asarray(self._solve(np.ascontiguousarray(b)))

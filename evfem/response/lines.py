@@ -1,8 +1,8 @@
 """One parameter on its way through a run: derivatives of states, books and rows, part by part.
 
-Total derivatives are sums of two partial ones, each a central difference of fourth order of what the run itself
-evaluates: by the parameter at fixed states, between four models of changed scenes (`Beside`), and along the
-derivative of the states at a fixed scene, in one more model of the scene (`Line.along`).
+Total derivatives are sums of two partial ones, each a central difference of fourth order of what the run
+itself evaluates: by the parameter at fixed states, between four models of changed scenes (`Beside`), and
+along the derivative of the states at a fixed scene, in one more model of the scene (`Line`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.newton.state import State
 from evfem.response.parameters import Parameter
 from evfem.response.parts import Equations
 from evfem.scene.scene import Scene
@@ -22,7 +23,6 @@ from evfem.simulation.history import UNITS
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.run import Request, Run
 from evfem.simulation.works import Books
-from evfem.newton.state import State
 
 #: share of a parameter between neighbours, their places in steps and the weights of the difference
 STEP = 1e-3
@@ -32,10 +32,10 @@ PLACES, WEIGHTS = (-2, -1, 1, 2), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
 #: how far (mm) nodes of the undeformed finger move between places
 SHIFT = 5e-6
-#: refinements at most; the relative change that is still to come when they are done, and what is too much
-ROUNDS, DONE, WRONG = 12, 1e-12, 1e-6
-#: factor by which a refinement must fall, if not the last one was exact
-BETTER = 2.0
+#: refinements at most; the relative change that is still to come when they are done, that from which on it is
+#: rounding where it falls no more than by the next factor, and what is too much; the factor by which it must
+#: fall with the matrix of another part
+ROUNDS, DONE, ROUNDING, NOISE, WRONG, SLOW = 30, 1e-13, 1e-7, 0.5, 1e-6, 0.01
 LOST = "the linear equations of step {} were not solved"
 #: columns with units that are counted all the same
 WHOLE = (
@@ -91,8 +91,8 @@ def moved(owner: Any, change: Change, way: float) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A part that a run accepted: its states and their margins, which part of the step it is, the nodes that a
-    jump of friction holds at x (P,), else nan, and the books of the run before and after it.
+    """A part that a run accepted: its states and their margins, which part of the step it is, where a jump of
+    friction holds nodes (`pins`, (P,) in mm, else nan), and the books of the run before and after it.
     """
 
     old: State
@@ -124,7 +124,7 @@ class Beside:
     def begin(self, part: Accepted, jumps: Floats, old: State) -> Equations:
         """The equations of a part from `old`; `jumps` (J, 3) of friction are those of the followed run."""
         assert self.request is not None
-        pins, own = part.pins.copy(), self.run.model.equilibrium.interface.pins.jumps
+        pins, own = part.pins.copy(), self.run.model.equilibrium.interface.jumps.table
         for node in np.flatnonzero(np.isfinite(pins)):
             jump = int(np.abs(pins[node] - jumps[:, 0]).argmin())
             pins[node] += own[jump, 0] - jumps[jump, 0]
@@ -146,9 +146,9 @@ class Beside:
 
 @dataclass
 class Line:
-    """One parameter: `beside`, runs of changed scenes at the `PLACES` in steps of `step`, and `centre`, one of
-    the scene itself, for places along the states at most `longest` apart; derivatives of state, books and sums
-    so far, and what was found step by step.
+    """One parameter: `beside`, runs of changed scenes at the `PLACES` in steps of `step`, and `centre`, one
+    of the scene itself, for places along the states at most `longest` apart; derivatives of state, books and
+    sums so far, and what was found step by step.
     """
 
     name: str
@@ -171,56 +171,68 @@ class Line:
         cls, scene: Scene, parameter: Parameter, centre: Beside, lengths: Callable[[State], Floats]
     ) -> Line:
         """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
-        step, still = STEP * parameter.size, centre.run.model.mesh.points
-        shift = _shift(Beside.of(scene, parameter, step), still)
-        step *= min(1.0, SHIFT / max(shift, 1e-300))
-        beside = [Beside.of(scene, parameter, place * step) for place in PLACES]
+        step = longest = STEP * parameter.size
+        last = Beside.of(scene, parameter, PLACES[-1] * step)
+        shift = _shift(last, centre.run.model.mesh.points) / PLACES[-1]
+        if shift > SHIFT:
+            step *= SHIFT / shift
+            last = Beside.of(scene, parameter, PLACES[-1] * step)
+        beside = [*(Beside.of(scene, parameter, place * step) for place in PLACES[:-1]), last]
         state = changes([one.run.state for one in beside], step)
-        return cls(parameter.name, step, STEP * parameter.size, beside, centre, lengths, state)
+        return cls(parameter.name, step, longest, beside, centre, lengths, state)
 
     # -- a part
 
-    def follow(self, part: Accepted, solve: Callable[[Floats], Floats], jumps: Floats) -> bool:
-        """Take the derivatives to the end of a part; says whether `solve` was as good as exact."""
+    def follow(self, part: Accepted, solve: Callable[[Floats], Floats], jumps: Floats, patient: bool) -> bool:
+        """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(part, jumps, part.old) for one in self.beside]
-        voltage = [one.target.drive.voltage for one in equations]
+        change = self._nothing(
+            part.new, difference([one.target.voltage.voltage for one in equations], self.step)
+        )
         by_parameter = difference([one.residual(part.new) for one in equations], self.step)
-        change: Change = {"u": np.zeros_like(part.new.u)}
-        change |= {
-            "contact_force": np.zeros_like(part.new.contact_force),
-            "bone": np.zeros_like(part.new.bone),
-        }
-        change["voltage"] = float(difference(voltage, self.step))
-        before, size, body = 1.0, self.centre.run.model.body.size, self.centre.run.model.body
-        for rounds in range(1, ROUNDS + 1):
-            more = solve(-by_parameter - self.along(part, jumps, change))
-            change["u"] = change["u"] + body.expand(more[:size])
-            change["bone"] = change["bone"] + more[body.bone]
-            change["contact_force"] = change["contact_force"] + more[size:].reshape(
-                part.new.contact_force.shape
-            )
-            size_of_it = self._relative(more, change, part.new, size)
-            rate, before = size_of_it / before if rounds > 1 else 1.0, size_of_it
-            if not np.isfinite(size_of_it) or size_of_it * rate <= DONE or rate > BETTER:
+        rate, before, rounds = 1.0, 1.0, 0
+        while rounds < ROUNDS:
+            rounds += 1
+            more = solve(-by_parameter - self._along(part, jumps, change))
+            self._add(change, more)
+            share = self._share(more, change, part.new)
+            rate, before = share / before if rounds > 1 else 1.0, share
+            if share * rate <= DONE or (share <= ROUNDING and rate > NOISE):
                 break
-        if not size_of_it <= WRONG:
-            self.reason = LOST
-        else:
+            if not np.isfinite(share) or (rate > SLOW and rounds > 1 and not patient):
+                break
+        if before <= WRONG and (patient or rate <= SLOW or before <= ROUNDING):
             self._end(part, equations, jumps, change)
-        return rounds <= 3 and not self.reason
+            return True
+        self.reason = LOST if patient else ""
+        return False
 
-    def _relative(self, more: Floats, change: Change, state: State, size: int) -> float:
+    def _nothing(self, state: State, voltage: Any) -> Change:
+        """The derivative of a part's end before anything is known but that of the voltage."""
+        zero = {name: np.zeros_like(getattr(state, name)) for name in ("u", "bone", "contact_force")}
+        return {**zero, "voltage": float(voltage)}
+
+    def _add(self, change: Change, more: Floats) -> None:
+        """Add a solution (m,) of a part's equations to a derivative."""
+        body = self.centre.run.model.body
+        change["u"] = change["u"] + body.expand(more[: body.size])
+        change["bone"] = change["bone"] + more[body.bone]
+        change["contact_force"] = change["contact_force"] + more[body.size :].reshape(
+            change["contact_force"].shape
+        )
+
+    def _share(self, more: Floats, change: Change, state: State) -> float:
         """The largest change of displacements and of contact forces, as a share of the largest derivative of
         each, or of the largest value over the parameter.
         """
-        shares = []
+        shares, size = [], self.centre.run.model.body.size
         for name, part in (("u", slice(0, size)), ("contact_force", slice(size, None))):
             usual = STEP / self.longest * np.abs(getattr(state, name)).max(initial=0.0)
             largest = max(np.abs(change[name]).max(initial=0.0), usual, 1e-300)
             shares.append(np.abs(more[part]).max(initial=0.0) / largest)
         return float(max(shares))
 
-    def along(self, part: Accepted, jumps: Floats, change: Change) -> Floats:
+    def _along(self, part: Accepted, jumps: Floats, change: Change) -> Floats:
         """Derivative (m,) of the part's equations along those of its states, the end's being `change`."""
         way = self._way(part, change)
         found = []
@@ -241,7 +253,7 @@ class Line:
         return max(min(self.longest, nearest / max(PLACES)), LEAST * self.longest)
 
     def _end(self, part: Accepted, equations: list[Equations], jumps: Floats, change: Change) -> None:
-        """The derivatives at the end of a part: what it leaves behind, its books, how far its statuses hold."""
+        """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
         step, way = self.step, self._way(part, change)
         by_parameter = changes([one.ended(part.new) for one in equations], step)
         along, margins = [], []
@@ -308,6 +320,6 @@ class Line:
 
 
 def _shift(one: Beside, points: Floats) -> float:
-    """How far (mm) the nodes of its undeformed finger are from `points` (N, dim) at most; 0 for other meshes."""
+    """How far (mm) the nodes of a finger are from `points` (N, dim) at most; 0 for other meshes."""
     own = one.run.model.mesh.points
     return float(np.abs(own - points).max()) if own.shape == points.shape else 0.0

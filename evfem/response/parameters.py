@@ -146,7 +146,7 @@ class Keyed:
             return ("voltage", {"0": "position", "1": "voltage"}.get(column, column), row)
         if name in ELECTRIC:
             return (*ELECTRIC[name], *rest)
-        if self.scene.drive is not None and name in {key.name for key in fields_of(type(self.scene.drive))}:
+        if self.scene.drive is not None and _field(self.scene.drive, name) is not None:
             return ("drive", name, *rest)
         if name in {"stratum_corneum_thickness", "stratum_corneum_eps_r"}:
             return ("finger", "electrical", name)
@@ -195,7 +195,8 @@ def parameter_of(scene: Scene, given: Any) -> Parameter:
 def _field(owner: Any, name: str) -> str | None:
     """The attribute of an object that a file calls `name`."""
     if is_dataclass(owner):
-        for key in fields_of(type(owner)):
+        kind: Any = type(owner)
+        for key in fields_of(kind):
             if name in (key.name, key.field):
                 return key.field
     return name if hasattr(owner, name) else None
