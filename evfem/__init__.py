@@ -48,6 +48,8 @@ _NAMES = {
     "scene.options": ("Output", "Solver"),
     "scene.probes": ("Probe",),
     "planning.plan": ("plan",),
+    "response.parameters": ("ShapeChange",),
+    "response.sensitivities": ("Sensitivities", "sensitivities"),
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),
     "simulation.checkpoint": ("Checkpoint",),

@@ -67,6 +67,7 @@ ROOMS = {
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
+    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities"),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
         "samples file folder table run check",

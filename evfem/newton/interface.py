@@ -284,6 +284,13 @@ class Interface:
         nodal = self._slipping(old, new, np.arange(x.size), mu, slip)
         return replace(nodal, normal=normal, length=self.tributary_at(part, x)).bound(self.law)
 
+    def limit(self, old: State, state: State, x: Floats, way: Floats) -> Floats:
+        """Bounds of friction (P,) in N/mm of the pad nodes of `state` at x (P,), slipping by `way` (P,)."""
+        mu = self.friction(old, np.arange(x.size), x)
+        if self.law is None:
+            return np.asarray(mu * state.contact_force[:, 0])
+        return self._slipping(old, state, np.arange(x.size), mu, way).bound(self.law)
+
     def _origin(self, old: State) -> Floats:
         """Origin of the slip (P,): the last accepted x, or the jump of friction that holds a node."""
         return np.where(self.jumps.held, self.jumps.x, self.positions(old.u)[:, 0])
