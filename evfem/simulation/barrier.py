@@ -103,15 +103,11 @@ def _lifted(part: Part) -> Floats:
 
 def _in_time(part: Part) -> Floats:
     """Drag, viscosity and inertia as potentials of an implicit step; drag counts from the release."""
-    body, old, new = part.model.body, part.old, part.new
-    way, dynamics = new.u - old.u, part.model.body.dynamics
+    body, old = part.model.body, part.old
+    way, dynamics = part.new.u - old.u, body.dynamics
     held = np.array([0.5 * body.drag_dissipation(old.u + s * way) for s in PLACES])
-    if dynamics is not None and dynamics.step > 0.0:
-        held = held + 0.5 * dynamics.damping(new.u) * PLACES**2
-        if dynamics.branches is not None:
-            held = held + [dynamics.branches.potential(old.u + s * way) for s in PLACES]
-        speed = way / dynamics.step
-        held = held + [dynamics.kinetic_energy(s * speed - old.velocity) for s in PLACES]
+    if dynamics is not None:
+        held = held + dynamics.potential(old.u, way, PLACES)
     return held - held[0]
 
 

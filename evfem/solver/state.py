@@ -10,11 +10,11 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import OPEN
 from evfem.solver.strategy import Strategy
-from evfem.tissue.dynamics import NO_BRANCHES
+from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES, Past
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
-#: drive, velocity and force of a hand where there is none
+#: what a hand keeps where there is none
 NO_HAND: Floats = np.zeros(0)
 #: the time since a node touched where nothing depends on it
 NO_AGE: Floats = np.zeros(0)
@@ -52,9 +52,10 @@ class State:
     the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
     pressure as an unknown, that (E, Q) in MPa (`evfem.solver.pressure`). With a law of friction other than
-    Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
-    (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. Maxwell
-    branches keep `inner` (`evfem.tissue.branches`).
+    Coulomb's `age` (P,) in s; with a hand what it keeps, `hand` (6,) (`evfem.solver.hand`); under a voltage
+    resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
+    (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
+    `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`).
     """
 
     u: Floats
@@ -71,6 +72,13 @@ class State:
     hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    rates: Floats = field(default_factory=lambda: NO_RATES)
+    seconds: float = 0.0
+
+    @property
+    def past(self) -> Past:
+        """The part that led here, as the next one counts it."""
+        return Past(self.seconds, self.rates)
 
     @property
     def touching(self) -> Any:
@@ -82,8 +90,8 @@ class State:
 class TangentPoint:
     """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,) when the
     step began, whether the attraction was frozen, the time step's displacements at its beginning (N, dim) and
-    its seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, and
-    what branches kept when the step began.
+    its seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, what branches
+    kept when the step began, and mean rates and seconds of the part before.
     """
 
     u: Floats
@@ -95,6 +103,8 @@ class TangentPoint:
     status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    rates: Floats = field(default_factory=lambda: NO_RATES)
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
