@@ -384,16 +384,17 @@ class Target:
         """Whether the bone's translation is, to the last digit, what is known of it."""
         return bool((self.bone(bone) == bone).all())
 
-    def jumps(self, old: State, bone: int) -> bool:
-        """Whether a given speed on the way from `old`, of node `bone` or of the drive, is another one than in
-        the part before, or there is none.
+    def going_on(self, old: State, bone: int) -> State:
+        """`old` as the next part counts it: a given speed, of node `bone` or of the drive, that jumps on the way
+        to here begins anew.
         """
         if old.seconds == 0.0 or self.duration == 0.0:
-            return True
+            return old
         before, now = old.rates[0][bone].tolist(), ((self.bone(old.bone) - old.bone) / self.duration).tolist()
         pairs = list(zip(before, now, strict=True))
         if self.height.free:
             del pairs[1]
         if self.hand is not None:
             pairs[0] = float(old.hand[3]), (self.x - float(old.hand[0])) / self.duration
-        return any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)
+        jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)
+        return replace(old, seconds=0.0) if jumps else old
