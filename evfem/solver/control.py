@@ -385,8 +385,8 @@ class Target:
         return bool((self.bone(bone) == bone).all())
 
     def going_on(self, old: State, bone: int) -> State:
-        """`old` as the next part counts it: a given speed, of node `bone` or of the drive, that jumps on the way
-        to here begins anew.
+        """`old` as the next part counts it: anew where a given speed, of node `bone` or of the drive, jumps on the
+        way to here.
         """
         if old.seconds == 0.0 or self.duration == 0.0:
             return old
