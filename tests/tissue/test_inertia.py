@@ -10,8 +10,8 @@ from tools.grids import rectangle, solve, tangent_of
 from tools.meshes import block
 
 import evfem as ev
+from evfem.newton.control import Force, GivenVoltage, Target
 from evfem.simulation.model import make_model
-from evfem.solver.control import Force, GivenVoltage, Target
 from evfem.tissue.dynamics import Difference, Dynamics, Past, make_dynamics
 from evfem.tissue.laws import NeoHookean
 from evfem.tissue.weakform import Tissue

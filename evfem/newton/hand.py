@@ -27,7 +27,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, check_fields, number
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
-from evfem.solver.state import State
+from evfem.newton.state import State
 from evfem.tissue.dynamics import Difference
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
@@ -102,7 +102,7 @@ AT_REST: Floats = np.zeros(6)
 
 
 @dataclass(frozen=True)
-class Grip:
+class HandControl:
     """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s), and
     their mean rates over the part before, which the step's `difference` may count.
     """
@@ -114,12 +114,12 @@ class Grip:
     rates: tuple[float, float, float] = (0.0, 0.0, 0.0)
     difference: Difference = field(default_factory=Difference)
 
-    def begun(self, old: State, drive: float, duration: float) -> Grip:
+    def begun(self, old: State, drive: float, duration: float) -> HandControl:
         """In the step from `old` that takes the drive to x = `drive`."""
         before = (float(old.hand[0]), float(old.bone[0]), float(old.hand[1]))
         along, moved, faster = old.hand[3:].tolist()
         difference = Difference.over(duration, old.seconds)
-        return Grip(self.hand, drive, duration, before, (along, moved, faster), difference)
+        return HandControl(self.hand, drive, duration, before, (along, moved, faster), difference)
 
     def _rate(self, number: int, end: float) -> float:
         """Rate at the end of the step of one of the three that were `before`."""
@@ -135,7 +135,7 @@ class Grip:
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
 
     @property
-    def way(self) -> float:
+    def increment(self) -> float:
         """Displacement of the bone if nothing changes (mm)."""
         return self.before[2] * self.duration
 
