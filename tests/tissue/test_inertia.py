@@ -11,6 +11,7 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.newton.control import Force, GivenVoltage, Target
+from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.model import make_model
 from evfem.tissue.dynamics import Difference, Dynamics, Past, make_dynamics
 from evfem.tissue.laws import NeoHookean
@@ -231,3 +232,44 @@ def test_a_bar_that_hits_a_wall_is_in_contact_for_two_crossings_and_rebounds(sha
     assert energy.max() < 1.0 + 1e-12
     assert energy[-1] > 0.95
     assert bar.state.velocity[:, 1].mean() / bar.SPEED == pytest.approx(1.0, abs=0.05 * share)
+
+
+def slid(way, hand=None):
+    """A round block of heavy tissue that is pressed, slides along +x or -x, and waits."""
+    law = ev.NeoHookean(E=0.1, nu=0.4, density=1e-6, relaxation=((0.5, 2e-3),))
+    finger = ev.MeshedFinger(block(8, 3, sag=0.4), {"tissue": law}, viscosity=1e-3)
+    motion = [
+        ev.Press(indentation=0.2, steps=4, speed=100.0),
+        ev.Slide(0.3 * way, steps=6, speed=50.0, hold="force"),
+        ev.Wait(0.02, steps=6, spacing="log", hold="force"),
+    ]
+    solver = ev.Solver(dynamics="inertial", tolerance=1e-10)
+    return ev.Scene(finger, ev.Flat(friction=0.4), motion=motion, solver=solver, hand=hand)
+
+
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
+@pytest.mark.parametrize("hand", [None, ev.Hand(0.2, 1e-4, 1e-7)], ids=["", "hand"])
+def test_a_mirrored_run_is_the_mirror_image(hand):
+    right, left = (ev.simulate(slid(way, hand)) for way in (1.0, -1.0))
+    for name in ("applied_force", "kinetic_energy", "integrator_dissipation"):
+        most = np.abs(right[name]).max()
+        np.testing.assert_allclose(left[name], right[name], atol=1e-7 * most, err_msg=name)
+    np.testing.assert_allclose(left.position, -right.position, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
+@pytest.mark.parametrize("step", [2, 4, 7, 13])
+def test_a_resumed_run_gives_the_same_numbers(step, tmp_path):
+    """In the middle of a motion, where the part before counts, and between two, to the last digit."""
+    scene, kept = slid(1.0, ev.Hand(0.2, 1e-4, 1e-7)), []
+
+    class Keeper:
+        def step(self, row, frame, checkpoint):
+            kept.append(checkpoint())
+
+    whole = ev.simulate(scene, observers=[Keeper()])
+    file = Checkpoint(tmp_path / "checkpoint.npz")
+    file.write(scene.digest(), kept[step - 1], whole.rows[:step])
+    again = ev.simulate(scene, resume=file.read(scene.digest()))
+    for name in ("applied_force", "applied_tangential_force", "kinetic_energy", "integrator_dissipation"):
+        np.testing.assert_array_equal(again[name], whole[name], err_msg=name)
