@@ -3,11 +3,11 @@ r"""Whether the finger could get from one equilibrium to the next without climbi
 A part leads from u_0 to u_1. With the loads of its END held it has the potential
 
 .. math:: \Phi(u) = \psi(u) - W_e(u_0 \to u;\,U_1) - r_1\cdot(b - b_0) + D_f(\lambda_1)
-          + \tfrac{1}{2} D_v(u - u_0) + \tfrac{1}{2}\,|u - u_0 - h v_0|^2_M / h^2 ,
+          + \Phi_t(u) ,
 
 of which u_1 is a stationary point: tissue and springs, attraction, the reaction on the bone, friction under
-the contact forces of the end, and of a step in time its viscosity, drag and inertia, as backward Euler has
-them. Where it is convex it falls all along the straight way from u_0 to u_1, however long the part, whatever
+the contact forces of the end, and of a step in time viscosity, branches, drag and inertia
+(`evfem.tissue.dynamics`, its potential). Where it is convex it falls all along the straight way from u_0 to u_1, however long the part, whatever
 slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations have come to u_1 over it,
 the body never would. The reverse does not hold: of several equilibria some may all lie downhill.
 
@@ -102,7 +102,7 @@ def _lifted(part: SubstepWork) -> Floats:
 
 
 def _in_time(part: SubstepWork) -> Floats:
-    """Drag, viscosity and inertia as potentials of an implicit step; drag counts from the release."""
+    """The potential of what time adds to the forces; drag counts from the release."""
     body, old = part.model.body, part.old
     way, dynamics = part.new.u - old.u, body.dynamics
     held = np.array([0.5 * body.drag_dissipation(old.u + s * way) for s in PLACES])
