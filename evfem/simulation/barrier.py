@@ -6,10 +6,11 @@ A part leads from u_0 to u_1. With the loads of its END held it has the potentia
           + \Phi_t(u) ,
 
 of which u_1 is a stationary point: tissue and springs, attraction, the reaction on the bone, friction under
-the contact forces of the end, and of a step in time viscosity, branches, drag and inertia
-(`evfem.tissue.dynamics`, its potential). Where it is convex it falls all along the straight way from u_0 to u_1, however long the part, whatever
-slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations have come to u_1 over it,
-the body never would. The reverse does not hold: of several equilibria some may all lie downhill.
+the contact forces of the end, and of a step in time :math:`\Phi_t` of viscosity, branches, drag and inertia
+(`evfem.tissue.dynamics`). Where it is convex it falls all along the straight way from u_0 to u_1, however
+long the part, whatever slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations
+have come to u_1 over it, the body never would. The reverse does not hold: of several equilibria some may all
+lie downhill.
 
 A bone that is held and not loaded has its place at the end already: nodes that do not touch at both ends
 begin where it carries them. Nodes that touch at both ends follow the surface, not the chord; to first

@@ -23,9 +23,9 @@ The history has
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
-- ``viscous_dissipation`` :math:`D_v = \int 2\eta|\Delta E|^2/\Delta t`, never negative, and what Maxwell branches
-  lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after which
-  they are at rest, loses all of it.
+- ``viscous_dissipation`` :math:`D_v = \int 2\eta|\Delta E|^2/\Delta t`, never negative, and what Maxwell
+  branches lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after
+  which they are at rest, loses all of it.
 
 Their difference is computed term by term without the work of the bone, so the balance is a check
 that the forces of the accepted states are in equilibrium:

@@ -40,7 +40,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
-from evfem.tissue.branches import Branches, branches_of
+from evfem.tissue.branches import Branches, branches_of, make_branches
 from evfem.tissue.forms import Parts, deformation_gradient, green_strain, kelvin_voigt, mass
 from evfem.tissue.kernels.blocks import LANES, loops, padded
 from evfem.tissue.laws import split
@@ -383,5 +383,5 @@ def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str)
     rows = branches_of(space, laws, finger)
     if not (eta.any() or rows or kind.inertia):
         return None
-    branches = Branches(space, rows) if rows else None
+    branches = make_branches(space, rows) if rows else None
     return kind(space, eta if eta.any() else None, density if kind.inertia else None, branches)
