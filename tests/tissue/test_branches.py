@@ -199,8 +199,8 @@ TWINS = ("q1", "q1_fbar", "q2", "q2p1", "p2", "hex8", "hex27p1")
 
 @pytest.mark.parametrize("element", TWINS)
 def test_compiled_loops_are_the_twins_of_the_form(element):
-    """Through three steps of very different lengths: what they keep, forces, tangent, energy, loss, potential;
-    a region without branches has none.
+    """Through three steps of very different lengths, with a region that has no branches: forces, tangent,
+    what is kept, energy, loss, potential.
     """
     if element.startswith("hex"):
         space = box(element, (2, 1, 2))
@@ -238,8 +238,7 @@ def test_loops_refuse_arrays_of_other_cells():
     compiled = make_branches(space, branches_of(space, {"lower": tissue(relaxation=SKIN)}, SimpleNamespace()))
     u = np.zeros((space.size, 2))
     compiled.begin(u, compiled.at_rest, 0.1)
-    whole = compiled.loops, compiled.space.cells, compiled._modulus, compiled._before
-    loops, cells, modulus, before = whole
+    loops, cells, modulus, before = compiled.loops, space.cells, compiled._modulus, compiled._before
     for wrong in (
         (modulus[:, :2], before),
         (modulus, before[..., :4, :].copy()),
