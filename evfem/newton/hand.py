@@ -9,7 +9,7 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
 
 by backward Euler; beside tissue with mass by its differences of second order
 (`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts
-and the bone comes to rest. Across the slide, the bone's height stays what the motion says.
+and the bone comes to rest. Across the slide, the motion prescribes the bone's height.
 
 Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
 100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
@@ -151,7 +151,7 @@ class HandControl:
         return force
 
     def force(self, x: float) -> float:
-        """What of it comes to the bone (N/mm), the mass taken off."""
+        """Force on the bone (N/mm): that of the drive minus the inertia of the mass."""
         force = self.driving(x)
         if self.duration > 0.0:
             force -= self.hand.mass * self._rate(2, self.velocity(x))
