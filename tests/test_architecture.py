@@ -19,7 +19,7 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
+        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray"},
         "arrays constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
@@ -106,6 +106,7 @@ LATE = {
     "distributed",
     "pyarrow",
     "pandas",
+    "xarray",
     "SurfaceTopography",
 }
 #: compiled from C, without imports
