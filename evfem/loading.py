@@ -11,8 +11,8 @@ from evfem.errors import InputError
 
 Found = Any  # Result, FitResult, VoltageProfile, Sampled, Scene, Sweep, SweepResult, Mesh or Texture
 ALLOWED = (
-    "the folder of a run or a sweep, a result (.npz), a fit (.json), a signal (.csv, .wav), a scene or a "
-    "sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
+    "the folder of a run or a sweep, a result (.npz), a fit (.json), a signal (.csv, .wav, .hjif), a scene "
+    "or a sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
 )
 #: format of the fast models that 0.2 saved
 FAST_MODEL = "evfem-reduced-1"
@@ -35,7 +35,7 @@ def load(path: str | Path) -> Found:
     SweepResult
         From the folder of a sweep, its `sweep.json`, or a csv file with its table.
     VoltageProfile, Sampled
-        From .csv or .wav; `Sampled` from a .csv over time.
+        From .csv, .wav or .hjif; `Sampled` from a .csv over time.
     Scene, Sweep
         From .toml.
     Mesh
@@ -133,6 +133,7 @@ READERS: Mapping[str, Callable[[Path], Found]] = {
     ".csv": _signal,
     ".json": _fit,
     ".wav": _signal,
+    ".hjif": _signal,
     ".toml": _tables,
     ".vtu": _mesh,
     ".msh": _mesh,
