@@ -39,7 +39,7 @@ def load(path: str | Path) -> Found:
     Scene, Sweep
         From .toml.
     Mesh
-        From .vtu or .msh.
+        From .vtu, .msh or another format of meshio's.
 
     Raises
     ------
@@ -102,7 +102,16 @@ def _signal(path: Path) -> Found:
     from evfem.electrostatics.signalfile import read_voltage
     from evfem.sweeps import table
 
-    return table.read(path) if table.is_table(path) else read_voltage(path)
+    if table.is_table(path):
+        return table.read(path)
+    try:
+        return read_voltage(path)
+    except InputError as error:
+        if path.suffix.lower() != ".csv":
+            raise
+        allowed = "a voltage (position,voltage or time,voltage) or the table of a sweep; measurements: "
+        allowed += "`ev.MeasuredCurve.from_csv`, heights and friction: `evfem texture import`"
+        raise InputError("path", error.given, allowed) from None
 
 
 def _tables(path: Path) -> Found:
@@ -135,6 +144,5 @@ READERS: Mapping[str, Callable[[Path], Found]] = {
     ".wav": _signal,
     ".hjif": _signal,
     ".toml": _tables,
-    ".vtu": _mesh,
-    ".msh": _mesh,
+    **dict.fromkeys((".vtu", ".msh", ".inp", ".med", ".e", ".exo", ".xdmf", ".vtk", ".mesh", ".bdf"), _mesh),
 }

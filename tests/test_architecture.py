@@ -325,5 +325,7 @@ def test_every_public_name_can_be_loaded_and_is_listed():
     for name in evfem.__all__:
         assert getattr(evfem, name) is not None
     assert set(evfem.__all__) <= set(dir(evfem))
-    with pytest.raises(AttributeError, match="no attribute 'pinger'"):
+    with pytest.raises(AttributeError, match=r"no attribute 'pinger'"):
         evfem.pinger  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'FingerPd'; did you mean FingerPad\?"):
+        evfem.FingerPd  # noqa: B018
