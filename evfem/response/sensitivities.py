@@ -247,6 +247,11 @@ class Sensitivities:
         return self.values[column, parameter]
 
     @property
+    def warnings(self) -> Sequence[str]:
+        """The warnings of the run."""
+        return self.result.warnings
+
+    @property
     def elasticity(self) -> Elasticity:
         """d ln column / d ln parameter (steps,) by column and parameter; nan where the column is 0."""
         return Elasticity(self)
