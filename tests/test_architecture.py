@@ -67,11 +67,11 @@ ROOMS = {
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
-    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities"),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
         "samples file folder table run check",
     ),
+    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities uncertainty design"),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
