@@ -1,4 +1,4 @@
-"""What is reported of a run: a row per requested step, works and energies (`works`), fields."""
+"""Reports of a run: a row per requested step, works and energies (`works`), fields."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Ledger:
     came_off: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
     def accept(self, old: State, new: State) -> bool:
-        """Add the works of one converged part; says whether stability was lost in it."""
+        """Adds the works of one converged part; returns whether stability was lost in it."""
         part = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
         self._watch(old, new)
         begin = self.end or Books.nothing(old.u.shape)
@@ -73,8 +73,8 @@ class Ledger:
         assert end is not None
         if self.let_go:
             self.came_off, self.let_go = np.vstack([self.came_off, [step, self.let_go]]), 0.0
-        position = model.equilibrium.places(state)
-        contact = model.equilibrium.contact_forces(state).sum(axis=0)
+        position = model.equilibrium.interface.places(state)
+        contact = model.equilibrium.interface.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
         adhesion, kept = self._adhesion(state, withheld)
@@ -138,7 +138,7 @@ class Ledger:
 
 
 def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
-    """How much of the pad touches, mm or mm2, and the columns that say so, in space those along z too."""
+    """Columns of the widths or areas of contact, mm or mm2, in space those along z too."""
     pressure = state.contact_force[:, 0] / shares(model, position)
     gap = surface_state(model.surface, position).normal_gap
     at = reach(gap, pressure, model.pad.spacing_at(position), model.shear_modulus)
@@ -169,8 +169,8 @@ def _positive(share: Floats) -> Floats:
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
-    size, nodes = model.body.space.size, model.pad.nodes
-    position, withheld = model.equilibrium.places(state), model.equilibrium.interface.withheld(state)
+    size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
+    position, withheld = interface.places(state), interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
     pulled = share if model.attraction is None else _positive(model.attraction.weights(position))

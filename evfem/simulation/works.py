@@ -24,9 +24,9 @@ The history has
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
-- ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative, and what Maxwell branches
-  lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after which
-  they are at rest, loses all of it.
+- ``viscous_dissipation`` :math:`D_v = \int 2\eta|\Delta E|^2/\Delta t`, never negative, and what Maxwell
+  branches lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after
+  which they are at rest, loses all of it.
 
 Their difference is computed term by term without the work of the bone, so the balance is a check
 that the forces of the accepted states are in equilibrium:
@@ -34,9 +34,9 @@ that the forces of the accepted states are in equilibrium:
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
           + (W_e - \bar f_e\cdot\Delta u) + W_t .
 
-What tissue and backward Euler lose on the way, the work of nodes that land, leave or begin to slip, and what
-the way adds to the attraction's work. Over a motion the sum falls with the square of the step, in time with
-the step, and is ``integrator_dissipation``.
+What tissue and backward differences lose on the way, the work of nodes that land, leave or begin to slip, and
+what the way adds to the attraction's work. Over a motion the sum falls with the square of the step, in time
+without inertia with the step, and is ``integrator_dissipation``.
 
 A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
 where time stops), and the end is far away however small the part. Then L does not fall with the step. It is
@@ -118,7 +118,7 @@ class Books:
 
 
 def tells_source(model: Model) -> bool:
-    """Whether the source's work is told: under a voltage resolved in time and Strong and Troxel's law."""
+    """Whether the source's work is computed: for a voltage resolved in time and Strong and Troxel's law."""
     attraction = model.attraction
     if attraction is None or attraction.charging is None:
         return False
@@ -174,7 +174,7 @@ class SubstepWork:
         return dict(zip(SUMS, added, strict=True))
 
     def _turned(self) -> float:
-        """What the bone gives beyond the trapezoid where nodes begin to slip: their shear force changes while
+        """Work of the bone beyond the trapezoid where nodes begin to slip: their shear force changes while
         they stick, and stays while they slip.
         """
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
@@ -259,7 +259,7 @@ class SubstepWork:
             charging.begin(begin, seconds)
 
     def _flow(self) -> Flow:
-        """What the source gave, and what leaked; the first voltage is raised before anything moves."""
+        """Work of the source and leakage; the first voltage is raised before anything moves."""
         attraction, new = self.model.attraction, self.new
         assert attraction is not None
         assert attraction.charging is not None
@@ -338,7 +338,7 @@ class SubstepWork:
     @cached_property
     def x(self) -> tuple[Floats, Floats]:
         """x of the pad nodes (P,) before and after."""
-        x0, x1 = (self.model.equilibrium.places(state)[:, 0] for state in (self.old, self.new))
+        x0, x1 = (self.model.equilibrium.interface.places(state)[:, 0] for state in (self.old, self.new))
         return x0, x1
 
     @cached_property
@@ -359,7 +359,7 @@ class SubstepWork:
     @property
     def _on_surface(self) -> tuple[Floats, Floats]:
         """Forces between finger and surface (P, dim) before and after."""
-        contact = self.model.equilibrium.contact_forces
+        contact = self.model.equilibrium.interface.contact_forces
         before, after = (contact(state) + state.attraction for state in (self.old, self.new))
         return before, after
 
@@ -402,7 +402,7 @@ class SubstepWork:
     def _contact(self) -> float:
         """Trapezoidal work of the contact forces, N mm per mm of depth."""
         equilibrium = self.model.equilibrium
-        before, after = (equilibrium.contact_forces(state) for state in (self.old, self.new))
+        before, after = (equilibrium.interface.contact_forces(state) for state in (self.old, self.new))
         return _mean_work(before, after, self.way)
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
@@ -428,7 +428,7 @@ class SubstepWork:
         if model.attraction is not None:
             at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
             work += float(np.sum((at[1] - at[0]) * along))
-        x = model.equilibrium.places(carried)[:, 0]
+        x = model.equilibrium.interface.places(carried)[:, 0]
         less = self._coefficient(x) - self._coefficient(self.x[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 

@@ -134,9 +134,9 @@ def adhesion_of(key: str, given: Any) -> Any:
 
 
 class Softened:
-    """`law` for faces shut at `closed` (mm), with a line of the same work where it falls faster than `steepest`
-    (MPa/mm, a number or one for each node). Its methods take the strength in the place of a voltage, as force
-    laws do.
+    """`law` for faces shut at `closed` (mm), with a line of the same work where it falls faster than
+    `steepest` (MPa/mm, a number or one for each node). Its methods take the strength in the place of a
+    voltage, as force laws do.
     """
 
     def __init__(self, law: Any, closed: float, steepest: Values) -> None:

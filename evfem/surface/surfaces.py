@@ -67,7 +67,7 @@ GivesWay = Annotated[Elastic | None, {"check": lambda key, given: elastic_of(giv
 
 
 class RigidSurface(Checked):
-    """What surfaces share; subclasses are frozen dataclasses with these fields."""
+    """Base of surfaces; subclasses are frozen dataclasses with these fields."""
 
     friction: float | Rows
     y: float | None
