@@ -226,8 +226,8 @@ def test_a_surface_that_is_strained_too_much_is_told():
 
 
 def test_a_clutch_of_two_strips():
-    """Strips of EA 0.5 and 0.3 N per mm of width, 12 mm long, drawn apart under a drag t = mu p: both slip from
-    their loaded ends over F EA2/((EA1 + EA2) t) and F EA1/((EA1 + EA2) t), and all slip at F = t L.
+    """Strips of EA 0.5 and 0.3 N per mm of width, 12 mm long, drawn apart under a drag t = mu p: both slip
+    from their loaded ends over F EA2/((EA1 + EA2) t) and F EA1/((EA1 + EA2) t), and all slip at F = t L.
     """
     first, second, length, number, drag = 0.5, 0.3, 12.0, 48, 0.3 * 0.005
 
