@@ -57,6 +57,8 @@ from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file
 from evfem.mesh.mesh import Mesh as Mesh
 from evfem.planning.plan import plan as plan
+from evfem.response.impedance import Impedance as Impedance
+from evfem.response.impedance import impedance as impedance
 from evfem.scene import file as _scene_file
 from evfem.scene.motion import Hover as Hover
 from evfem.scene.motion import Press as Press

@@ -71,6 +71,7 @@ ROOMS = {
         "samples file folder run check",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
+    "response": ({"numpy", "scipy"}, "impedance"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
         "texture generate library importing importers",

@@ -22,7 +22,7 @@ measure in the same way, with the pressure :math:`K_i(\theta - \theta_v)`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
@@ -136,6 +136,21 @@ class Branches:
         """Add the tangent to the `data` of a pattern."""
         if self.step > 0.0:
             self.integral.add_tangent(u - u[:1], pattern, data)
+
+    def at_once(self, u: Floats, pattern: Pattern) -> dict[float, Floats]:
+        """By relaxation time (s), the tangents at u (N, dim) of branches that are at rest there, to changes
+        faster than they relax: added up like `Pattern.zeros`.
+        """
+        bar, theta = self._strain(u)
+        found = {}
+        for time in np.unique(self.time[self.shear > 0.0]):
+            shear, bulk = ((each * (self.time == time)).sum(axis=0) for each in (self.shear, self.bulk))
+            rest = {"before": bar[:, :, None], "share": 0.0, "theta_before": theta, "theta_share": 0.0}
+            branch = SimpleNamespace(shear=shear, bulk=bulk, **rest)
+            w = SimpleNamespace(branches=[branch], has_bulk=self.integral.parts.theta)
+            found[float(time)] = pattern.zeros()
+            replace(self.integral, w=w).add_tangent(u - u[:1], pattern, found[float(time)])
+        return found
 
     def inner(self, u: Floats) -> Floats:
         """`inner` at the end of a step that ends at u (N, dim)."""

@@ -1,0 +1,1 @@
+"""What a scene answers to small changes about its state: stiffness over the frequency."""
