@@ -192,9 +192,11 @@ class LinearSystem:
             A = A + (1j * omega * time / (1.0 + 1j * omega * time)) * matrix
         A = A.tocsc()
         free = A.shape[0] - way.size
-        lu = splu(A[:free, :free], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        moved = lu.solve(-(A[:free, free:] @ way))
-        return complex(way @ (A[free:, :free] @ moved + A[free:, free:] @ way))
+        force = A[free:, free:] @ way
+        if free:  # a single row of cells between bone and nodes that stick has none
+            lu = splu(A[:free, :free], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+            force = force - A[free:, :free] @ lu.solve(A[:free, free:] @ way)
+        return complex(way @ force)
 
 
 def linearised(model: Model, state: State) -> LinearSystem:
