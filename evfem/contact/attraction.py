@@ -77,8 +77,8 @@ class Attraction:
         """Charges (M, P) of an uncharged pad, (2, 0) where charges do not move."""
         return np.zeros((2, 0)) if self.charging is None else self.charging.none
 
-    def _seen(self, gap: Any, voltage: float, position: Floats) -> Any:
-        """The voltage that the law sees at gaps (P,) of nodes at (P, dim): that of the charges, too."""
+    def _voltages(self, gap: Any, voltage: float, position: Floats) -> Any:
+        """Effective voltage at gaps (P,) of nodes at (P, dim), with that of the charges."""
         if self.charging is None:
             return voltage
         return self.charging.effective(gap, voltage, self.pad.tributary(position))
@@ -128,7 +128,7 @@ class Attraction:
         gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1])
         gaps = gaps + self._separation(positions, pressing)
         at = zip(gaps, voltages.tolist(), positions, strict=True)
-        pairs = [(gap, self._seen(gap, u, position)) for gap, u, position in at]
+        pairs = [(gap, self._voltages(gap, u, position)) for gap, u, position in at]
         on = 1.0 if self.air_layer else touching.astype(float)
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
         weight = on * pressure * self.pad.tributary(positions)
@@ -208,7 +208,7 @@ class Attraction:
         if self.charging is None:
             return traction_derivative(self.law, apart, voltage, self.layers)
         law = self.law
-        seen = lambda g: law.traction(g, self._seen(g, voltage, position), self.layers)  # noqa: E731
+        seen = lambda g: law.traction(g, self._voltages(g, voltage, position), self.layers)  # noqa: E731
         return derivative(seen, apart, GAP_STEP)
 
     def stiffness(
@@ -219,7 +219,7 @@ class Attraction:
         frame = surface_state(self.surface, position)
         on = 1.0 if self.air_layer else touching.astype(float)
         apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
-        p = on * self.law.traction(apart, self._seen(apart, voltage, position), self.layers)
+        p = on * self.law.traction(apart, self._voltages(apart, voltage, position), self.layers)
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)

@@ -14,8 +14,8 @@ Algorithm (`LinearContactStep.solve`)::
     repeat
         solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included
         displacements <- free + C (forces on `near`)
-        hit <- other candidates that have penetrated; stop if there are none
-        near <- near and hit
+        penetrated <- other candidates that have penetrated; stop if there are none
+        near <- near and penetrated
 """
 
 from __future__ import annotations
@@ -233,10 +233,10 @@ class LinearContactStep:
             moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
             gap = normal_gap + self._along_normal(moved)
             gap[near] = 0.0  # the dense problem has settled theirs
-            hit = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
-            if not hit.size:
+            penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
+            if not penetrated.size:
                 break
-            near = np.union1d(near, hit)
+            near = np.union1d(near, penetrated)
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
         own = np.diagonal(self.body.compliance)[0 :: self.body.dim]

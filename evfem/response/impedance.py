@@ -7,9 +7,9 @@ The state is the last one of a scene whose tissue is at rest in every step. Smal
           - K_{el} - K_c\Bigr] u = f ,
 
 with the tangent K of tissue at rest, the tangents :math:`K_i` of its Maxwell branches to fast changes, C of
-its Kelvin-Voigt viscosity, its mass M, and the attraction's stiffness :math:`K_{el}`. Nodes that stick do not
-move, those that slip move along the surface: with their displacement s along the tangent t their contact force
-changes by
+its Kelvin-Voigt viscosity, its mass M, and the stiffness of attraction :math:`K_{el}` and of contact forces
+:math:`K_c`. Nodes that stick do not move, those that slip move along the surface: with their displacement s
+along the tangent t their contact force changes by
 
 .. math:: d\lambda = d\lambda_n\,(n + b'e) + \bigl[\phi'(\lambda_t n - \lambda_n t)
           + b_\mu\mu'\,e\bigr]dx - b_v\,(e\cdot i\omega s)\,e - \frac{b}{v}\,i\omega s_\perp ,
@@ -23,7 +23,6 @@ one that slides on: the motion is smaller than what it slides in a period.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,11 +34,11 @@ from evfem.common.pools import blas_limits
 from evfem.contact.signorini import FORWARD, STICK, sizes
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, quoted
+from evfem.newton.state import State
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.simulation.result import Result
 from evfem.simulation.run import Run
-from evfem.solver.state import State
 from evfem.tensor import derivative
 from evfem.tissue.dynamics import Dynamics, make_dynamics
 
@@ -149,7 +148,9 @@ def _scene_of(source: Any) -> Scene:
     resolved = source.drive is not None and source.drive.resolved
     if resolved or isinstance(source.electrics.voltage, (ChargeControl, OpenCircuit)):
         given = "a drive that is resolved in time" if resolved else "a given charge"
-        raise InputError("source", given, 'a scene with a given voltage, and drive = "mean" where it alternates')
+        raise InputError(
+            "source", given, 'a scene with a given voltage, and drive = "mean" where it alternates'
+        )
     return source
 
 
@@ -204,7 +205,7 @@ def linearised(model: Model, state: State) -> LinearSystem:
     body, finger = model.body, model.scene.finger
     pattern, contact = body.pattern, Contact(model, state)
     terms = make_dynamics(body.space, finger.materials, finger, "inertial")
-    assert terms is not None
+    assert terms is not None and terms.mass is not None
 
     def reduced(matrix: Any) -> Any:
         return contact.onto @ matrix @ contact.along
@@ -271,9 +272,10 @@ class Contact:
             by_mu, by_speed = found.by_mu, found.by_speed
             by_normal = derivative(lambda N: replace(seen, normal=N).bound(law), normal, FORCE_STEP)
             by_length = derivative(lambda A: replace(seen, length=A).bound(law), seen.length, LENGTH_STEP)
-        each = (bound, by_normal, by_mu * interface.surface.friction_slope(x), by_speed, by_length, speed)
-        each = tuple(np.where(self.slips, value, 0.0) for value in each)
-        self.bound, self.by_normal, self.by_place, self.by_speed, self.by_length, self.speed = each
+        by_place = by_mu * interface.surface.friction_slope(x)
+        each = (bound, by_normal, by_place, by_speed, by_length, speed)
+        of_slips = (np.where(self.slips, value, 0.0) for value in each)
+        self.bound, self.by_normal, self.by_place, self.by_speed, self.by_length, self.speed = of_slips
 
     def _felt(self) -> Floats:
         """What the body feels of touching nodes that are pressed with 1 more, (k, dim) along n and t."""
@@ -295,7 +297,8 @@ class Contact:
     def _attraction(self) -> Any:
         import scipy.sparse as sparse
 
-        attraction, state = self.model.attraction, self.state
+        attraction: Any = self.model.attraction
+        state = self.state
         if attraction is None or not attraction.acts(state.voltage):
             return sparse.csr_matrix((self.size, self.size))
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
@@ -365,7 +368,9 @@ class Contact:
         if self.dim == 3:
             tangents = self.axes[:, 1:]
             across = np.einsum("kai,kaj->kij", tangents, tangents) - along
-            blocks += np.where(moves, self.bound / np.where(moves, self.speed, 1.0), 0.0)[:, None, None] * across
+            blocks += (
+                np.where(moves, self.bound / np.where(moves, self.speed, 1.0), 0.0)[:, None, None] * across
+            )
         return self._blocks(blocks)
 
     def _motions(self) -> tuple[Any, Any]:
@@ -383,9 +388,8 @@ class Contact:
         columns = np.repeat(np.arange(count), self.dim)
 
         def matrix(vectors: Floats) -> Any:
-            free = (np.ones(kept.size), (kept, count + np.arange(kept.size)))
-            values, places = np.append(vectors.ravel(), free[0]), (rows, columns)
-            places = tuple(np.append(a, b) for a, b in zip(places, free[1], strict=True))
+            values = np.append(vectors.ravel(), np.ones(kept.size))
+            places = np.append(rows, kept), np.append(columns, count + np.arange(kept.size))
             return sparse.csr_matrix((values, places), (self.size, count + kept.size))
 
         return matrix(tangents), matrix(balanced).T.tocsr()

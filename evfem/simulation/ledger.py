@@ -10,11 +10,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.contact.signorini import FORWARD, OPEN
+from evfem.newton.state import State
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, Part, tells_source, unloaded
-from evfem.solver.state import State
+from evfem.simulation.works import Books, SubstepWork, tells_source, unloaded
 from evfem.surface.pad import Pad, reach, surface_state
 
 
@@ -28,7 +28,7 @@ class Ledger:
 
     def accept(self, old: State, new: State) -> bool:
         """Add the works of one converged part; says whether stability was lost in it."""
-        part = Part(self.model, old if self.end else unloaded(old), new)
+        part = SubstepWork(self.model, old if self.end else unloaded(old), new)
         begin = self.end or Books.nothing(old.u.shape)
         self.end = part.end()
         works = part.works(begin, self.end)

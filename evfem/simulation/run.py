@@ -21,6 +21,20 @@ from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
+from evfem.newton.control import (
+    FollowFriction,
+    Force,
+    GivenGap,
+    GivenVoltage,
+    HeightControl,
+    Indentation,
+    KeptCharge,
+    Target,
+    Unsupported,
+    VoltageControl,
+)
+from evfem.newton.hand import AT_REST, HandControl
+from evfem.newton.state import State, StepFailed
 from evfem.planning.pathdependence import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
@@ -41,21 +55,7 @@ from evfem.simulation.failure import advice, unheld
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
-from evfem.simulation.works import Part
-from evfem.solver.control import (
-    FollowFriction,
-    Force,
-    GivenGap,
-    GivenVoltage,
-    HeightControl,
-    Indentation,
-    KeptCharge,
-    Target,
-    Unsupported,
-    VoltageControl,
-)
-from evfem.solver.hand import AT_REST, Grip
-from evfem.solver.state import State, StepFailed
+from evfem.simulation.works import SubstepWork
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
 
@@ -169,7 +169,7 @@ class Run:
             scene.coupling,
             body=self.model.body,
             allowed=allowed_error(scene),
-            rise=lambda old, new, target: rise(Part(self.model, old, new), target),
+            rise=lambda old, new, target: rise(SubstepWork(self.model, old, new), target),
         )
         if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
@@ -240,9 +240,9 @@ class Run:
                 end = self._target(course, start, reached, now + seconds)
                 if first + k == 1 and not self._follows(seconds):
                     # the voltage acts in full; only a first step in parts raises it on the way
-                    begin = replace(begin, drive=GivenVoltage(0.0))
+                    begin = replace(begin, voltage=GivenVoltage(0.0))
                 if (kept := self._kept(now + seconds, now)) is not None:
-                    begin, end = (replace(one, drive=kept) for one in (begin, end))
+                    begin, end = (replace(one, voltage=kept) for one in (begin, end))
                 path = self._path(begin, end, now, seconds)
                 yield Request(first + k, index, motion.kind, path, seconds)
 
@@ -291,7 +291,7 @@ class Run:
         if isinstance(self.voltage, FollowForce) and course.distance:
             drive = self._following(self.voltage, position)
         along = position_z if bone.size == 3 else None
-        return Target(position, height, drive, z=along, hand=self._grip)
+        return Target(position, height, drive, z=along, hand=self._hand)
 
     def _loose(self, course: Course, start: dict[str, float], voltage: float, time: float) -> bool:
         """Whether a held force is that of any height: the finger is loose, not attracted at `time` (s)."""
@@ -302,8 +302,8 @@ class Run:
         return bool(start["loose"]) and voltage == 0.0
 
     @property
-    def _grip(self) -> Grip | None:
-        return None if self.scene.hand is None else Grip(self.scene.hand)
+    def _hand(self) -> HandControl | None:
+        return None if self.scene.hand is None else HandControl(self.scene.hand)
 
     @staticmethod
     def _following(wish: FollowForce, position: float) -> FollowFriction:
@@ -325,16 +325,16 @@ class Run:
 
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.scene.electrics.voltage
-            if isinstance(end.drive, KeptCharge):
-                return self._kept(begin + fraction * seconds, begin) or end.drive
-            if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
+            if isinstance(end.voltage, KeptCharge):
+                return self._kept(begin + fraction * seconds, begin) or end.voltage
+            if isinstance(wanted, FollowForce) and isinstance(end.voltage, FollowFriction):
                 return self._following(wanted, x)
-            if isinstance(end.drive, GivenGap):
-                gap = start.drive.gap if isinstance(start.drive, GivenGap) else end.drive.gap
-                return GivenGap(gap + fraction * (end.drive.gap - gap))
+            if isinstance(end.voltage, GivenGap):
+                gap = start.voltage.gap if isinstance(start.voltage, GivenGap) else end.voltage.gap
+                return GivenGap(gap + fraction * (end.voltage.gap - gap))
             if self._follows(seconds):
                 return GivenVoltage(self.voltage_at(x, begin + fraction * seconds))
-            first, last = start.drive.voltage, end.drive.voltage
+            first, last = start.voltage.voltage, end.voltage.voltage
             return GivenVoltage(first + fraction * (last - first))
 
         return target

@@ -49,9 +49,7 @@ def test_a_homogeneous_block_has_the_spectrum_of_its_branches():
 
 def pad(element, **more):
     laws = {name: replace(law, density=LIGHT) for name, law in ev.FingerPad().materials.items()}
-    finger = ev.FingerPad(
-        resolution="coarse", materials=laws, relaxation=SKIN, bulk_relaxation=True, **more
-    )
+    finger = ev.FingerPad(resolution="coarse", materials=laws, relaxation=SKIN, bulk_relaxation=True, **more)
     return ev.Scene(
         finger,
         ev.Flat(friction=50.0),
@@ -129,9 +127,7 @@ DISPLAY = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.
 
 def sliding(surface=DISPLAY, law=None, voltage=0.0, **more):
     finger = ev.FingerPad(ridges=False, resolution="coarse")
-    return ev.Scene(
-        finger, surface, law, voltage, [PRESSED, SLID], solver=ev.Solver(tolerance=1e-10), **more
-    )
+    return ev.Scene(finger, surface, law, voltage, [PRESSED, SLID], solver=ev.Solver(tolerance=1e-10), **more)
 
 
 def slope(scene, axis, h=1e-5):
@@ -142,7 +138,10 @@ def slope(scene, axis, h=1e-5):
         motion = [replace(press, indentation=press.indentation + change), slide]
         column = "applied_force"
         if axis == "tangential":
-            motion, column = [press, replace(slide, distance=slide.distance + change)], f"applied_{axis}_force"
+            motion, column = (
+                [press, replace(slide, distance=slide.distance + change)],
+                f"applied_{axis}_force",
+            )
         ends.append(ev.simulate(replace(scene, motion=motion))[column][-1])
     return (ends[1] - ends[0]) / (2.0 * h)
 
@@ -189,7 +188,9 @@ def test_penalties_give_way_under_a_finger_that_sticks_and_one_that_slips():
     soft = ev.Solver(element="q1", contact="penalty", penalty_normal=p, penalty_tangential=0.2 * p)
     found = ev.impedance(replace(rigid, solver=soft), 1e-9).stiffness[0].real
     assert found == pytest.approx(width / (1.0 / 0.034 + 1.0 / p), rel=1e-4)
-    stiff = replace(sliding(), solver=ev.Solver(contact="penalty", penalty_normal=1e6, penalty_tangential=1e6))
+    stiff = replace(
+        sliding(), solver=ev.Solver(contact="penalty", penalty_normal=1e6, penalty_tangential=1e6)
+    )
     assert ev.impedance(stiff, 1e-9).stiffness[0].real == pytest.approx(
         ev.impedance(sliding(), 1e-9).stiffness[0].real, rel=1e-4
     )
@@ -221,7 +222,9 @@ def test_a_small_vibration_in_time():
     for n in (10, 20):
         x = amplitude * np.sin(2.0 * np.pi * np.arange(6 * n + 1) / n)
         slides = [ev.Slide(d, speed=abs(d) * frequency * n, steps=1) for d in np.diff(x)]
-        run = replace(scene, motion=[*scene.motion, *slides], solver=replace(scene.solver, dynamics="viscous"))
+        run = replace(
+            scene, motion=[*scene.motion, *slides], solver=replace(scene.solver, dynamics="viscous")
+        )
         force = ev.simulate(run).applied_tangential_force[-n:]
         turned = np.exp(-2j * np.pi * np.arange(1, n + 1) / n)
         errors.append(abs(2j * (turned @ force) / n / amplitude / exact - 1.0))

@@ -1,4 +1,4 @@
-r"""The finger's finite elements in an equilibrium step (`evfem.solver.equilibrium`): factorise, solve
+r"""The finger's finite elements in an equilibrium step (`evfem.newton.equilibrium`): factorise, solve
 contact, move.
 
 Algorithm (`FactorisedBody.advance`), one outer iteration::
@@ -8,7 +8,7 @@ Algorithm (`FactorisedBody.advance`), one outer iteration::
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
-    next iterate <- Anderson's combination with those before (`evfem.solver.anderson`), unless it goes
+    next iterate <- Anderson's combination with those before (`evfem.newton.anderson`), unless it goes
         too far, or the attraction's negative stiffness had to be scaled down; a new tangent after an
         older one begins anew
 
@@ -23,8 +23,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
-    GROWING,
-    GROWN,
+    CANDIDATE_GROWTH,
+    CANDIDATE_ROUNDS,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
     REACH,
@@ -37,15 +37,23 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
-from evfem.electrostatics.signals import Seen
-from evfem.solver.anderson import Anderson
-from evfem.solver.control import Target, VoltageProblem
-from evfem.solver.findings import findings
-from evfem.solver.interface import Interface
-from evfem.solver.linearisation import Linearisation
-from evfem.solver.pressure import Pressure
-from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
-from evfem.solver.travel import Travel
+from evfem.electrostatics.signals import PadState
+from evfem.newton.anderson import Anderson
+from evfem.newton.control import Target, VoltageProblem
+from evfem.newton.interface import Interface
+from evfem.newton.linearisation import Linearisation
+from evfem.newton.pressure import Pressure
+from evfem.newton.state import (
+    NO_PRESSURE,
+    Balance,
+    Limits,
+    MixedBalance,
+    Reusable,
+    State,
+    StepFailed,
+    findings,
+)
+from evfem.newton.travel import Travel
 from evfem.tissue.body import Body
 
 
@@ -93,7 +101,7 @@ class FactorisedBody:
 
     def _first_guess(self, state: State, target: Target) -> State:
         """Where iterations begin: the last increment once more, or moved with the bone if nothing touches."""
-        state = replace(state, voltage=target.drive.guess(state.voltage))
+        state = replace(state, voltage=target.voltage.guess(state.voltage))
         if state.touching.any():
             return self._extrapolated(state, target)
         bone = target.bone(state.bone)
@@ -102,12 +110,12 @@ class FactorisedBody:
     def _extrapolated(self, state: State, target: Target) -> State:
         """As far along the last increment of the displacements as the bone's next one is along its last."""
         node = self.body.space.mesh.node_sets["bone"][0]
-        last, way = state.last_increment[node], target.way(state.bone)
-        axis = int(np.argmax(np.abs(way)))
+        last, ahead = state.last_increment[node], target.increment(state.bone)
+        axis = int(np.argmax(np.abs(ahead)))
         # where the bone turns off, its last increment along the new way is rounding of either sign
-        if way[axis] * last[axis] <= TURNED * way[axis] ** 2:
+        if ahead[axis] * last[axis] <= TURNED * ahead[axis] ** 2:
             return state
-        fraction = min(float(way[axis] / last[axis]), self.limits.strategy.reach)
+        fraction = min(float(ahead[axis] / last[axis]), self.limits.strategy.reach)
         u = state.u + fraction * state.last_increment
         if not self.body.tissue.smallest_J(u) > SMALLEST_J:
             return state
@@ -141,11 +149,11 @@ class FactorisedBody:
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
         dim = state.bone.size
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
-        missing = [target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction)]
+        missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
         if target.hand is not None:
             missing.append(target.hand.unbalanced(float(state.bone[0]), reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
-        return max(float(free / largest), target.drive.lacking(self._seen(state)))
+        return max(float(free / largest), target.voltage.lacking(self._pad_state(state)))
 
     def _rounding(self, state: State) -> float:
         """Forces (N/mm) below which the balance is rounding: of displacements, stresses and attraction."""
@@ -186,7 +194,7 @@ class FactorisedBody:
             return after
         bone = after.bone.copy()
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
-        voltage = mixed.voltage if target.drive.free else after.voltage
+        voltage = mixed.voltage if target.voltage.free else after.voltage
         if target.hand is not None:
             bone[0] = mixed.bone[0]
         return replace(mixed, bone=bone, voltage=voltage)
@@ -200,13 +208,13 @@ class FactorisedBody:
         """The next iterate; nodes that sank in become candidates, many of them start the way again."""
         if not self.interface.follows:
             return after
-        for _ in range(GROWING):
+        for _ in range(CANDIDATE_ROUNDS):
             known = self.linearisation.candidates.size
             gap = self.interface.shallowest_penetration(after)
             if gap is None:
                 break
-            self.admit(after, gap)
-            if self.linearisation.candidates.size < GROWN * known:
+            self.add_candidates(after, gap)
+            if self.linearisation.candidates.size < CANDIDATE_GROWTH * known:
                 break
             self.linearisation.factorise(state)
             self._anderson.reset()
@@ -216,9 +224,9 @@ class FactorisedBody:
     def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
         factor = self.linearisation.factor
-        saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
+        saved, residual = factor.forward(-balance.of_tangent(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
-        driven = target.drive.solve(step, self._problem(saved, state))
+        driven = target.voltage.solve(step, self._problem(saved, state))
         found, bone = self.travel.limited(step, driven.solution, state, target)
         if driven.change:
             saved = saved + driven.change * driven.unit
@@ -260,12 +268,12 @@ class FactorisedBody:
         self._scaled_down = found.reduced
         return found
 
-    def _seen(self, state: State) -> Seen:
-        return Seen.of(self.attraction, self.interface, state, self.linearisation.touching)
+    def _pad_state(self, state: State) -> PadState:
+        return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
 
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
         """What a voltage control has; `saved` is the residual's state for the backward solve."""
-        factor, seen, nodes = self.linearisation.factor, self._seen(state), self.pad.nodes
+        factor, pad, nodes = self.linearisation.factor, self._pad_state(state), self.pad.nodes
 
         def pushed(forces: Floats) -> tuple[Floats, Floats]:
             nodal = np.zeros_like(state.u)
@@ -278,8 +286,8 @@ class FactorisedBody:
             still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
             return row, still, own
 
-        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(seen.forces(KILOVOLT))
-        return VoltageProblem(squared, self._solve, unit, pushed, measured, seen)
+        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.forces(KILOVOLT))
+        return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""
@@ -289,7 +297,7 @@ class FactorisedBody:
         whole = fraction == 1.0 and not target.height.free and target.hand is None
         voltage = state.voltage
         if update.driven:
-            voltage = target.drive.after(voltage, fraction * update.driven)
+            voltage = target.voltage.after(voltage, fraction * update.driven)
         return replace(
             state,
             u=state.u + fraction * update.u,
@@ -320,7 +328,7 @@ class FactorisedBody:
         none, found = np.zeros(self.body.reduce(state.u).size), []
         for place in (state, ahead):
             step = self._contact_step(state, place, target, still)
-            also = target.drive.unknowns(step, self._problem(none, place))
+            also = target.voltage.unknowns(step, self._problem(none, place))
             found.append(stability_ratio(replace(step, unknowns=(*step.unknowns, *also))))
         return max(found, key=lambda one: one.ratio)
 
@@ -361,13 +369,13 @@ class FactorisedBody:
         state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
         return replace(state, pressure=NO_PRESSURE)
 
-    def admit(self, state: State, gap: float) -> None:
+    def add_candidates(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""
         self.linearisation.choose_candidates(state, max(0.0, gap))
 
-    def forget(self) -> None:
+    def discard(self) -> None:
         """Drop the factorisation, so that the next step starts from a fresh one."""
-        self.linearisation.forget()
+        self.linearisation.discard()
 
     def findings(self, state: State, balance: Balance) -> str:
         """The largest out-of-balance forces, the state of contact and the smallest volume ratio."""

@@ -6,7 +6,7 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
     state <- the body's first guess for the target
     repeat
         f <- attraction at the iterate (or frozen)
-        R, residual <- balance of the body, with the shares of the controls (`evfem.solver.control`)
+        R, residual <- balance of the body, with the shares of the controls (`evfem.newton.control`)
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
         give up if what would be accepted has an outline that crosses itself, or is not stable
@@ -14,7 +14,7 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
-The body is `evfem.solver.factorised.FactorisedBody`. Friction is counted from the last accepted
+The body is `evfem.newton.factorised.FactorisedBody`. Friction is counted from the last accepted
 state; nothing is committed before acceptance.
 """
 
@@ -29,12 +29,12 @@ from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import StabilityRatio
-from evfem.electrostatics.signals import Seen
-from evfem.solver.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
-from evfem.solver.factorised import FactorisedBody
-from evfem.solver.interface import Interface
-from evfem.solver.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
-from evfem.solver.strategy import stuck
+from evfem.electrostatics.signals import PadState
+from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
+from evfem.newton.factorised import FactorisedBody
+from evfem.newton.interface import Interface
+from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
+from evfem.newton.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
@@ -51,7 +51,7 @@ class Equilibrium:
         self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record
         self.tolerance, self.strategy = limits.tolerance, limits.strategy
-        self._seen: tuple[State, Balance] | None = None
+        self._iterate: tuple[State, Balance] | None = None
 
     def rest(self, bone: Floats, voltage: float) -> State:
         """The undeformed body, translated by `bone` (dim,)."""
@@ -86,12 +86,12 @@ class Equilibrium:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
+        return PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""
-        seen = Seen.of(self.attraction, self.interface, state, old.touching)
-        return GivenVoltage(target.drive.held(seen))
+        pad = PadState.of(self.attraction, self.interface, state, old.touching)
+        return GivenVoltage(target.voltage.held(pad))
 
     def step(
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
@@ -125,13 +125,13 @@ class Equilibrium:
         try:
             found = self._try(old, target, frozen, start)
         except StepFailed:
-            if target.drive.fallback(old, None) is None:
+            if target.voltage.fallback(old, None) is None:
                 raise
-        other = target.drive.fallback(old, found)
+        other = target.voltage.fallback(old, found)
         if found is not None and other is None:
             return found
         assert other is not None
-        held = self._try(old, replace(target, drive=other), frozen, start)
+        held = self._try(old, replace(target, voltage=other), frozen, start)
         if not sticks(held):
             raise StepFailed("the wished friction force was not found", self.record.residuals)
         return held
@@ -152,26 +152,26 @@ class Equilibrium:
         try:
             return self._find(old, target, frozen, start or old)
         except (ContactNotSolved, StepFailed) as error:
-            self.body.forget()
+            self.body.discard()
             reason = error.reason if isinstance(error, StepFailed) else f"contact: {error}"
             kind = Folded if isinstance(error, Folded) else StepFailed
             failed = kind(reason, self.record.residuals)
             failed.unstable = isinstance(error, Unstable)
-            failed.findings = "" if self._seen is None else self.body.findings(*self._seen)
+            failed.findings = "" if self._iterate is None else self.body.findings(*self._iterate)
             raise failed from error
 
     def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
         """The iterations at the head of this file."""
         target = target.begun(old)
         self.interface.begin(old, target.duration)
-        target.drive.begin(old)
+        target.voltage.begin(old)
         state = self.body.begin(old, target, frozen is not None, start)
         residuals: list[float] = []
         self.record.residuals, changed = residuals, 0
         for iteration in range(self.strategy.iterations):
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
-            self._seen = state, balance
+            self._iterate = state, balance
             reached = target.reached(state.bone)
             residuals.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):
@@ -184,7 +184,7 @@ class Equilibrium:
             if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
-            self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
+            self.interface.jumps.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 
@@ -203,12 +203,12 @@ class Equilibrium:
             return False
         forward = float(np.sign(target.x - old.bone[0])) or 1.0
         slack = self.tolerance * max(np.abs(state.reaction).max(), SMALLEST_FORCE)
-        return target.drive.accepts(forward, state.reaction, slack)
+        return target.voltage.accepts(forward, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:
         """Whether contact and friction hold here; a node that penetrates becomes a candidate."""
         penetration = self.interface.shallowest_penetration(state)
         if penetration is not None:
-            self.body.admit(state, penetration)
+            self.body.add_candidates(state, penetration)
             return False
         return self.interface.obeyed(old, state)

@@ -3,8 +3,8 @@ their laws.
 
 Contact forces of a state are along the profile's normal and tangent at the node's x, in three dimensions
 along z too. Slip is counted along the profile, :math:`r\,\Delta x` with its stretch r, from the last accepted
-x, or from the jump of friction that holds the node (`Pins`), and along z. A slipping node's shear force is
-against its slip. With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
+x, or from the jump of friction that holds the node (`FrictionJumps`), and along z. A slipping node's shear
+force opposes its slip. With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
 and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 """
 
@@ -27,52 +27,52 @@ from evfem.common.constants import (
 )
 from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
+from evfem.contact.slipping import OscillatingNodes
+from evfem.newton.state import State
 from evfem.protocols import FrictionLaw
-from evfem.solver.slipping import Returned
-from evfem.solver.state import State
 from evfem.surface.friction import Slipping, with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
 
-class Pins:
-    """Nodes that a jump of friction holds back during one step; `x` (P,) is nan for free nodes.
+class FrictionJumps:
+    """Nodes that a jump of the friction coefficient holds during one step; `x` (P,) is nan for free nodes.
 
     A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
-    to the higher limit. By its own x the coefficient has no consistent value: iterations put it before the
-    jump, behind it, before it again. It is pinned a hair inside the rougher side, sticking with the higher
-    coefficient, and released below the lower limit. A node that began the step on the rougher side is not
-    held.
+    to the higher limit. At the jump the coefficient has no single value, and iterates alternate between its
+    two sides. Such a node is fixed `PIN_OFFSET` inside the rougher side, where it sticks with the higher
+    coefficient, and is released below the lower limit. A node that began the step on the rougher side is
+    not held.
     """
 
     def __init__(self, jumps: Floats, size: int) -> None:
         """`jumps` (J, 3): position, coefficient before and behind."""
-        self.jumps, self.size = jumps, size
+        self.table, self.size = jumps, size
         self.begin(np.zeros(size))
 
     def begin(self, x: Floats) -> None:
-        """Forget everything: a new step starts with the nodes at x."""
+        """Starts a step with the nodes at x (P,) in mm, none held."""
         self.x = np.full(self.size, np.nan)
         self.lower = np.zeros(self.size)
-        if len(self.jumps):
-            self._side, self._begin = np.searchsorted(self.jumps[:, 0], x, side="right"), x
+        if len(self.table):
+            self._side, self._begin = np.searchsorted(self.table[:, 0], x, side="right"), x
             self._changes = np.zeros(self.size, dtype=np.int64)
             self._released = np.zeros(self.size, dtype=bool)
 
     @property
     def held(self) -> Any:
-        """Pinned nodes, (P,) bool."""
+        """Nodes at a jump, (P,) bool."""
         return np.isfinite(self.x)
 
     def watch(self, x: Floats, touching: Any) -> None:
-        """Look at the next iterate: count changes of side, and pin what keeps changing."""
-        if not len(self.jumps):
+        """Counts changes of side at the next iterate; holds a node after `CHANGES` of them."""
+        if not len(self.table):
             return
-        side = np.searchsorted(self.jumps[:, 0], x, side="right")
+        side = np.searchsorted(self.table[:, 0], x, side="right")
         moved = touching & (side != self._side) & ~self._released
         self._changes += moved
         new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
-        place, before, behind = self.jumps[np.maximum(side, self._side)[new] - 1].T
+        place, before, behind = self.table[np.maximum(side, self._side)[new] - 1].T
         inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
         from_smoother = (place - self._begin[new]) * inside > 0.0
         new = new[from_smoother]
@@ -81,11 +81,11 @@ class Pins:
         self._side = side
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
-        """Let go of nodes whose shear force is below the lower `limit` (P,); says whether there were any."""
+        """Releases nodes whose shear force is below the lower `limit` (P,); returns if there were any."""
         return self.let_go(self.held & (np.abs(shear) < limit - weak))
 
     def let_go(self, loose: Any) -> bool:
-        """Let go of these nodes (P,) bool for the rest of the step; says whether there were any."""
+        """Releases these nodes (P,) bool for the rest of the step; returns whether there were any."""
         self.x[loose] = np.nan
         if loose.any():
             self._released |= loose
@@ -120,7 +120,7 @@ class Interface:
     are far by now are let go.
     """
 
-    _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
+    _surfaces: tuple[tuple[Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -131,17 +131,17 @@ class Interface:
         self._down = pad.facing(self.points)
         # coefficients of friction may change over x in three dimensions, but not jump
         jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
-        self.pins = Pins(jumps, pad.nodes.size)
+        self.jumps = FrictionJumps(jumps, pad.nodes.size)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
-        self._returned = Returned(pad.nodes.size)
+        self._oscillating = OscillatingNodes(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
-        self.pins.begin(self.positions(old.u)[:, 0])
-        self._returned = Returned(self.pad.nodes.size)
+        self.jumps.begin(self.positions(old.u)[:, 0])
+        self._oscillating = OscillatingNodes(self.pad.nodes.size)
         self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
@@ -150,11 +150,11 @@ class Interface:
 
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states, which many ask for."""
-        for u, found in self._seen:
+        for u, found in self._surfaces:
             if u is state.u:
                 return found
         found = surface_state(self.surface, self.positions(state.u))
-        self._seen = ((state.u, found), *self._seen[:1])
+        self._surfaces = ((state.u, found), *self._surfaces[:1])
         return found
 
     def resting(self, state: State) -> Floats:
@@ -183,11 +183,11 @@ class Interface:
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
-        """What the contact problem has to know of candidates c; of all nodes their attraction's change."""
+        """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
         position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
-        friction = self.friction(old, c, np.where(self.pins.held[c], self.pins.x[c], position[:, 0]))
+        friction = self.friction(old, c, np.where(self.jumps.held[c], self.jumps.x[c], position[:, 0]))
         known = Candidates(
             surface=surface,
             slip=slip,
@@ -205,15 +205,15 @@ class Interface:
         """The candidates c under a law of friction other than Coulomb's.
 
         Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
-        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem knows the part of F
-        that does not grow with dx; seen with that, slip and yielding are (1 + K C) times as large.
+        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem has the part of F
+        that does not grow with dx; with it, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])
         slip = np.where(known.status >= FORWARD, way, 0.0)
         moving = self.slipping(old, state, c, known.friction, slip)
         if self.dim == 2:
-            found = self._returned.linearised(law, moving, c, known.status, shear)
+            found = self._oscillating.linearised(law, moving, c, known.status, shear)
         else:  # the direction of a slip turns: the law by the speed of the iterate
             found = replace(moving.linearised(law), by_speed=np.zeros_like(slip))
         by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
@@ -236,42 +236,42 @@ class Interface:
     def slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
         """These pad nodes (k,) as a law of friction sees them, with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
-        length = self.shares(state)[nodes]
-        seen = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
+        length = self.tributary(state)[nodes]
+        nodal = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
         found = self.restored(state.voltage)
-        return seen if found is None else replace(seen, withheld=found[0][nodes], left=found[1][nodes])
+        return nodal if found is None else replace(nodal, withheld=found[0][nodes], left=found[1][nodes])
 
     def withheld(self, state: State) -> Floats:
-        """What a core of the attraction withholds of pull and pressing force of closed nodes (P,), N/mm."""
+        """Part of attraction and pressing force of closed nodes (P,) that a core takes away, N/mm."""
         found = self.restored(state.voltage)
         if found is None:
             return np.zeros(len(self.points))
-        share = self.shares(state)
+        share = self.tributary(state)
         pressure = np.maximum(state.contact_force[:, 0], 0.0) / share
         return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
 
-    def lengths(self, position: Floats) -> Floats:
-        """What the pad's nodes at positions (P, dim) stand for (P,): mm, in space mm2; never quite 0."""
+    def tributary_of(self, position: Floats) -> Floats:
+        """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
         least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
         return np.maximum(self.pad.tributary(position), least)
 
-    def shares(self, state: State) -> Floats:
-        """The same of a state."""
-        return self.lengths(self.positions(state.u))
+    def tributary(self, state: State) -> Floats:
+        """Tributary lengths or areas (P,) in a state."""
+        return self.tributary_of(self.positions(state.u))
 
-    def shares_at(self, part: tuple[State, State], x: Floats) -> Floats:
-        """The same at x (P,), on a part between two states; in space its mean over the part."""
+    def tributary_at(self, part: tuple[State, State], x: Floats) -> Floats:
+        """Tributary lengths or areas (P,) at x (P,) between two states; in space the mean of both."""
         if self.dim == 2:
-            return self.lengths(x[:, None])
+            return self.tributary_of(x[:, None])
         old, new = part
-        return 0.5 * (self.shares(old) + self.shares(new))
+        return 0.5 * (self.tributary(old) + self.tributary(new))
 
     def age(self, old: State) -> Floats:
         """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
         return np.where(old.touching, old.age + self.duration, 0.0)
 
     def aged(self, old: State, state: State) -> State:
-        """The accepted state with the ages of its nodes, if a law of friction may ask for them."""
+        """The accepted state, with contact times if a law of friction is given."""
         if self.law is None:
             return state
         return replace(state, age=self.age(old))
@@ -282,12 +282,12 @@ class Interface:
         mu = self.friction(old, np.arange(x.size), x)
         if self.law is None:
             return np.asarray(mu * normal)
-        seen = self.slipping(old, new, np.arange(x.size), mu, slip)
-        return replace(seen, normal=normal, length=self.shares_at(part, x)).bound(self.law)
+        nodal = self.slipping(old, new, np.arange(x.size), mu, slip)
+        return replace(nodal, normal=normal, length=self.tributary_at(part, x)).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
-        return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
+        return np.where(self.jumps.held, self.jumps.x, self.positions(old.u)[:, 0])
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
@@ -296,7 +296,7 @@ class Interface:
     def friction(self, old: State, nodes: Ints, x: Floats) -> Floats:
         """Friction coefficient of these pad nodes (k,) at the positions x (k,) in mm; `old` is the
         last accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask
-        for it here; `Pins` alone takes the coefficients on both sides of a jump from the surface.
+        for it here; `FrictionJumps` alone takes the coefficients on both sides of a jump from the surface.
         """
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
 
@@ -313,11 +313,11 @@ class Interface:
     def _strayed(self, old: State, state: State, x: Floats) -> Any:
         """Pinned nodes (P,) that slipped to another coefficient, or whose interface no longer holds them."""
         nodes = np.arange(x.size)
-        pinned = self.friction(old, nodes, np.where(self.pins.held, self.pins.x, x))
+        pinned = self.friction(old, nodes, np.where(self.jumps.held, self.jumps.x, x))
         here, slips = self.friction(old, nodes, x), state.status >= FORWARD
-        yielded = np.abs(x - self.pins.x) > self.tolerance * self.length
+        yielded = np.abs(x - self.jumps.x) > self.tolerance * self.length
         beyond = sizes(state.contact_force[:, 1:]) > self._resting_limit(old, state, here) + self._weak(state)
-        return self.pins.held & (pinned != here) & (slips | (yielded & beyond))
+        return self.jumps.held & (pinned != here) & (slips | (yielded & beyond))
 
     def _weak(self, state: State) -> float:
         """Forces (N/mm) below which a law of contact or friction holds."""
@@ -329,15 +329,15 @@ class Interface:
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self._weak(state)
-        lower = self._resting_limit(old, state, self.pins.lower)
-        if self.pins.release(lower, sizes(state.contact_force[:, 1:]), weak):
+        lower = self._resting_limit(old, state, self.jumps.lower)
+        if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
-        if self.pins.let_go(self._strayed(old, state, position[:, 0])):
+        if self.jumps.let_go(self._strayed(old, state, position[:, 0])):
             return False
         normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         compliance = self.compliance(old)[active]
         slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
-        x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
+        x = np.where(self.jumps.held, self.jumps.x, position[:, 0])[active]
         status, nodes = state.status[active], np.flatnonzero(active)
         way, size = sizes(slip), sizes(shear)
         limit = (mu := self.friction(old, nodes, x)) * normal
@@ -367,7 +367,7 @@ class PenaltyInterface(Interface):
 
     def compliance(self, old: State) -> Floats:
         """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
-        return 1.0 / np.outer(self.shares(old), self.penalties)
+        return 1.0 / np.outer(self.tributary(old), self.penalties)
 
 
 def slipped(interface: Interface, old: State, new: State) -> Floats:

@@ -10,11 +10,11 @@ from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, l
 
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, StabilityRatio
-from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.interface import PenaltyInterface
-from evfem.solver.state import Folded, Limits, StepFailed
-from evfem.solver.strategy import Strategy
+from evfem.newton.control import FollowFriction, GivenVoltage, Indentation, Target
+from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.interface import PenaltyInterface
+from evfem.newton.state import Folded, Limits, StepFailed
+from evfem.newton.strategy import Strategy
 from evfem.surface.friction import RateFriction
 from evfem.surface.surfaces import Flat
 
@@ -170,7 +170,7 @@ def test_a_node_that_sticks_again_yields_and_slips_in_series():
     old = replace(old, age=nothing, contact_force=before)
     before[k, 1] = shear + interface.candidates(old, new, every, nothing, nothing).slip[k, 0] / give
     interface.law, interface.duration, steep = law, 2e-3, 0.7 / give
-    interface._returned.nodes[k], interface._returned._slope[k] = True, steep * interface.duration
+    interface._oscillating.nodes[k], interface._oscillating._slope[k] = True, steep * interface.duration
     found = interface.candidates(old, new, every, nothing, nothing)
     rest = float(law.bound(normal / length, MU, 0.0, 0.0)) * length
     growth, way = found.slip_stiffness[k], -np.sign(shear)

@@ -9,11 +9,11 @@ import pytest
 from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, legal, node, pushed, shifted
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.solver.control import GivenVoltage, Indentation, Target
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.state import Limits
-from evfem.solver.strategy import Strategy
+from evfem.newton.control import GivenVoltage, Indentation, Target
+from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.interface import Interface, PenaltyInterface
+from evfem.newton.state import Limits
+from evfem.newton.strategy import Strategy
 from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.surface.surfaces import Flat
 
@@ -49,7 +49,7 @@ def lawful(kind, law, surface=None):
     shear = good.contact_force[:, 1]
     for _ in range(60):  # shares change a little with the slips
         x = X + np.where(touching, SLIP * sign - give[:, 1] * (shear - before[:, 1]), 0.0)
-        share, speed = interface.shares_at((old, good), x), np.abs(sign) * SLIP / SECONDS
+        share, speed = interface.tributary_at((old, good), x), np.abs(sign) * SLIP / SECONDS
         mu = surface.friction if surface else MU
         limit = mu * normal if law is None else law.bound(normal / share, mu, speed, 0.0) * share
         shear = np.where(sign != 0.0, -sign * limit, np.where(touching, 0.2 * limit, 0.0))

@@ -10,13 +10,13 @@ from tools.meshes import block
 
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.errors import NotConverged
+from evfem.newton.control import Target
+from evfem.newton.state import Balance, StepFailed
+from evfem.newton.strategy import Strategy, stuck
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.solver.control import Target
-from evfem.solver.state import Balance, StepFailed
-from evfem.solver.strategy import Strategy, stuck
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -78,7 +78,7 @@ def test_one_iteration_of_the_whole_step_leaves_a_quadratic_rest(options, move):
     state = equilibrium.step(state, Target.held(state.bone + 1e-2 * np.array(move) * [1.0, -1.0], voltage))
     rest = []
     for size in (2e-3, 5e-4):
-        equilibrium.body.linearisation.forget()
+        equilibrium.body.linearisation.discard()
         equilibrium.step(
             replace(state, last_increment=0.0 * state.last_increment),
             Target.held(state.bone + size * np.array(move) * [1.0, -1.0], voltage),

@@ -26,7 +26,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, check_fields, number
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
-from evfem.solver.state import State
+from evfem.newton.state import State
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
 STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
@@ -99,7 +99,7 @@ AT_REST: Floats = np.zeros(3)
 
 
 @dataclass(frozen=True)
-class Grip:
+class HandControl:
     """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s)."""
 
     hand: Hand
@@ -107,10 +107,10 @@ class Grip:
     duration: float = 0.0
     before: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def begun(self, old: State, drive: float, duration: float) -> Grip:
+    def begun(self, old: State, drive: float, duration: float) -> HandControl:
         """In the step from `old` that takes the drive to x = `drive`."""
         before = (float(old.hand[0]), float(old.bone[0]), float(old.hand[1]))
-        return Grip(self.hand, drive, duration, before)
+        return HandControl(self.hand, drive, duration, before)
 
     @property
     def stiffness(self) -> float:
@@ -121,7 +121,7 @@ class Grip:
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
 
     @property
-    def way(self) -> float:
+    def increment(self) -> float:
         """Displacement of the bone if nothing changes (mm)."""
         return self.before[2] * self.duration
 

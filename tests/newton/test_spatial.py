@@ -254,7 +254,7 @@ def test_a_state_obeys_every_law_or_not(case, law):
     old = replace(old, age=np.full(old.status.size, 0.2), status=np.full_like(old.status, OPEN))
     limit = 0.5 * 10.0
     if LAWS[law] is not None:
-        area = interface.shares(new)[node]
+        area = interface.tributary(new)[node]
         speed = 0.005 / 0.5 if moved == MOVED else 0.0
         limit = float(LAWS[law].bound(10.0 / area, 0.5, speed, 0.0) * area)
     force, u = new.contact_force.copy(), new.u.copy()

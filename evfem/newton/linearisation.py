@@ -23,8 +23,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     FAR,
-    FIRST,
-    HELD,
+    FIRST_CANDIDATES,
     LEFT_OVER,
     LONGER,
     SHORTER,
@@ -34,23 +33,24 @@ from evfem.common.constants import (
     STABLE,
     STALLED,
     STEEP,
-    TAKEN,
+    STEEP_IN_SPACE,
+    SUBTRACTED,
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
-from evfem.solver.condensation import Singular, make_condensation
-from evfem.solver.interface import Interface
-from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
+from evfem.newton.condensation import Singular, make_condensation
+from evfem.newton.interface import Interface
+from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import normals, surface_state
 from evfem.tissue.body import Body
 
 
-def in_vain(residuals: list[float], same: bool) -> bool:
-    """Whether iterations gain nothing: the last two with the `same` nodes in contact, or the last four with
-    the bone where it should be.
+def no_progress(residuals: list[float], same: bool) -> bool:
+    """Whether iterations stagnate: over the last two with the `same` nodes in contact, or over the last four
+    with the bone in its place.
 
-    >>> in_vain([1e-2, 2e-2, 5e-2], True), in_vain([1e-2, 2e-2, 5e-2], False)
+    >>> no_progress([1e-2, 2e-2, 5e-2], True), no_progress([1e-2, 2e-2, 5e-2], False)
     (True, False)
     """
     if same and len(residuals) > 2 and min(residuals[-2:]) > residuals[-3]:
@@ -58,15 +58,15 @@ def in_vain(residuals: list[float], same: bool) -> bool:
     return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
 
 
-def steadied(gain: Floats) -> Floats:
-    """Gains of the attraction per contact force (P,) as the tangent takes them.
+def limited_gain(gain: Floats) -> Floats:
+    """Gains of the attraction per contact force (P,), limited for the tangent.
 
-    What a contact force of 1 leaves is 1 - gain. Where that is nothing the node's equilibrium folds, and
-    beyond, the force grows by itself until the rough faces are close: iterations are to leave such a
-    place, and to come to one below 1 by its own tangent. So beyond `STABLE` the tangent takes
-    abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
+    The net force of a contact force of 1 is 1 - gain. At a gain of 1 the node's equilibrium has a fold;
+    above, the force grows by itself until the rough faces are close. Iterations shall leave such a point,
+    and converge to one below 1 with its own tangent: above `STABLE` the tangent has abs(1 - gain), limited
+    to the range from `LEFT_OVER` to 1 - `STABLE`.
 
-    >>> steadied(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
+    >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
     [0.5, 0.95, 0.99, 0.95, 0.9]
     """
     return np.where(gain > STABLE, 1.0 - np.clip(np.abs(1.0 - gain), LEFT_OVER, 1.0 - STABLE), gain)
@@ -125,7 +125,7 @@ class Linearisation:
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
-            self._follow(state, gap, weakening > TAKEN * self.softest * self.pad.tributary(position))
+            self._follow(state, gap, weakening > STEEP_IN_SPACE * self.softest * self.pad.tributary(position))
             return
         steep, near = self.steep * self.pad.tributary(position), (gap <= reach) | (state.status != OPEN)
         needed = self.pad.free & (near | (weakening > steep))
@@ -141,11 +141,11 @@ class Linearisation:
         self.factor = None
 
     def _follow(self, state: State, gap: Floats, steep: Any) -> None:
-        """Let the candidates follow the contact, and half as many others; what left is let go once a step."""
+        """Candidates are nodes in contact and half as many others; those far away are dropped once a step."""
         needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
         if self.candidates.size and needed[self.candidates].sum() == needed.sum():
             return
-        count = max(SPARE * needed.sum(), FIRST * self.pad.free.sum())
+        count = max(SPARE * needed.sum(), FIRST_CANDIDATES * self.pad.free.sum())
         enough = np.sort(gap)[min(int(count), int(self.pad.free.sum()) - 1)]
         chosen = np.flatnonzero(self.pad.free & (gap <= enough) | needed)
         self.candidates = chosen if self._lets_go else np.union1d(self.candidates, chosen)
@@ -153,14 +153,14 @@ class Linearisation:
 
     # -- factorisation
 
-    def forget(self) -> None:
-        """Drop the factorisation, so that the next iteration starts from a fresh one."""
+    def discard(self) -> None:
+        """Drops the factorisation: the next iteration makes a new one."""
         self.factor = None
 
     def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
-        """Factorise if there is no factorisation, it stalls, or a new one saves; says whether it did."""
+        """Factorises if there is none, iterations stall, or a new one saves time; returns whether it did."""
         same, self._status = np.array_equal(self._status, state.status), state.status
-        if self._has_fringes(state) and in_vain(history, same):
+        if self._has_fringes(state) and no_progress(history, same):
             self._outdated |= not self.fringes
             self.fringes = True
         if not self.refused and not self._too_old(history):
@@ -205,7 +205,7 @@ class Linearisation:
 
     def _weaken(self, upper: Floats, state: State) -> None:
         """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
-        most = HELD * self.softest * self.pad.tributary(self.interface.positions(state.u))
+        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.positions(state.u))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
         weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
@@ -286,9 +286,9 @@ class Linearisation:
         if attraction.direction == "normal":
             along[:, 0], along[:, 1] = surface.stretch, 0.0
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)[:, None] * along
-        # whole, it could pull a node on a slope in again by more than the steadied gain leaves to hold it
+        # the full tangential gain could close a node on a slope by more than the limited normal gain holds
         gain[:, 1] = np.where(gain[:, 0] > STABLE, 0.0, gain[:, 1])
-        gain[:, 0] = steadied(gain[:, 0])
+        gain[:, 0] = limited_gain(gain[:, 0])
         return Roughness(gain, lost[:, None] * along, pressing)
 
     def _coupling(self, state: State) -> Floats | None:
