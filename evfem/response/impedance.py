@@ -205,7 +205,8 @@ def linearised(model: Model, state: State) -> LinearSystem:
     body, finger = model.body, model.scene.finger
     pattern, contact = body.pattern, Contact(model, state)
     terms = make_dynamics(body.space, finger.materials, finger, "inertial")
-    assert terms is not None and terms.mass is not None
+    assert terms is not None
+    assert terms.mass is not None
 
     def reduced(matrix: Any) -> Any:
         return contact.onto @ matrix @ contact.along
