@@ -16,8 +16,9 @@
 # A finger pad is pressed to one depth twice, fast and slowly, and held. A probe keeps the stress at a point
 # below the epidermis; a model of a slowly adapting afferent turns it into spikes.
 #
-# **What this is:** a comparison of two signals. The neuron's constants were fitted to mice, with another model
-# of the skin. Its spikes are no threshold and no rate of a person, and nothing here says what anybody feels.
+# **What this is:** a comparison of two signals. The neuron's constants were fitted to mice, with another
+# model of the skin. Its spikes are no threshold and no rate of a person, and say nothing of what anybody
+# feels.
 
 # %%
 import matplotlib.pyplot as plt
@@ -29,8 +30,8 @@ from evfem import export
 # %% [markdown]
 # ## Two histories of stress
 #
-# Time must pass, in steps that are short against what is asked for. Here the tissue itself does not relax: what
-# differs is how fast it is pressed.
+# Time must pass, in steps that are short against what is asked for. The tissue itself does not relax here:
+# what differs is how fast it is pressed.
 
 # %%
 finger = ev.FingerPad(resolution="coarse", ridges=False)
@@ -52,9 +53,10 @@ runs = {"in 50 ms": press(0.05), "in 500 ms": press(0.5)}
 # %% [markdown]
 # ## The neuron
 #
-# Gerling and others: a current follows changes of the stress and forgets them in 8, 200 and 1744.6 ms, a part
-# never; it charges a membrane that leaks, and at 30 mV fires and starts again. Compression is positive. Units:
-# kPa, ms, pA, mV; the constants are facts of the published code (doi:10.1109/TOH.2013.36).
+# Gerling and others: a current follows changes of the stress and forgets them in 8, 200 and 1744.6 ms, a
+# part never; it charges a membrane that leaks, and at 30 mV fires and starts again. Compression is positive.
+# Units: kPa, ms, pA, mV. The constants are those of their published programs; the model of a population is
+# in doi:10.1109/TOH.2013.36.
 
 # %%
 TAU = np.array([8.0, 200.0, 1744.6, np.inf])  # ms
@@ -115,8 +117,8 @@ plt.show()
 plt.close(figure)
 
 # %% [markdown]
-# Both end under the same stress. The fast press makes the current larger while it lasts, so that spikes follow
-# each other more closely.
+# Both end under the same stress. The fast press makes the current larger while it lasts, so that spikes
+# follow each other more closely.
 
 # %%
 for name, result in runs.items():
