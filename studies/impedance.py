@@ -67,7 +67,7 @@ def slope(finger: ev.FingerPad, depth: float) -> float:
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Stiffness by depth and axis, the frequency where its real part vanishes, and the slope of a press."""
     finger, depths = pad(not quick), DEPTHS[1:2] if quick else DEPTHS
-    frequency = np.geomspace(0.1, 300.0, 15 if quick else 30)
+    frequency = np.geomspace(0.1, 200.0, 15 if quick else 30)
     alone = spectrum(frequency)
     numbers, series = {}, []
     for depth in depths:
@@ -115,8 +115,8 @@ def draw(series: list[Series], depths: tuple[float, ...]) -> Figure:
             size = kept[f"real.{axis}.{depths[-1]:g}_mm"].y[0] / kept["branches.real"].y[0]
             one = kept[f"branches.{part}"]
             ax.plot(one.x, size * one.y, color="black", lw=0.8, ls="--", label="branches alone")
-            top = 1.25 * size * max(one.y)
-            ax.set(xscale="log", ylim=(-0.6 * top if part == "real" else 0.0, top))
+            top = 1.6 * size * max(one.y)
+            ax.set(xscale="log", ylim=(-0.4 * top if part == "real" else 0.0, top))
             ax.set(xlabel="frequency (Hz)", ylabel=f"{axis}, {part} (mN/mm²)")
             ax.axhline(0.0, color="0.6", lw=0.6)
     axes[0].legend(fontsize=7, loc="lower left")

@@ -1,7 +1,7 @@
 """Hunter's problem on a finite block: a rigid cylinder that is drawn over tissue which relaxes.
 
 A parabola of 10 mm radius stands still, a block of nearly incompressible tissue with one branch slides over
-it without friction under 0.05 N/mm. Tissue is squeezed on the way and has no time to come back, so the contact
+it without friction under 0.05 N/mm. Tissue is squeezed on the way and has no time to come back: the contact
 is shifted to where it comes in, and the surface resists the slide though nothing rubs.
 
 The half-plane is solved in closed form after S. C. Hunter, J. Appl. Mech. 28 (1961) 611-617; `HALF_PLANE` has
