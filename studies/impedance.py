@@ -22,7 +22,7 @@ from evfem.common.arrays import Floats
 
 from .common import Series, Study
 from .plots import COLOURS, Figure, panels
-from .relaxation import NAIL, SHARES
+from .relaxation import SHARES, pad
 
 DEPTHS = (0.3, 0.6, 1.0)
 AXES = ("normal", "tangential")
@@ -40,11 +40,6 @@ def spectrum(frequency: Floats) -> Any:
     share, tau = np.array(SHARES).T
     turned = 2j * np.pi * frequency[:, None] * tau
     return 1.0 + (share * turned / (1.0 + turned)).sum(axis=1)
-
-
-def pad(ridges: bool) -> ev.FingerPad:
-    """The paper's finger, coarse, with branches."""
-    return ev.FingerPad(resolution="coarse", ridges=ridges, relaxation=SHARES, materials={"nail": NAIL})
 
 
 def pressed(finger: ev.FingerPad, depth: float) -> ev.Scene:
@@ -66,8 +61,8 @@ def slope(finger: ev.FingerPad, depth: float) -> float:
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Stiffness by depth and axis, the frequency where its real part vanishes, and the slope of a press."""
-    finger, depths = pad(not quick), DEPTHS[1:2] if quick else DEPTHS
-    frequency = np.geomspace(0.1, 200.0, 15 if quick else 30)
+    finger, depths = pad(quick), DEPTHS[1:2] if quick else DEPTHS
+    frequency = np.geomspace(0.1, 300.0, 15 if quick else 30)
     alone = spectrum(frequency)
     numbers, series = {}, []
     for depth in depths:
@@ -116,7 +111,7 @@ def draw(series: list[Series], depths: tuple[float, ...]) -> Figure:
             one = kept[f"branches.{part}"]
             ax.plot(one.x, size * one.y, color="black", lw=0.8, ls="--", label="branches alone")
             top = 1.6 * size * max(one.y)
-            ax.set(xscale="log", ylim=(-0.4 * top if part == "real" else 0.0, top))
+            ax.set(xscale="log", xlim=(0.08, 200.0), ylim=(-0.4 * top if part == "real" else 0.0, top))
             ax.set(xlabel="frequency (Hz)", ylabel=f"{axis}, {part} (mN/mm²)")
             ax.axhline(0.0, color="0.6", lw=0.6)
     axes[0].legend(fontsize=7, loc="lower left")

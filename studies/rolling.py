@@ -5,7 +5,7 @@ it without friction under 0.05 N/mm. Tissue is squeezed on the way and has no ti
 is shifted to where it comes in, and the surface resists the slide though nothing rubs.
 
 The half-plane is solved in closed form after S. C. Hunter, J. Appl. Mech. 28 (1961) 611-617; `HALF_PLANE` has
-half width, centre and coefficient of resistance of these numbers. The block is 60 mm wide and 30 mm high,
+half width, centre and coefficient of resistance of these numbers. The block is 120 mm wide and 60 mm high,
 bonded above: it is to show direction and size, to within what its size leaves.
 """
 
@@ -25,8 +25,8 @@ HALF_PLANE = {
     20.0: (2.84824771, 0.85249353, 0.1158799098),
     60.0: (2.40581584, 0.75361563, 0.0861761985),
 }
-WIDTH, HEIGHT, TRACK, WAY = 60.0, 30.0, 14.0, 18.0
-NU = 0.49
+WIDTH, HEIGHT, TRACK, WAY = 120.0, 60.0, 14.0, 18.0
+NU = 0.499
 
 
 class Rolling(NamedTuple):
