@@ -65,14 +65,14 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "scipy"},
-        "provenance history result spectrum model doubtful works barrier ledger checkpoint failure run",
+        "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
+    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities impedance"),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
-        "samples file folder run check",
+        "samples file folder table run check",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
-    "response": ({"numpy", "scipy"}, "impedance"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
         "texture generate library importing importers",

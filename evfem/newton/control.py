@@ -1,8 +1,7 @@
-r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction force.
+r"""Controls of a step: the bone's height or the force on it, the voltage or the friction force.
 
-A control says which part of the step is known; where a force is prescribed instead, it gives the
-extra unknown with the equation that settles it (`evfem.contact.condensed.ExtraUnknown`), its share
-of the residual, and its bounds:
+A control prescribes one quantity. Where that is a force, it gives the extra unknown and its equation
+(`evfem.contact.condensed.ExtraUnknown`), the residual of that equation, and bounds:
 
 ==================  ===========================  ============================  ====================
 control             known                        unknown                       equation
@@ -115,7 +114,7 @@ class Unsupported(Indentation):
 
 @dataclass(frozen=True)
 class VoltageProblem:
-    """What a voltage control may ask for: the present squared voltage (kV^2), a solved contact problem, state
+    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state
     for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
     `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
     the residual and by forces with such a state; the present state of the `pad`.

@@ -8,7 +8,7 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
           - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
 
 by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
-and the bone comes to rest. Across the slide, the bone's height stays what the motion says.
+and the bone comes to rest. Across the slide, the motion prescribes the bone's height.
 
 Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
 100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
@@ -138,7 +138,7 @@ class HandControl:
         return force
 
     def force(self, x: float) -> float:
-        """What of it comes to the bone (N/mm), the mass taken off."""
+        """Force on the bone (N/mm): that of the drive minus the inertia of the mass."""
         force = self.driving(x)
         if self.duration > 0.0:
             force -= self.hand.mass * (self.velocity(x) - self.before[2]) / self.duration

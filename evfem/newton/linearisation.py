@@ -222,7 +222,7 @@ class Linearisation:
         return None if self.factor is None or self.fringes else self._made_at
 
     def restore(self, state: State, at: TangentPoint) -> None:
-        """Make the factorisation again that a run which goes on from `state` had made at `at`."""
+        """Repeats the factorisation made at `at` by the run that is resumed from `state`."""
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
             self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner)
@@ -261,9 +261,9 @@ class Linearisation:
         return np.asarray(self.attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
-        """How the attraction of every pad node depends on its contact force, where rough faces come
-        closer under it, along normal and tangent: on a slope what pulls down moves the node sideways
-        too. None without them.
+        """Derivatives of the attraction of every pad node by its contact force, where rough faces come
+        closer under it, along normal and tangent: on a slope a vertical force has a tangential component.
+        None for smooth faces.
         """
         attraction = self.attraction
         if (

@@ -1,1 +1,1 @@
-"""What a scene answers to small changes about its state: stiffness over the frequency."""
+"""How what a scene does answers to its parameters and to small motions: exact derivatives, impedance."""

@@ -56,7 +56,7 @@ def rise(part: SubstepWork, target: Target) -> float:
 
 
 def _carried(part: SubstepWork, target: Target) -> Floats:
-    """How far the bone, if not loaded, carries the pad's nodes (P, dim); 0 where they keep touching."""
+    """Displacements (P, dim) of pad nodes with a bone that is not loaded; 0 where they keep touching."""
     travel = part.new.bone - part.old.bone
     if target.height.free:
         travel[1] = 0.0
@@ -90,12 +90,12 @@ def _rubbed(part: SubstepWork) -> float:
 
 
 def _lifted(part: SubstepWork) -> Floats:
-    """What nodes that touch at both ends have to climb beside the chord between their places."""
+    """Work against contact forces of nodes that touch at both ends, off the chord of their places."""
     model, old, new = part.model, part.old, part.new
     touching = old.touching & new.touching
     if model.surface.is_flat or not touching.any():
         return np.zeros_like(PLACES)
-    begin, end = (model.equilibrium.positions(state.u)[touching] for state in (old, new))
+    begin, end = (model.equilibrium.interface.positions(state.u)[touching] for state in (old, new))
     normal = new.contact_force[touching, 0]
     lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in PLACES]
     return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES
@@ -116,7 +116,7 @@ def _in_time(part: SubstepWork) -> Floats:
 
 
 def _hand(part: SubstepWork) -> Floats:
-    """What a hand's spring adds to the constant force of the end."""
+    """Energy of a hand's spring beyond the constant force of the end."""
     hand = part.model.scene.hand
     if hand is None:
         return np.zeros_like(PLACES)
