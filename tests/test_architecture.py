@@ -71,6 +71,7 @@ ROOMS = {
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
         "samples file folder table run check",
     ),
+    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities uncertainty design"),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},

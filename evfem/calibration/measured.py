@@ -52,6 +52,11 @@ class Along:
         where = "" if self.motion is None else f" in motion {self.motion}"
         return tuple(f"{self.column} at {self.over} {x!r}{where}" for x in self.at)
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that the values follow from."""
+        return (self.column, self.over)
+
     def answers(self, result: Result) -> dict[str, float | None]:
         """The values by name."""
         values = along(result, self.column, self.over, np.array(self.at), self.motion)
@@ -68,6 +73,11 @@ class Single:
     def names(self) -> tuple[str, ...]:
         """The name of the value."""
         return (self.output,)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The column that the value follows from."""
+        return (self.output.split(".")[0],)
 
     def answers(self, result: Result) -> dict[str, float | None]:
         """The value by name."""

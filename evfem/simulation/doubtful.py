@@ -43,7 +43,7 @@ def outside(model: Model) -> Ints:
 
 
 def deepest(model: Model, nodes: Ints, u: Floats) -> Floats:
-    """How deep (mm) these nodes are inside the surface at most, and the number of the one that is: (2,)."""
+    """Largest penetration (mm) of these nodes into the surface, and the number of that node: (2,)."""
     gap = surface_state(model.surface, (model.mesh.points + u)[nodes]).gap
     return np.array([-gap.min(), nodes[gap.argmin()]], dtype=float) if gap.size else np.zeros(2)
 
@@ -107,12 +107,12 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _lost(rows: Sequence[Row], name: str) -> Floats:
-    """What a column of dissipation adds in each row (r,)."""
+    """Increments (r,) of a column of dissipation."""
     return np.diff(_column(rows, f"{name}_dissipation"), prepend=0.0)
 
 
 def _energy(rows: Sequence[Row]) -> float:
-    """What is stored at most, and all that is dissipated."""
+    """Largest stored energy plus all dissipation."""
     stored = (_column(rows, "stored_energy") + _column(rows, "kinetic_energy")).max()
     return (
         1e-300
@@ -185,7 +185,7 @@ def _gone(model: Model, failed: StepFailed) -> str:
     state, target = failed.last
     try:
         with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite
-            margin = model.equilibrium.stability_ratio(state, target)
+            margin = model.equilibrium.body.stability_ratio(state, target)
     except StepFailed:  # the tangent there is singular
         return ""
     # a trial far from equilibrium may give way too: alone that shows nothing
@@ -205,7 +205,7 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
 
     In three dimensions the last two `rows` tell: the voltage falls as the gap closes.
     """
-    margin = model.equilibrium.stability_ratio(state, Target.held(state.bone, state.voltage))
+    margin = model.equilibrium.body.stability_ratio(state, Target.held(state.bone, state.voltage))
     if margin is None and len(rows) > 1:
         ways = [rows[-1][name] - rows[-2][name] for name in ("voltage", "min_gap")]
         lost = abs(rows[-2]["voltage"]) > 0.0 and ways[0] * np.sign(state.voltage) * ways[1] > 0.0

@@ -209,7 +209,7 @@ class Run:
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
     def _kept(self, time: float, begin: float) -> KeptCharge | None:
-        """What prescribes the electrode's charge at `time` (s) in a step from `begin`, if anything does."""
+        """Control of the electrode's charge at `time` (s) in a step from `begin`, or None."""
         voltage = self.scene.electrics.voltage
         if isinstance(voltage, ChargeControl):
             return KeptCharge(NANO * voltage.charge_at(time) / eps_0)
@@ -315,7 +315,7 @@ class Run:
         return FollowFriction(float(wish(position)), wish.largest_voltage)
 
     def _path(self, start: Target, end: Target, begin: float, seconds: float) -> Path:
-        """Straight from one target, at time `begin`, to the next, with profile, signal or wished force."""
+        """Linearly from one target, at time `begin`, to the next, with profile, signal or given force."""
 
         def target(done: float, fraction: float) -> Target:
             duration = (fraction - done) * seconds
@@ -350,6 +350,7 @@ class Run:
         """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         released, snapped = self.stepper.relaxations, self.stepper.snaps
+        self.state = request.path(0.0, 1.0).going_on(self.state, self.model.mesh.node_sets["bone"][0])
         try:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
         except StepFailed as error:
@@ -392,7 +393,7 @@ class Run:
             "barriers": self.stepper.barriers,
             "held": self.stepper.held,
             "unsettled": self.stepper.unsettled,
-            "candidates": int(self.model.equilibrium.reusable().candidates.size),
+            "candidates": int(self.model.equilibrium.body.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",
         }
@@ -411,7 +412,7 @@ class Run:
         """Arrays from which the run can go on after its last converged step."""
         return {
             **state_arrays(self.state),
-            **reusable_arrays(self.state, self.model.equilibrium.reusable()),
+            **reusable_arrays(self.state, self.model.equilibrium.body.reusable()),
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
@@ -422,7 +423,7 @@ class Run:
     def _restore(self, saved: Saved) -> None:
         arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
         self.state = state_of(arrays)
-        self.model.equilibrium.resume(self.state, reusable_of(arrays))
+        self.model.equilibrium.body.resume(self.state, reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)
