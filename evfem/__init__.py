@@ -55,6 +55,7 @@ _NAMES = {
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),
     "simulation.checkpoint": ("Checkpoint",),
+    "simulation.loop": ("Loop", "loop"),
     "simulation.result": ("Frame", "Result"),
     "simulation.run": ("simulate",),
     "simulation.spectrum": ("spectrum",),
@@ -62,8 +63,9 @@ _NAMES = {
     "newton.strategy": ("Strategy",),
     "sweeps.check": ("check",),
     "sweeps.file": ("Sweep",),
-    "sweeps.run": ("SweepResult", "sweep"),
+    "sweeps.run": ("sweep",),
     "sweeps.samples": ("Normal", "Samples", "Uniform"),
+    "sweeps.table": ("SweepResult",),
     "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
     "textures.texture": ("Texture",),
     "estimate.touch": ("Touch",),
@@ -127,7 +129,9 @@ def __getattr__(name: str) -> Any:
     elif name in _GONE:
         raise AttributeError(f"{name}: {_GONE[name]}")
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        close = _import_module(f"{__name__}.errors").near(name, __all__)
+        meant = f"; did you mean {close[0]}?" if close else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
     globals()[name] = value
     return value
 

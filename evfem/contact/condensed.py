@@ -1,11 +1,10 @@
-r"""The linearised body as its contact candidates see it: a dense compliance, and the contact
-problem posed on it.
+r"""The linearised body condensed onto its contact candidates, and the contact problem on that compliance.
 
 The compliance :math:`C = S_{cc}^{-1}` (`evfem.solver`) is kept with the factorisation.
-On a curved profile the contact force turns
-with the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
-:math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the
-nodes near contact, so it is put into their small block alone (`evfem.contact.follower`).
+On a curved profile the contact force turns with the node, a follower force:
+:math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes
+in every iteration but touches only the nodes near contact, so it is put into their small block alone
+(`evfem.contact.follower`).
 
 Algorithm (`LinearContactStep.solve`)::
 
@@ -50,8 +49,7 @@ LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What is known of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in
-    N).
+    """Data of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in N).
 
     The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
     N/mm, statuses (c,), friction coefficients (c,) and slopes over x (c,) in 1/mm. `interface_compliance` (c,

@@ -60,8 +60,8 @@ APART, MOVED = 8, 1e-9
 
 
 def in_sight(places: Floats) -> Ints:
-    """Which of the places (L, 2) of an outline, from left to right, the display sees: at them stand
-    columns (K,). Of two neighbours along a slope above `STEEP` the higher one is behind an overhang, or
+    """Numbers (K,) of the points (L, 2) of an outline, from left to right, that are visible from the display
+    and have columns. Of two neighbours along a slope above `STEEP` the higher one is behind an overhang, or
     deep in a groove.
 
     >>> in_sight(np.array([[0.0, 0.0], [1.0, 0.0], [0.9, 0.5], [2.0, 0.0]])).tolist()

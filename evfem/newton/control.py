@@ -1,8 +1,7 @@
-r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction force.
+r"""Controls of a step: the bone's height or the force on it, the voltage or the friction force.
 
-A control says which part of the step is known; where a force is prescribed instead, it gives the
-extra unknown with the equation that settles it (`evfem.contact.condensed.ExtraUnknown`), its share
-of the residual, and its bounds:
+A control prescribes one quantity. Where that is a force, it gives the extra unknown and its equation
+(`evfem.contact.condensed.ExtraUnknown`), the residual of that equation, and bounds:
 
 ==================  ===========================  ============================  ====================
 control             known                        unknown                       equation
@@ -39,6 +38,8 @@ from evfem.newton.state import State, StepFailed
 
 #: a voltage (V) that is none
 TINY = 1e-300
+#: a given speed that changes by this share of the larger one jumps
+JUMP = 0.25
 #: why no voltage makes a gap (mm)
 TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
@@ -115,7 +116,7 @@ class Unsupported(Indentation):
 
 @dataclass(frozen=True)
 class VoltageProblem:
-    """What a voltage control may ask for: the present squared voltage (kV^2), a solved contact problem, state
+    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state
     for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
     `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
     the residual and by forces with such a state; the present state of the `pad`.
@@ -380,3 +381,18 @@ class Target:
     def reached(self, bone: Floats) -> bool:
         """Whether the bone's translation is, to the last digit, what is known of it."""
         return bool((self.bone(bone) == bone).all())
+
+    def going_on(self, old: State, bone: int) -> State:
+        """`old` as the next part counts it: anew where a given speed jumps on the way to here, that of node
+        `bone` or of the drive.
+        """
+        if old.seconds == 0.0 or self.duration == 0.0:
+            return old
+        before, now = old.rates[0][bone].tolist(), ((self.bone(old.bone) - old.bone) / self.duration).tolist()
+        pairs = list(zip(before, now, strict=True))
+        if self.height.free:
+            del pairs[1]
+        if self.hand is not None:
+            pairs[0] = float(old.hand[3]), (self.x - float(old.hand[0])) / self.duration
+        jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)
+        return replace(old, seconds=0.0) if jumps else old

@@ -28,12 +28,11 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.contact.stability import StabilityRatio
 from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
-from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
+from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
@@ -70,17 +69,10 @@ class Equilibrium:
             age=NO_AGE if self.interface.law is None else np.zeros(nodes),
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
+            rates=np.zeros_like(self.body.body.rates(still)),
         )
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
-
-    def positions(self, u: Floats) -> Floats:
-        """Current positions of the pad nodes (P, 2)."""
-        return self.interface.positions(u)
-
-    def contact_forces(self, state: State) -> Floats:
-        """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
-        return self.interface.contact_forces(state)
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
@@ -107,7 +99,7 @@ class Equilibrium:
         return self._given_way(old, held, frozen, found) if found.touching.any() else found
 
     def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
-        """Where a finger without a force stands that is touched at `target`, from the iterate `touched`.
+        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`.
 
         Without mass every height above is an equilibrium too: its lowest node then just does not touch.
         """
@@ -133,20 +125,8 @@ class Equilibrium:
         assert other is not None
         held = self._try(old, replace(target, voltage=other), frozen, start)
         if not sticks(held):
-            raise StepFailed("the wished friction force was not found", self.record.residuals)
+            raise StepFailed("the prescribed friction force was not found", self.record.residuals)
         return held
-
-    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
-        """Stability ratio of the equilibrium `state`."""
-        return self.body.stability_ratio(state, target)
-
-    def reusable(self) -> Reusable:
-        """Data of the solver that the next step reuses."""
-        return self.body.reusable()
-
-    def resume(self, state: State, carried: Reusable) -> None:
-        """Put the solver where it was after the step that led to `state`."""
-        self.body.resume(state, carried)
 
     def _try(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
         try:
@@ -179,12 +159,12 @@ class Equilibrium:
             if reached and balance.residual <= self.tolerance:
                 if self._accepts(old, state, target):
                     return self._accepted(old, state, target)
-                if iteration > changed:  # nodes were let go or admitted: what follows is another problem
+                if iteration > changed:  # other nodes are held or candidates: another problem begins
                     changed = iteration + 1
             if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
-            self.interface.jumps.watch(self.positions(state.u)[:, 0], state.touching)
+            self.interface.jumps.watch(self.interface.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 

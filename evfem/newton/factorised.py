@@ -100,7 +100,7 @@ class FactorisedBody:
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
-        """Where iterations begin: the last increment once more, or moved with the bone if nothing touches."""
+        """Start of the iterations: the last increment once more, or the bone's if nothing touches."""
         state = replace(state, voltage=target.voltage.guess(state.voltage))
         if state.touching.any():
             return self._extrapolated(state, target)
@@ -272,7 +272,7 @@ class FactorisedBody:
         return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
 
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
-        """What a voltage control has; `saved` is the residual's state for the backward solve."""
+        """Data for a voltage control; `saved` is the residual's state for the backward solve."""
         factor, pad, nodes = self.linearisation.factor, self._pad_state(state), self.pad.nodes
 
         def pushed(forces: Floats) -> tuple[Floats, Floats]:
@@ -335,10 +335,10 @@ class FactorisedBody:
     # -- a step ends
 
     def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
-        """How crests push the finger out of the equilibrium `state` faster than it is held, by the
-        tangent at hand and by the one there: iterations may come to such a one from afar. Not asked of
-        tissue in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue
-        that gives way by itself, a negative compliance, is not seen.
+        """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by
+        the tangent at hand and by the one there, else None: iterations may converge to such a state from
+        afar. Not tested for tissue in time, in three dimensions, and for the attraction, whose instability
+        the iterations show; a tangent of the tissue that is not positive definite is not detected.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
@@ -367,7 +367,9 @@ class FactorisedBody:
         """The converged state with its velocity, its increment and what branches keep of it."""
         velocity, increment = self.body.velocity(state.u), state.u - old.u
         state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
-        return replace(state, pressure=NO_PRESSURE)
+        rates = self.body.rates(state.u)
+        seconds = self.body.beginning[1] if rates.size else 0.0
+        return replace(state, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
 
     def add_candidates(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""

@@ -1,5 +1,4 @@
-r"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys
-their laws.
+r"""The interface of pad and surface: gaps, slips and friction of the pad nodes, and the laws of contact.
 
 Contact forces of a state are along the profile's normal and tangent at the node's x, in three dimensions
 along z too. Slip is counted along the profile, :math:`r\,\Delta x` with its stretch r, from the last accepted
@@ -116,8 +115,8 @@ class Interface:
     """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh.
 
     Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where each
-    has three unknowns in a dense compliance, the candidates follow the contact: those of the last step that
-    are far by now are let go.
+    has three unknowns in a dense compliance, the candidates follow the contact: those that are far by now
+    are dropped.
     """
 
     _surfaces: tuple[tuple[Floats, SurfaceState], ...] = ()
@@ -234,7 +233,7 @@ class Interface:
         )
 
     def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
-        """These pad nodes (k,) as a law of friction sees them, with coefficients (k,) and slips (k,)."""
+        """Data of a law of friction at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         length = self.tributary(state)[nodes]
         nodal = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
@@ -293,7 +292,7 @@ class Interface:
         return self._slipping(old, state, np.arange(x.size), mu, way).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
-        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
+        """Origin of the slip (P,): the last accepted x, or the jump of friction that holds a node."""
         return np.where(self.jumps.held, self.jumps.x, self.positions(old.u)[:, 0])
 
     def compliance(self, old: State) -> Floats:

@@ -22,7 +22,7 @@ from evfem.plotting.footprint import footprint
 from evfem.plotting.meshes import regions
 from evfem.plotting.movie import animate
 from evfem.plotting.response import tornado
-from evfem.plotting.sweeps import sweep, sweep_map
+from evfem.plotting.sweeps import sweep, sweep_histogram, sweep_map, sweep_scatter
 
 __all__ = [
     "FIELDS",
@@ -44,6 +44,8 @@ __all__ = [
     "signal",
     "spectrum",
     "sweep",
+    "sweep_histogram",
     "sweep_map",
+    "sweep_scatter",
     "tornado",
 ]

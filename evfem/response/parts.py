@@ -93,7 +93,7 @@ class Equations:
         return self.smooth(state) + self.kinked(state)
 
     def smooth(self, state: State) -> Floats:
-        """The part of R (m,) that is smooth over long ways: tissue, bone; above a flat surface gaps, sticking."""
+        """The part of R (m,) that is smooth over long ways: tissue, bone; on flat surfaces gaps, sticking."""
         forces = self._tissue(state)
         contact = np.where(self._near(state), 0.0, self.contact(state)[0])
         bone = self._bone(replace(state, reaction=forces[self.model.body.bone]))

@@ -200,7 +200,7 @@ class _Differentiated:
     def _factorise(self, here: Equations, new: State) -> bool:
         """Factorise the matrix of a part; what is singular solves to nan."""
         model = self.run.model
-        near = np.union1d(model.equilibrium.reusable().candidates, np.flatnonzero(new.status != OPEN))
+        near = np.union1d(model.equilibrium.body.reusable().candidates, np.flatnonzero(new.status != OPEN))
         kept = np.concatenate([model.body.unknowns[model.pad.nodes[near]].ravel(), model.body.bone])
         if self._factor is None or not np.array_equal(kept, self._factor.kept):
             self._factor = make_condensation(model.body.pattern, kept, self.run.scene.solver.threads)

@@ -380,24 +380,6 @@ def test_a_scene_file_says_it_and_a_dumped_one_too(law):
     assert KINDS[law.kind] is type(law)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("friction_law = 0.3", "surface.friction_law: given 0.3; allowed: a table"),
-        ('friction_law = {kind = "glue"}', "coulomb | load_index | adhesive | rate | ageing"),
-        ('friction_law = {kind = "adhesive"}', "surface.friction_law.strength"),
-        (
-            'friction_law = {kind = "ageing", fresh = 2.0}',
-            "surface.friction_law.fresh: given 2.0; allowed: a share",
-        ),
-    ],
-)
-def test_mistakes_in_a_file_are_one_sentence(text, said):
-    with pytest.raises(InputError) as caught:
-        loads(TEXT.replace("LAW", text))
-    assert said in str(caught.value)
-
-
 def test_what_cannot_be_is_refused():
     with pytest.raises(InputError, match=r"motion\[1\].speed"):
         slab(STRIBECK, slid())

@@ -112,7 +112,7 @@ def test_a_voltage_that_is_kept_needs_a_pad_that_sticks():
         if state is good:
             assert equilibrium.step(old, target) is good
         else:
-            with pytest.raises(StepFailed, match="wished friction force"):
+            with pytest.raises(StepFailed, match="prescribed friction force"):
                 equilibrium.step(old, target)
 
 

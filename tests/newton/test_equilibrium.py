@@ -173,7 +173,7 @@ def test_frozen_attraction_is_used_as_given():
     frozen[:, 1] = -1e-4
     held = model.equilibrium.step(state, target, frozen)
     np.testing.assert_array_equal(held.attraction, frozen)
-    total = held.reaction + model.equilibrium.contact_forces(held).sum(axis=0) + frozen.sum(axis=0)
+    total = held.reaction + model.equilibrium.interface.contact_forces(held).sum(axis=0) + frozen.sum(axis=0)
     assert np.abs(total).max() < 1e-8 * np.abs(held.reaction).max()
 
 

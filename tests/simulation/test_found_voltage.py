@@ -180,7 +180,7 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
     """At a pad that is out of shape, some nodes touching, with charges that leak."""
     leak = ev.Drive(skin=ev.Dielectric(1e5, conductivity=1e-4), gap_conductivity=1e-8, resolved=True)
     run = Run(scene(dim, 100.0, [ev.Wait(1.0, steps=1)], leak), None)
-    attraction, rest = run.model.attraction, run.model.equilibrium.positions(run.state.u)
+    attraction, rest = run.model.attraction, run.model.equilibrium.interface.positions(run.state.u)
     random = np.random.default_rng(3)
     position = rest + random.uniform(0.0, 0.05, rest.shape)
     position[0, 1] = -0.01
