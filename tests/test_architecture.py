@@ -83,7 +83,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "labels figures fields finger footprint curves sweeps meshes movie",
+        "labels figures fields finger footprint curves sweeps meshes movie response",
     ),
     "studio": ({"numpy"}, "state page runs server"),
 }
