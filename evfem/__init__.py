@@ -13,7 +13,7 @@ import sys as _sys
 from importlib import import_module as _import_module
 from typing import Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 
 #: module -> the public names it gives
 _NAMES = {
@@ -21,6 +21,8 @@ _NAMES = {
     "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
     "calibration.parameters": ("Parameter",),
     "calibration.result": ("FitResult",),
+    "surface.adhesion": ("Capillary", "Dugdale"),
+    "surface.elastic": ("ElasticLayer", "ElasticStack"),
     "surface.friction": (
         "AdhesiveFriction",
         "AgeingFriction",
@@ -50,7 +52,9 @@ _NAMES = {
     "scene.probes": ("Probe",),
     "planning.plan": ("plan",),
     "response.parameters": ("ShapeChange",),
+    "response.design": ("design",),
     "response.sensitivities": ("Sensitivities", "sensitivities"),
+    "response.uncertainty": ("uncertainty",),
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),
     "simulation.checkpoint": ("Checkpoint",),
@@ -128,7 +132,9 @@ def __getattr__(name: str) -> Any:
     elif name in _GONE:
         raise AttributeError(f"{name}: {_GONE[name]}")
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        close = _import_module(f"{__name__}.errors").near(name, __all__)
+        meant = f"; did you mean {close[0]}?" if close else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
     globals()[name] = value
     return value
 

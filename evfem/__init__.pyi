@@ -59,11 +59,13 @@ from evfem.mesh.mesh import Mesh as Mesh
 from evfem.newton.hand import Hand as Hand
 from evfem.newton.strategy import Strategy as Strategy
 from evfem.planning.plan import plan as plan
+from evfem.response.design import design as design
 from evfem.response.impedance import Impedance as Impedance
 from evfem.response.impedance import impedance as impedance
 from evfem.response.parameters import ShapeChange as ShapeChange
 from evfem.response.sensitivities import Sensitivities as Sensitivities
 from evfem.response.sensitivities import sensitivities as sensitivities
+from evfem.response.uncertainty import uncertainty as uncertainty
 from evfem.scene import file as _scene_file
 from evfem.scene.motion import Hover as Hover
 from evfem.scene.motion import Press as Press
@@ -86,6 +88,10 @@ from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate
 from evfem.simulation.spectrum import spectrum as spectrum
 from evfem.surface import surfaces as surfaces
+from evfem.surface.adhesion import Capillary as Capillary
+from evfem.surface.adhesion import Dugdale as Dugdale
+from evfem.surface.elastic import ElasticLayer as ElasticLayer
+from evfem.surface.elastic import ElasticStack as ElasticStack
 from evfem.surface.friction import AdhesiveFriction as AdhesiveFriction
 from evfem.surface.friction import AgeingFriction as AgeingFriction
 from evfem.surface.friction import Coulomb as Coulomb

@@ -19,8 +19,8 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices checks views pools digest storage manifest tables pictures",
+        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray"},
+        "arrays quadrature constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -44,10 +44,11 @@ ROOMS = {
         {"numpy", "scipy", "skfem"},
         "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "friction surfaces textures usersurface pad skin"),
+    "surface": ({"numpy", "scipy"}, "friction adhesion elastic surfaces textures usersurface pad skin"),
     "contact": (
         {"numpy", "scipy"},
-        "charging attraction fullfield drivenfield signorini slipping solve follower condensed stability",
+        "charging attraction adhesive bed fullfield drivenfield signorini slipping solve follower condensed "
+        "stability",
     ),
     "newton": (
         {"numpy", "scipy", "pypardiso"},
@@ -61,16 +62,20 @@ ROOMS = {
     ),
     "planning": (
         {"numpy"},
-        "resolution loaddrift partchecks parts plausibility fieldchoice core timescales pathdependence plan",
+        "resolution loaddrift partchecks parts plausibility fieldchoice core adhesion timescales "
+        "pathdependence plan",
     ),
     "simulation": (
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
-    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities impedance"),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
         "samples file folder table run check",
+    ),
+    "response": (
+        {"numpy", "scipy"},
+        "parameters parts tangent lines sensitivities uncertainty design impedance",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
@@ -83,7 +88,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "labels figures fields finger footprint curves response sweeps meshes movie",
+        "labels figures fields finger footprint curves sweeps meshes movie response",
     ),
     "studio": ({"numpy"}, "state page runs server"),
 }
@@ -107,6 +112,7 @@ LATE = {
     "distributed",
     "pyarrow",
     "pandas",
+    "xarray",
     "SurfaceTopography",
 }
 #: compiled from C, without imports
@@ -325,5 +331,7 @@ def test_every_public_name_can_be_loaded_and_is_listed():
     for name in evfem.__all__:
         assert getattr(evfem, name) is not None
     assert set(evfem.__all__) <= set(dir(evfem))
-    with pytest.raises(AttributeError, match="no attribute 'pinger'"):
+    with pytest.raises(AttributeError, match=r"no attribute 'pinger'"):
         evfem.pinger  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'FingerPd'; did you mean FingerPad\?"):
+        evfem.FingerPd  # noqa: B018

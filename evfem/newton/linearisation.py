@@ -44,6 +44,7 @@ from evfem.newton.interface import Interface
 from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import normals, surface_state
 from evfem.tissue.body import Body
+from evfem.tissue.dynamics import Past
 
 
 def no_progress(residuals: list[float], same: bool) -> bool:
@@ -117,11 +118,11 @@ class Linearisation:
             self._outdated |= (
                 not SHORTER * self._made_at.duration <= duration <= LONGER * self._made_at.duration
             )
-        dynamics.begin(old.u, old.velocity, duration, old.inner)
+        dynamics.begin(old.u, old.velocity, duration, old.inner, old.past)
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
-        position = self.interface.positions(state.u)
+        position = self.interface.places(state)
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
@@ -198,14 +199,15 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        begin, seconds, inner = self.body.beginning
+        begin, seconds, inner, past = self.body.beginning
         at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
-        self._made_at = TangentPoint(*at, state.status, state.pressure, inner)
+        more = (past.rates, past.seconds, state.given, state.strain)
+        self._made_at = TangentPoint(*at, state.status, state.pressure, inner, *more)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
         """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
-        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.positions(state.u))
+        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.places(state))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
         weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
@@ -225,8 +227,10 @@ class Linearisation:
         """Repeats the factorisation made at `at` by the run that is resumed from `state`."""
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
-            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner)
-        self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
+            still, past = np.zeros_like(at.begin), Past(at.seconds, at.rates)
+            self.body.dynamics.begin(at.begin, still, at.duration, at.inner, past)
+        there = replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure)
+        self.factorise(replace(there, given=at.given, strain=at.strain))
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:
@@ -297,7 +301,9 @@ class Linearisation:
         None without attraction, or where they are faint: a symmetric compliance takes a third of
         the time. None with charges too, so that a factorisation does not depend on the step.
         """
-        if self.attraction is None or state.voltage == 0.0 or self.frozen or self.attraction.charging:
+        if self.attraction is None or self.frozen or self.attraction.charging:
+            return None
+        if not self.attraction.acts(state.voltage):
             return None
         position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
         pressing = state.contact_force[:, 0]

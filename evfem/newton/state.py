@@ -12,14 +12,16 @@ from evfem.common.constants import NAMED
 from evfem.contact.signorini import OPEN, STICK
 from evfem.newton.strategy import Strategy
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import NO_BRANCHES
+from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES, Past
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
-#: drive, velocity and force of a hand where there is none
+#: what a hand keeps where there is none
 NO_HAND: Floats = np.zeros(0)
 #: the time since a node touched where nothing depends on it
 NO_AGE: Floats = np.zeros(0)
+#: what a rigid surface gives way by, and its change along x
+NO_BED: Floats = np.zeros((0, 2))
 #: the charges where the voltage is not resolved in time
 NO_CHARGES: Floats = np.zeros((2, 0))
 
@@ -53,9 +55,12 @@ class State:
     the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
     pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
-    Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
-    (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. Maxwell
-    branches keep `inner` (`evfem.tissue.branches`).
+    Coulomb's `age` (P,) in s; with a hand what it keeps, `hand` (6,) (`evfem.newton.hand`); under a voltage
+    resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
+    (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
+    `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface
+    adds to the places of the pad's nodes relative to it is `given` (P, 2) in mm, its derivative along x
+    `strain` (P, 2).
     """
 
     u: Floats
@@ -72,6 +77,15 @@ class State:
     hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    rates: Floats = field(default_factory=lambda: NO_RATES)
+    seconds: float = 0.0
+    given: Floats = field(default_factory=lambda: NO_BED)
+    strain: Floats = field(default_factory=lambda: NO_BED)
+
+    @property
+    def past(self) -> Past:
+        """The part that led here, as the next one counts it."""
+        return Past(self.seconds, self.rates)
 
     @property
     def touching(self) -> Any:
@@ -83,8 +97,8 @@ class State:
 class TangentPoint:
     """Point of a tangent: displacements u (N, dim), voltage, pad nodes that touched (P,) when the step began,
     whether the attraction was frozen, the displacements at the beginning of the time step (N, dim) and its
-    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, and the branches' inner
-    variables when the step began.
+    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, the branches' inner
+    variables when the step began, and mean rates and seconds of the part before.
     """
 
     u: Floats
@@ -96,6 +110,10 @@ class TangentPoint:
     status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    rates: Floats = field(default_factory=lambda: NO_RATES)
+    seconds: float = 0.0
+    given: Floats = field(default_factory=lambda: NO_BED)
+    strain: Floats = field(default_factory=lambda: NO_BED)
 
 
 @dataclass(frozen=True, eq=False)

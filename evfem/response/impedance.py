@@ -40,7 +40,7 @@ from evfem.simulation.model import Model
 from evfem.simulation.result import Result
 from evfem.simulation.run import Run
 from evfem.tensor import derivative
-from evfem.tissue.dynamics import Dynamics, make_dynamics
+from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
 
 AXES = ("normal", "tangential")
 #: steps of differences of a law that drops imaginary parts: in N/mm and mm
@@ -99,8 +99,8 @@ def impedance(source: Scene | Result, frequencies: Any, axis: str = "normal") ->
     Raises
     ------
     InputError
-        Another axis or frequency; a result of a scene that no file can hold; an attraction whose charge is
-        given or takes time.
+        Another axis or frequency; a result of a scene that no file can hold; an elastic surface; an
+        attraction whose charge is given or takes time.
     NotConverged
         A step of the scene has no solution.
 
@@ -145,6 +145,8 @@ def _scene_of(source: Any) -> Scene:
             raise InputError("source", given, "the scene itself") from None
     if not isinstance(source, Scene):
         raise InputError("source", quoted(source), "a Scene or a Result")
+    if source.ground.elastic is not None:
+        raise InputError("source", "a scene with an elastic surface", "a rigid surface")
     resolved = source.drive is not None and source.drive.resolved
     if resolved or isinstance(source.electrics.voltage, (ChargeControl, OpenCircuit)):
         given = "a drive that is resolved in time" if resolved else "a given charge"
@@ -206,7 +208,6 @@ def linearised(model: Model, state: State) -> LinearSystem:
     pattern, contact = body.pattern, Contact(model, state)
     terms = make_dynamics(body.space, finger.materials, finger, "inertial")
     assert terms is not None
-    assert terms.mass is not None
 
     def reduced(matrix: Any) -> Any:
         return contact.onto @ matrix @ contact.along
@@ -223,9 +224,17 @@ def linearised(model: Model, state: State) -> LinearSystem:
     return LinearSystem(
         reduced(pattern.full(body.tangent(state.u)) + contact.stiffness - contact.attraction),
         summed(damping) + reduced(contact.damping),
-        summed(terms.mass.data(pattern).copy()),
+        summed(pattern.componentwise(mass_matrices(body.space) * _density(model)[:, None, None])),
         {time: summed(data) for time, data in branches.items()},
     )
+
+
+def _density(model: Model) -> Floats:
+    """Density (E,) in t/mm3 of every cell."""
+    found = np.zeros(len(model.mesh.cells))
+    for name, law in model.scene.finger.materials.items():
+        found[model.mesh.cells_of(name)] = getattr(law, "density", 1e-9)
+    return found
 
 
 class Contact:

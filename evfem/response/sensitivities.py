@@ -13,11 +13,13 @@ of w, z, p. With :math:`' = d/dp`
 what a part leaves behind, of works and rows, by the run's own code, with no equilibrium solved
 (`evfem.response.lines`). By the parameter, states fixed, over models of changed scenes
 :math:`\epsilon = 10^{-3}` of the parameter apart (of Poisson's ratio of its distance to 1/2; of shapes so
-that no node moves by more than 5e-6 mm); along the derivative of the states so far that no gap changes by
-more than 1/1000 of the length over which the attraction does, or passes a kink of it. With a scale L
-of the argument the error is :math:`12 (\epsilon/L)^4`, about 1e-11, by rounding :math:`10^{-16}/\epsilon`,
-about 1e-12 of what is summed up. So every law, form, surface and mesh is differentiated as it is, whether it
-knows complex numbers or not.
+that no node moves by more than 5e-6 mm). Along the derivative of the states: of tissue, bone and gaps 4e-3
+apart; of attraction and friction so far that no gap changes by more than 1/1000 of the length over which the
+attraction does, or passes a kink of it, and that no node goes on by more than 1e-5 mm along a profile. For a
+function that varies over a scale L of its argument the error is :math:`12 (\epsilon/L)^4`, about 1e-11, and
+by rounding :math:`10^{-16}/\epsilon` of what is summed up: below 1e-9 of the forces with a nail 5000 times as
+stiff as the tissue below. So every law, form, surface and mesh is differentiated as it is, whether it knows
+complex numbers or not.
 
 w' is found by refinement, :math:`w' \leftarrow w' - K^{-1} R'`, with K of `evfem.response.tangent`,
 until R', the derivative of R along all of z', w' and p, is rounding. So K decides only how fast, and that of
@@ -36,6 +38,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,18 +46,21 @@ import numpy as np
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.pools import blas_limits
-from evfem.common.tables import frame
+from evfem.common.storage import write_text
+from evfem.common.tables import csv_text, frame
 from evfem.contact.signorini import OPEN
 from evfem.electrostatics.laws import traction_derivative
 from evfem.errors import InputError, unknown
 from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
 from evfem.newton.control import FollowFriction, Target, Unsupported
 from evfem.newton.state import State
-from evfem.response.lines import NEAR, SMOOTH, Accepted, Beside, Line, differentiable
+from evfem.planning.plan import scene_mesh
+from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
 from evfem.response.parameters import Parameter, parameter_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
+from evfem.simulation.history import COLUMNS, SPATIAL
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
@@ -75,8 +81,8 @@ class _Followed(Ledger):
 
     def accept(self, old: State, new: State) -> bool:
         before = self.mark()
-        if found := super().accept(old, new):
-            self.snapped = True
+        if (found := super().accept(old, new)) and before[1] is not None:
+            self.snapped = True  # in a first part, whose loads are raised in full, it is none of stability
         self.told(old, new, before)
         return found
 
@@ -84,12 +90,12 @@ class _Followed(Ledger):
 class _Differentiated:
     """A run that is followed, its parameters' lines, and the factorised matrix of the last part."""
 
-    def __init__(self, scene: Scene, parameters: Mapping[str, Parameter]) -> None:
+    def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
         self.run = Run(scene, None)
         self.ledger = self.run.ledger = _Followed(self.run.model)
         self.ledger.told = self._accepted
         self.centre = Beside.of(scene, None, 0.0)
-        self.lines = [Line.of(scene, one, self.centre, self._lengths) for one in parameters.values()]
+        self.lines = [Line.of(scene, one, self.centre, self._lengths, works) for one in parameters.values()]
         for line in self.lines:
             self._check(line)
         self._calls: list[tuple[float, float]] = []
@@ -138,7 +144,7 @@ class _Differentiated:
             each.request = next(each.requests)
         self._request, self._calls = request, []
         self.run.advance(replace(request, path=path))
-        if not self.stopped and self.run.rows[-1]["jumps"]:
+        if not self.stopped and self.run.rows[-1]["relaxations"]:
             self._stop(SNAPPED)
         for line in self.lines:
             if self.stopped or line.reason:
@@ -245,9 +251,50 @@ class Sensitivities:
         return self.values[column, parameter]
 
     @property
+    def warnings(self) -> Sequence[str]:
+        """The warnings of the run."""
+        return self.result.warnings
+
+    @property
     def elasticity(self) -> Elasticity:
         """d ln column / d ln parameter (steps,) by column and parameter; nan where the column is 0."""
         return Elasticity(self)
+
+    def moved(self, changes: Mapping[str, float]) -> Result:
+        """The run as its derivatives say it is with parameters changed by so much; columns without stay."""
+        columns: dict[str, Any] = {}
+        for name in (one for one in self.columns if differentiable(one)):
+            more = sum((change * self[name, key] for key, change in changes.items()), np.zeros(1))
+            columns[name] = np.asarray(self.result[name]) + more
+        own: dict[str, Any] = {name: value for name, value in columns.items() if name in COLUMNS}
+        space = {name: columns.get(name, value) for name, value in self.result.in_space.items()}
+        return replace(self.result, **own, in_space=space)
+
+    def gradient(self, function: Callable[[Result], float]) -> dict[str, float]:
+        """Derivatives by every parameter of a number that a smooth `function` makes of a run.
+
+        ``found.gradient(lambda run: run.tangential_force.mean())``
+        """
+        found = {}
+        for key, value in self.parameters.items():
+            way = STEP * (abs(value) or 1.0) / 10.0
+            more, less = (float(function(self.moved({key: sign * way}))) for sign in (1.0, -1.0))
+            found[key] = (more - less) / (2.0 * way)
+        return found
+
+    def effects(self, column: str, step: int = -1) -> tuple[dict[str, float], str]:
+        """The relative derivatives of a column at a step, counted from 0, by parameter; and what they are."""
+        values = {key: float(self.elasticity[column, key][step]) for key in self.parameters}
+        return values, f"d ln {column} / d ln parameter"
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the table and `valid_to`, a row for each step; whole or not at all."""
+        smooth = [name for name in self.columns if differentiable(name)]
+        columns: dict[str, Any] = {"step": [int(step) for step in self.result.step]}
+        for key in self.parameters:
+            columns |= {f"{name} by {key}": self[name, key].tolist() for name in smooth}
+            columns[f"valid_to {key}"] = self.valid_to[key].tolist()
+        write_text(Path(path), csv_text([list(columns), *zip(*columns.values(), strict=True)]))
 
     def table(self) -> Any:
         """A row for each step, a column `COLUMN by PARAMETER` for each pair: a `pandas.DataFrame`, without
@@ -323,7 +370,7 @@ def sensitivities(
     >>> scene = Scene(pad, Display(), Kaczmarek(), 100.0, Hover(gap=0.3, steps=1))
     >>> found = sensitivities(scene, ["electrostatics.voltage"], ["electrostatic_force"])
     >>> round(float(found.elasticity["electrostatic_force", "electrostatics.voltage"][0]), 5)
-    2.00001
+    2.00005
     """
     if not isinstance(scene, Scene):
         from evfem.scene.file import scene_at
@@ -334,8 +381,8 @@ def sensitivities(
     )
     known = {one.name: one for one in (parameter_of(scene, each) for each in given)}
     with blas_limits(), notices.shown(progress):
-        run = _Differentiated(scene, known)
-        wanted = _columns(run, columns)
+        wanted = _columns(scene_mesh(scene)[0].dim, columns)
+        run = _Differentiated(scene, known, any(map(is_work, wanted)))
         bar = notices.bar(scene.total_steps, "step", 0, progress)
         try:
             for request in run.run.requests():
@@ -346,11 +393,9 @@ def sensitivities(
     return _gathered(run, known, wanted)
 
 
-def _columns(run: _Differentiated, columns: Sequence[str] | None) -> tuple[str, ...]:
+def _columns(dim: int, columns: Sequence[str] | None) -> tuple[str, ...]:
     """The columns asked for."""
-    from evfem.simulation.history import COLUMNS, SPATIAL
-
-    names = COLUMNS if run.run.model.mesh.dim == 2 else (*COLUMNS, *SPATIAL)
+    names = COLUMNS if dim == 2 else (*COLUMNS, *SPATIAL)
     numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
     for name in columns or ():
         if name not in numbers:

@@ -64,6 +64,7 @@ class History:
     tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x", "shown"))
     electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards", "shown"))
     electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
+    adhesive_force: Floats = field(metadata=column("N/mm", "adhesion, downwards"))
     contact_width: Floats = field(
         metadata=column("mm", "from the first to the last edge of contact", "shown", whole="mm2")
     )
@@ -71,10 +72,14 @@ class History:
         metadata=column("mm", "sum of what touches, between edges", whole="mm2")
     )
     min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
+    surface_sink: Floats = field(
+        metadata=column("mm", "largest displacement of an elastic surface into it, 0 of a rigid one")
+    )
     peak_contact_pressure: Floats = field(metadata=column("MPa", "largest contact pressure of a node"))
     mean_contact_pressure: Floats = field(metadata=column("MPa", "pressing forces over what touches"))
     external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))
-    electrostatic_work: Floats = field(metadata=column("N", "done by the attraction"))
+    electrostatic_work: Floats = field(metadata=column("N", "done by the attraction of a voltage"))
+    adhesive_work: Floats = field(metadata=column("N", "done by adhesion"))
     stored_energy: Floats = field(metadata=column("N", "in the tissue, and in the springs of a penalty"))
     friction_dissipation: Floats = field(metadata=column("N", "by friction"))
     viscous_dissipation: Floats = field(metadata=column("N", "in the tissue"))
@@ -111,7 +116,7 @@ class History:
         return getattr(self, name)
 
     def table(self) -> Any:
-        """The history with a row for each step: a `pandas.DataFrame`, without pandas a record array."""
+        """The history with a row for each step: a `pandas.DataFrame`, without pandas a numpy record array."""
         return frame({name: np.asarray(self[name]) for name in self.columns})
 
     def to_csv(self, path: str | Path) -> None:
@@ -134,6 +139,8 @@ SPATIAL: Mapping[str, Mapping[str, Any]] = {
     "real_contact_area": column("mm2", "of all that touches", "shown"),
 }
 _ABOUT = {spec.name: spec.metadata for spec in fields(History)}
+#: what is known of each column, of three dimensions too
+ABOUT: Mapping[str, Mapping[str, Any]] = {**_ABOUT, **SPATIAL}
 #: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
 UNITS: Mapping[str, str] = {name: about["unit"] for name, about in _ABOUT.items()}
 WHOLE_UNITS: Mapping[str, str] = {name: about["whole"] for name, about in _ABOUT.items()}
@@ -146,8 +153,7 @@ SPATIAL_UNITS: Mapping[str, str] = {
     **{name: about["unit"] for name, about in SPATIAL.items()},
 }
 NEEDED, SHOWN = (
-    tuple(name for name, about in {**_ABOUT, **SPATIAL}.items() if trait in about["traits"])
-    for trait in ("needed", "shown")
+    tuple(name for name, about in ABOUT.items() if trait in about["traits"]) for trait in ("needed", "shown")
 )
 
 

@@ -18,11 +18,13 @@ import numpy as np
 import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import check_ending, load_arrays, save_arrays
+from evfem.common.tables import dataset
 from evfem.common.views import curves, plus, table
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.archive import mesh_arrays, mesh_of
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.history import (
+    ABOUT,
     COLUMNS,
     DRIFT,
     INTEGERS,
@@ -54,7 +56,7 @@ class Frame:
     `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip. `cauchy_stress`
     holds xx, yy, zz, xy of the cell means, in three dimensions yz and xz too, where `shear_traction` is a
     magnitude; `J` is the volume ratio. Tractions are nodal forces over the current shares of the pad, of the
-    full field over those of its columns.
+    full field over those of its columns. `surface_sink` is how far an elastic surface has sunk below a node.
     """
 
     step: int
@@ -65,6 +67,7 @@ class Frame:
     contact_pressure: Floats = field(metadata={"shape": ("N",)})
     shear_traction: Floats = field(metadata={"shape": ("N",)})
     electrostatic_traction: Floats = field(metadata={"shape": ("N",)})
+    surface_sink: Floats = field(metadata={"shape": ("N",)})
     contact_status: Ints = field(metadata={"shape": ("N",)})
     von_mises: Floats = field(metadata={"shape": ("E",)})
     cauchy_stress: Floats = field(metadata={"shape": ("E", "stresses")})
@@ -79,7 +82,13 @@ class Frame:
 _SHAPES: dict[str, tuple[str, ...]] = {
     spec.name: spec.metadata["shape"] for spec in fields(Frame) if spec.metadata
 }
+#: unit of a field that is not in MPa
+FIELD_UNITS = {"displacement": "mm", "gap": "mm", "surface_sink": "mm", "contact_status": "", "J": ""}
+#: size in a shape -> its name in a data set
+DIMENSIONS = {"N": "node", "E": "cell", "dim": "axis", "stresses": "stress"}
 POINT_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape == ("N",))
+#: fields of nodes that older versions did not write: they were 0
+LATER_FIELDS = ("surface_sink",)
 CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
 
@@ -292,6 +301,35 @@ class Result(History):
             found.append((words.replace("_", " "), f"{plus(self[name][-1]):.4g} {self.units[name]}"))
         return found
 
+    def to_xarray(self) -> Any:
+        """The result as an `xarray.Dataset`: every column over `step`, the fields kept over `frame` (the
+        number of its step) and `node` or `cell`, with `units` and `long_name`; places of the undeformed
+        nodes (mm) are the coordinates x, y and z.
+
+        Raises InputError where xarray is not installed (the extra `xarray`).
+        """
+        about = dict(ABOUT)
+        variables: dict[str, Any] = {
+            name: ("step", self[name], {"units": self.units[name], "long_name": about[name]["meaning"]})
+            for name in self.columns[1:]
+        }
+        for name, shape in _SHAPES.items() if self.frames else ():
+            values = np.stack([np.asarray(getattr(frame, name)) for frame in self.frames])
+            dims = ("frame", *(DIMENSIONS[size] for size in shape))
+            words = {"units": FIELD_UNITS.get(name, "MPa"), "long_name": name.replace("_", " ")}
+            variables[name] = (dims, values, words)
+        axes = "xyz"[: self.mesh.dim]
+        places = zip(axes, self.mesh.points.T, strict=True)
+        coordinates = {
+            "step": self.step,
+            "frame": [frame.step for frame in self.frames],
+            "axis": list(axes),
+            "stress": ["xx", "yy", "zz", "xy", "yz", "xz"][: 4 if self.mesh.dim == 2 else 6],
+            "region": ("cell", self.mesh.region, {"names": json.dumps(dict(self.mesh.region_names))}),
+            **{axis: ("node", place, {"units": "mm"}) for axis, place in places},
+        }
+        return dataset(variables, coordinates, {"provenance": json.dumps(self.provenance)})
+
     def save(self, path: str | Path) -> None:
         """Write one .npz file, in one step. Raises StorageError, and InputError for another ending."""
         check_ending(path, ".npz", "to_csv writes the history, export.paraview the fields")
@@ -382,7 +420,8 @@ class Saved:
 def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:
     if "frames/step" not in arrays:
         return []
-    columns = {spec.name: arrays[f"frames/{spec.name}"] for spec in fields(Frame)}
+    none = {f"frames/{name}": np.zeros_like(arrays["frames/gap"]) for name in LATER_FIELDS}
+    columns = {spec.name: (none | dict(arrays))[f"frames/{spec.name}"] for spec in fields(Frame)}
     size: dict[str, int] = {"N": len(mesh.points), "E": len(mesh.cells), "dim": mesh.dim}
     size["stresses"] = 6 if mesh.dim == 3 else 4
     count = len(columns["step"])

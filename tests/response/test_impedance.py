@@ -155,6 +155,7 @@ SCENES = {
     "load index": (sliding(friction_law=ev.LoadIndexFriction(pressure=0.01, index=1.2)), "normal"),
     "attraction": (sliding(law=ev.Kaczmarek(), voltage=1000.0), "normal"),
     "Maxwell stress": (sliding(law=ev.Kaczmarek(), voltage=1000.0, direction="normal"), "normal"),
+    "adhesion": (sliding(adhesion=ev.Dugdale(stress=0.002, reach=0.05)), "normal"),
     "rough": (sliding(law=ev.Kaczmarek(), voltage=1000.0, roughness_gap=ROUGH), "normal"),
 }
 
@@ -252,3 +253,6 @@ def test_refused():
         ev.impedance(sliding(), 1.0, "sideways")
     with pytest.raises(ev.InputError, match="source"):
         ev.impedance("scene", 1.0)
+    soft = ev.Flat(elastic=ev.ElasticLayer(E=1.0, nu=0.3, thickness=1.0))
+    with pytest.raises(ev.InputError, match="a rigid surface"):
+        ev.impedance(replace(sliding(), surface=soft), 1.0)
