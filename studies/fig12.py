@@ -19,7 +19,7 @@ import numpy as np
 from evfem import data
 
 from .common import Series, Study, side_by_side
-from .plots import COLOURS, Axes, Figure, new_figure, panel_letter
+from .plots import COLOURS, Axes, Figure, new_figure
 from .printed import Printed
 from .rendered import (
     AFTER,
@@ -207,8 +207,7 @@ def draw(outcomes: Mapping[str, Outcome], numbers: Mapping[str, float]) -> Figur
     axes = figure.subplots(3, len(keys), squeeze=False, sharex="col", height_ratios=(1.0, 1.3, 1.0))
     for column, key in zip(axes.T, keys, strict=True):
         letter, title = TITLE[key]
-        panel_letter(column[0], letter)
-        column[0].set_title(title, fontsize="medium")
+        column[0].set_title(f"[{letter}] {title}", loc="left", fontsize="medium")
         _draw_voltage(column[0], outcomes[key], key)
         _draw_force(column[1], outcomes[key], numbers, key)
         _draw_residual(column[2], outcomes[key])

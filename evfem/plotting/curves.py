@@ -39,6 +39,7 @@ from evfem.plotting.labels import (
     column_text,
     kind_of,
     named,
+    on_lines,
     quantity_label,
     units_of,
     values_of,
@@ -71,7 +72,7 @@ TRACTIONS = {
 }
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
 #: width of a letter of a motion's name in inches, and height of its line in points
-LETTER, HIGH = 0.085, 12.0
+LETTER, HIGH = 0.085, 13.0
 OVER = ("step", "position", "position_z", "time", "indentation", "voltage", "applied_force")
 #: so many frequencies are lines from 0, more are a curve; points: a line in front of another is thinner
 FEW, THICK = 100, 4.0
@@ -199,6 +200,7 @@ def _mark_motions(ax: Axes, result: Result) -> None:
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
             ha="center",
+            va="bottom",
         )
         start = end + 1
 
@@ -220,7 +222,7 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
         texts = {column_text(name, result.units[name]): y for name, y in drawn.items()}
         label = column_label if len(drawn) == 1 else axis_label
         lines = [(x, y, look) for y, look in styled(texts)]
-        curves(ax, lines, "", label(next(iter(drawn)), result.units))
+        curves(ax, lines, "", on_lines(label(next(iter(drawn)), result.units)))
     _marked(panels[0], over, result).set_xlabel("")
     panels[-1].set_xlabel(column_label(over, result.units))
     return panels
