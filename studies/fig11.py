@@ -59,14 +59,14 @@ PAPER = {
 }
 PAPER |= {
     f"{pad}.air_share_at_0.05": Printed(
-        digits, f"share of the air at 0.05 N/mm, {pad.replace('_', ' ')}", "", "section 3.2.5", MORE
+        digits, f"share of air at 0.05 N/mm, {pad.replace('_', ' ')}", "", "section 3.2.5", MORE
     )
     for pad, digits in (("with_ridges", "0.40"), ("without_ridges", "0.15"))
 }
 PAPER |= {
     f"{pad}.friction_added_by_air_at_0.05_percent": Printed(
         "10 to 20",
-        f"friction that air adds at 0.05 N/mm, {pad.replace('_', ' ')}",
+        f"friction by air at 0.05 N/mm, {pad.replace('_', ' ')}",
         "%",
         "section 3.2.5",
         FRICTION,
