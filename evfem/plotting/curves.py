@@ -179,16 +179,18 @@ def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
-    """A thin line where a motion ends, its name above; names that would collide stand in rows."""
-    ends = [*np.flatnonzero(np.diff(result.motion_index)).tolist(), len(result.step) - 1]
+    """A thin line where a motion ends, its name above, once for neighbours of one name; names that would
+    collide stand in rows.
+    """
+    for last in np.flatnonzero(np.diff(result.motion_index)):
+        ax.axvline(result.step[last] + 0.5, color="0.6", linewidth=0.8)
+    ends = [*np.flatnonzero(result.motion[1:] != result.motion[:-1]).tolist(), len(result.step) - 1]
     letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
     rows: list[float] = []  # where the last name of each row ends
     start = 0
     for end in ends:
         if end < 0:
             return
-        if end < len(result.step) - 1:
-            ax.axvline(result.step[end] + 0.5, color="0.6", linewidth=0.8)
         middle = 0.5 * (result.step[start] + result.step[end])
         half = 0.5 * letter * (len(result.motion[end]) + 1)
         row = next((row for row, last in enumerate(rows) if last <= middle - half), len(rows))
