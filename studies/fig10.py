@@ -41,7 +41,7 @@ VOLTS = (
     "Table 1's footnotes say 2500 V, everything else 2000 V; forces grow with the square of the voltage, "
     "and only 2000 V gives the printed ones"
 )
-MEAN = "the mean of Table 1, rounded"
+MEAN = "the mean of Table 1, rounded to 0.1 mm"
 AXES = {
     "axes.a_mm": Printed("16.70", "full axis 2a", "mm", PLACE, MEAN),
     "axes.b_mm": Printed("12.80", "full axis 2b", "mm", PLACE, MEAN),

@@ -43,8 +43,8 @@ MORE = (
     "neither the width nor the ridges' cross-section"
 )
 FRICTION = (
-    "friction grows by the attraction's part from the air over the load, and at 1000 V the whole "
-    "attraction is a small part of it; the printed 10 to 20 % are near the share of the attraction"
+    "friction grows by the air's part of the attraction over the load, and at 1000 V the whole attraction "
+    "is 3 to 4 % of the load: an increase by 10 to 20 % needs more than twice the voltage"
 )
 PAPER = {
     f"{pad}.{name}": Printed(

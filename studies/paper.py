@@ -77,7 +77,7 @@ def summary(all_sections: Iterable[Section]) -> list[str]:
     same = len(differences) - len(apart)
     near = sum(share < 1.0 for share in apart)
     return [
-        f"Of {len(differences)} printed numbers {same} are met to the last digit, or as a range.",
+        f"Of {len(differences)} printed numbers {same} agree to the last digit or within the printed range.",
         f"Of the others {near} differ by less than 1 %, {len(apart) - near} by more.",
         "No number is fitted to the paper.",
     ]
