@@ -1,0 +1,82 @@
+r"""Anderson's acceleration of iterations with an older tangent.
+
+An iteration with an older tangent is a fixed-point map, x -> g(x), that contracts slowly along the
+few directions in which the tangent has changed. With the steps :math:`r_k = g(x_k) - x_k` of the
+last iterations, the next iterate is the affine combination
+
+.. math:: x_{k+1} = g_k - \sum_j \theta_j\,(g_{k-j+1} - g_{k-j}), \qquad
+          \theta = \arg\min \| r_k - \sum_j \theta_j\,(r_{k-j+1} - r_{k-j}) \| .
+
+New tangents in iterations one after the other give maps that differ little: their iterates are combined
+too. Closed gaps, stick and slipping shear forces are linear relations between displacements and forces,
+so a combination obeys them as long as no status has changed. Source: D. G. Anderson, J. ACM 12 (1965)
+547, doi:10.1145/321296.321305.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
+from evfem.newton.state import State
+
+
+class Anderson:
+    """Remembers a step's last iterations under one map: changes of steps and images, and products."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the iterations: the map has changed."""
+        self._last: tuple[Floats, Floats] | None = None
+        self._changes: list[tuple[Floats, Floats]] = []
+        self._products = np.zeros((0, 0))
+
+    def next_iterate(self, before: State, after: State) -> State:
+        """A better iterate than `after`, the image of `before`; `after` itself while the map is unknown."""
+        if not np.array_equal(before.status, after.status):
+            self.reset()
+            return after
+        step, image = (after.u - before.u).ravel(), _vector(after)
+        last, self._last = self._last, (step, image)
+        if last is None:
+            return after
+        self._remember(step - last[0], image - last[1])
+        right = [change @ step for change, _ in self._changes]
+        shares = np.linalg.lstsq(self._products, right, rcond=1e-12)[0]
+        image = image.copy()
+        for share, (_, change) in zip(shares, self._changes, strict=True):
+            image -= share * change
+        return _state(after, image)
+
+    def _remember(self, step: Floats, image: Floats) -> None:
+        """Keep these changes, and drop what is older than `ANDERSON_DEPTH` iterations."""
+        self._changes = [*self._changes, (step, image)][-ANDERSON_DEPTH:]
+        kept = len(self._changes)
+        products = np.empty((kept, kept))
+        products[:-1, :-1] = self._products[
+            len(self._products) + 1 - kept :, len(self._products) + 1 - kept :
+        ]
+        products[-1] = products[:, -1] = [step @ change for change, _ in self._changes]
+        self._products = products
+
+
+def _vector(state: State) -> Floats:
+    squared = np.copysign((state.voltage / KILOVOLT) ** 2, state.voltage)
+    parts = (state.u, state.contact_force, state.bone, state.pressure)
+    return np.concatenate([*(part.ravel() for part in parts), [squared]])
+
+
+def _state(state: State, vector: Floats) -> State:
+    parts, end = [], 0
+    for part in (state.u, state.contact_force, state.bone, state.pressure):
+        begin, end = end, end + part.size
+        parts.append(vector[begin:end].reshape(part.shape))
+    u, force, bone, pressure = parts
+    squared = max(np.copysign(1.0, state.voltage) * vector[-1], 0.0)
+    voltage = float(np.copysign(KILOVOLT * np.sqrt(squared), state.voltage))
+    return replace(state, u=u, contact_force=force, bone=bone, pressure=pressure, voltage=voltage)

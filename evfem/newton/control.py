@@ -1,0 +1,381 @@
+r"""Controls of a step: the bone's height or the force on it, the voltage or the friction force.
+
+A control prescribes one quantity. Where that is a force, it gives the extra unknown and its equation
+(`evfem.contact.condensed.ExtraUnknown`), the residual of that equation, and bounds:
+
+==================  ===========================  ============================  ====================
+control             known                        unknown                       equation
+==================  ===========================  ============================  ====================
+`Indentation`       height of the bone                                         none
+`Force`                                          travel of the bone            F_y = -force
+`Unsupported`             height of the bone           travel of the bone            F_y = 0, if touched
+`GivenVoltage`      voltage                                                    none
+`KeptCharge`        charge of the electrode      voltage                       Q = charge
+`GivenGap`          smallest gap of the pad      squared voltage               g = gap
+`FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
+==================  ===========================  ============================  ====================
+
+Without charges between the layers attraction is proportional to the squared voltage, so that this unknown
+enters linearly. A control of one's own (a spring behind the bone, a prescribed charge) is a class with the
+methods of `HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.constants import KILOVOLT
+from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
+from evfem.contact.signorini import STICK
+from evfem.electrostatics.signals import PadState, Reading, electrode_charge, smallest_gap
+from evfem.newton.hand import HandControl
+from evfem.newton.state import State, StepFailed
+
+#: a voltage (V) that is none
+TINY = 1e-300
+#: why no voltage makes a gap (mm)
+TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
+#: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
+AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
+
+
+class HeightControl:
+    """Control of the bone's height: prescribed, here, or an unknown (`free`) with an equation."""
+
+    free = False
+
+    def known(self, height: float) -> float:
+        """The prescribed height (mm), or the present `height` where it is an unknown."""
+        return height
+
+    def missing(self, height: float, reaction: Floats) -> float:
+        """Upward force (N/mm) on the bone that the equation lacks at a height and reactions (2,)."""
+        return 0.0
+
+    def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
+        """The extra unknown, the bone's travel from `height` in mm, or nothing."""
+        return ()
+
+    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
+        """The control at `fraction` of the way to another one of its kind."""
+        return end
+
+
+@dataclass(frozen=True)
+class Indentation(HeightControl):
+    """The bone stands at `height` (mm)."""
+
+    height: float
+
+    def known(self, height: float) -> float:
+        return self.height
+
+    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
+        assert isinstance(end, Indentation)
+        return Indentation(self.height + fraction * (end.height - self.height))
+
+
+@dataclass(frozen=True)
+class Force(HeightControl):
+    """The bone carries the downward `force` (N/mm)."""
+
+    force: float
+    free = True
+
+    def missing(self, height: float, reaction: Floats) -> float:
+        return float(-self.force - reaction[1])
+
+    def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
+        return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
+
+    def towards(self, end: HeightControl, fraction: float) -> Force:
+        if isinstance(end, Unsupported):
+            return self
+        assert isinstance(end, Force)
+        return Force(self.force + fraction * (end.force - self.force))
+
+
+class Unsupported(Indentation):
+    """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
+    begins; touched on the way, by a crest or by tissue that recovers, it gives way (`Equilibrium.step`).
+
+    >>> Unsupported(0.3).towards(Force(0.0), 0.5)
+    Force(force=0.0)
+    """
+
+    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
+        return end
+
+
+@dataclass(frozen=True)
+class VoltageProblem:
+    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state
+    for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
+    `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
+    the residual and by forces with such a state; the present state of the `pad`.
+    """
+
+    squared: float
+    solve: Callable[[LinearContactStep], StepSolution]
+    unit: Callable[[], tuple[Floats, Floats]]
+    pushed: Any = None
+    measured: Any = None
+    pad: Any = None
+
+
+@dataclass(frozen=True)
+class VoltageStep:
+    """A solved step, the change of the voltage's unknown (kV^2 or kV), the state for the backward solve."""
+
+    solution: StepSolution
+    change: float = 0.0
+    unit: Floats | float = 0.0
+
+
+class VoltageControl:
+    """Control of the voltage: `voltage` (V), prescribed or the largest; `free`: it is an unknown."""
+
+    follows: Any = False
+    free: Any = False
+    voltage: float = 0.0
+
+    def begin(self, old: State) -> None:
+        """A step from `old` begins."""
+
+    def guess(self, voltage: float) -> float:
+        """Voltage at which the iterations of a step begin that comes from `voltage`."""
+        return voltage
+
+    def missing(self, reaction: Floats) -> float:
+        """Force on the bone along x (N/mm) that the control's equation lacks at these reactions (2,)."""
+        return 0.0
+
+    def lacking(self, pad: PadState) -> float:
+        """Relative residual of an equation that is no balance of forces."""
+        return 0.0
+
+    def held(self, pad: PadState) -> float:
+        """The voltage (V) if the pad stays where it is."""
+        return self.voltage
+
+    def after(self, voltage: float, change: float) -> float:
+        """The voltage (V), its sign kept, after a change of its unknown, here its square in kV^2."""
+        squared = (voltage / KILOVOLT) ** 2 + change
+        return float(np.copysign(KILOVOLT * np.sqrt(max(squared, 0.0)), voltage))
+
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
+        """Contact, together with the voltage where it is an unknown."""
+        return VoltageStep(problem.solve(step))
+
+    def unknowns(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+        """The voltage where it follows what the pad does, or nothing."""
+        return ()
+
+    def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
+        """Whether the equation, or its bound, holds for a bone that moves `forward` (+1 or -1)."""
+        return True
+
+    def fallback(self, old: State, found: State | None) -> VoltageControl | None:
+        """Another control where the step with this one failed (None) or has no sensible answer."""
+        return None
+
+
+@dataclass(frozen=True)
+class GivenVoltage(VoltageControl):
+    """The voltage is `voltage` (V)."""
+
+    voltage: float
+
+    def guess(self, voltage: float) -> float:
+        return self.voltage
+
+
+class ConstrainedVoltage(VoltageControl):
+    """The voltage is an unknown, and a quantity of the state has a prescribed value: one more equation,
+    linear in voltage and displacements. It is regular where a prescribed voltage has no equilibrium: the
+    attraction under a given charge does not grow as the gap closes.
+    """
+
+    free = True
+
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        """The quantity and its prescribed value."""
+        raise NotImplementedError
+
+    def unit(self, pad: PadState) -> Floats:
+        """Forces (P, dim) on the pad nodes per unit of the voltage's unknown."""
+        raise NotImplementedError
+
+    def unknown(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, Floats]:
+        """The unknown, and the part of the backward solve that a unit of it adds."""
+        reading, prescribed = self.read(problem.pad)
+        saved, push = problem.pushed(self.unit(problem.pad))
+        row, still, own = problem.measured(reading.by_position, saved)
+        travels = [row[unknown.axis - step.body.dim] for unknown in step.unknowns]
+        gains = np.array([*travels, reading.by_voltage + own])
+        return ExtraUnknown(push, 0, 0.0, Condition(row, gains, prescribed - reading.value - still)), saved
+
+    def unknowns(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+        return (self.unknown(step, problem)[0],)
+
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
+        unknown, saved = self.unknown(step, problem)
+        found = problem.solve(replace(step, unknowns=(*step.unknowns, unknown)))
+        return VoltageStep(found, float(found.extra[-1]), saved)
+
+
+@dataclass(frozen=True)
+class KeptCharge(ConstrainedVoltage):
+    """The electrode has `charge` over eps_0 (V, in space V mm), None: as before. Unknown: voltage in kV."""
+
+    charge: float | None = None
+
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        charging = pad.attraction.charging
+        kept = charging.electrode_charge(charging.old) if self.charge is None else self.charge
+        return electrode_charge(pad), kept
+
+    def unit(self, pad: PadState) -> Floats:
+        return pad.slope
+
+    def lacking(self, pad: PadState) -> float:
+        wanted = self.held(pad)
+        return abs(wanted - pad.voltage) / max(abs(wanted), abs(pad.voltage), TINY)
+
+    def held(self, pad: PadState) -> float:
+        reading, kept = self.read(pad)
+        return self.after(pad.voltage, (kept - reading.value) / reading.by_voltage)
+
+    def after(self, voltage: float, change: float) -> float:
+        return voltage + KILOVOLT * change
+
+
+@dataclass(frozen=True)
+class GivenGap(ConstrainedVoltage):
+    """The smallest gap of the deformed pad is `gap` (mm). The unknown is the squared voltage (kV^2)."""
+
+    gap: float
+
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        return smallest_gap(pad), self.gap
+
+    def unit(self, pad: PadState) -> Floats:
+        return pad.forces(KILOVOLT)
+
+    def lacking(self, pad: PadState) -> float:
+        return abs(smallest_gap(pad).value / self.gap - 1.0)
+
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
+        found = super().solve(step, problem)
+        if problem.squared == 0.0 and found.change < 0.0:
+            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(problem.pad).value), [])
+        return found
+
+
+@dataclass
+class FollowFriction(VoltageControl):
+    """The voltage, from 0 to `voltage` (V), makes the bone's force along x `force` (N/mm).
+
+    Friction of a pad that sticks hardly depends on the voltage, which then stays as it was.
+    """
+
+    force: float
+    voltage: float
+    _mode: str = field(default=UNKNOWN, repr=False, compare=False)
+    follows = True
+
+    @property
+    def free(self) -> bool:
+        """Whether the voltage is between its bounds."""
+        return self._mode == UNKNOWN
+
+    def begin(self, old: State) -> None:
+        self._mode = AT_ZERO if old.voltage == 0.0 else UNKNOWN
+
+    def missing(self, reaction: Floats) -> float:
+        return float(self.force - reaction[0]) if self.free else 0.0
+
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
+        if not self.free:
+            return VoltageStep(problem.solve(step))
+        unit, push = problem.unit()
+        found = problem.solve(replace(step, unknowns=(*step.unknowns, ExtraUnknown(push, 0, self.force))))
+        most, change = (self.voltage / KILOVOLT) ** 2, float(found.extra[-1])
+        if not 0.0 <= problem.squared + change <= most:
+            self._mode = AT_ZERO if problem.squared + change < 0.0 else AT_LIMIT
+            change = (0.0 if self._mode == AT_ZERO else most) - problem.squared
+            found = problem.solve(replace(step, residual=step.residual + change * push))
+        return VoltageStep(found, change, unit)
+
+    def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
+        """At a bound the force may miss `force` in its direction; else the voltage is unknown again."""
+        if self.free:
+            return True
+        lacking = forward * (self.force - reaction[0])
+        if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
+            self._mode = UNKNOWN
+            return False
+        return True
+
+    def fallback(self, old: State, found: State | None) -> VoltageControl | None:
+        if found is not None and not (self._mode == AT_LIMIT and sticks(found)):
+            return None
+        return GivenVoltage(old.voltage)
+
+
+def sticks(state: State) -> bool:
+    """Whether any node sticks."""
+    return bool((state.status == STICK).any())
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds,
+    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x is then that of
+    the drive, and the bone's an unknown.
+    """
+
+    x: float
+    height: HeightControl
+    voltage: VoltageControl
+    duration: float = 0.0
+    z: float | None = None
+    hand: HandControl | None = None
+
+    @classmethod
+    def held(cls, bone: Floats, voltage: float) -> Target:
+        """The bone at a given translation (dim,), under a given voltage.
+
+        >>> Target.held(np.array([0.5, -0.1, 2.0]), 100.0).bone(np.zeros(3)).tolist()
+        [0.5, -0.1, 2.0]
+        """
+        z = float(bone[2]) if len(bone) == 3 else None
+        return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage), z=z)
+
+    def bone(self, present: Floats) -> Floats:
+        """Translation of the bone (dim,) as far as it is known; the `present` one where it is not."""
+        x = self.x if self.hand is None else float(present[0])
+        along = [] if self.z is None else [self.z]
+        return np.array([x, self.height.known(float(present[1])), *along])
+
+    def increment(self, present: Floats) -> Floats:
+        """Expected displacement of the bone from its `present` translation (dim,)."""
+        increment = self.bone(present) - present
+        if self.hand is not None:
+            increment[0] = self.hand.increment
+        return increment
+
+    def begun(self, old: State) -> Target:
+        """The target of a step that starts from `old`."""
+        if self.hand is None:
+            return self
+        return replace(self, hand=self.hand.begun(old, self.x, self.duration))
+
+    def reached(self, bone: Floats) -> bool:
+        """Whether the bone's translation is, to the last digit, what is known of it."""
+        return bool((self.bone(bone) == bone).all())

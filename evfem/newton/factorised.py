@@ -1,0 +1,397 @@
+r"""The finger's finite elements in an equilibrium step (`evfem.newton.equilibrium`): factorise, solve
+contact, move.
+
+Algorithm (`FactorisedBody.advance`), one outer iteration::
+
+    factorise at the iterate if the factorisation at hand has become too old
+    g <- forward elimination of -R
+    forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
+    if the bone would move too far for a linear step: shorten its travel and solve contact again
+    du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
+    next iterate <- Anderson's combination with those before (`evfem.newton.anderson`), unless it goes
+        too far, or the attraction's negative stiffness had to be scaled down; a new tangent after an
+        older one begins anew
+
+If contact has no solution with an older tangent, the iteration is done again with a new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.constants import (
+    CANDIDATE_GROWTH,
+    CANDIDATE_ROUNDS,
+    KILOVOLT,
+    LARGEST_BONE_INCREMENT,
+    REACH,
+    SHORTEST_FRACTION,
+    SMALLEST_FORCE,
+    SMALLEST_J,
+    TURNED,
+)
+from evfem.contact.attraction import Attraction
+from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
+from evfem.contact.signorini import FORWARD, ContactNotSolved
+from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
+from evfem.electrostatics.signals import PadState
+from evfem.newton.anderson import Anderson
+from evfem.newton.control import Target, VoltageProblem
+from evfem.newton.interface import Interface
+from evfem.newton.linearisation import Linearisation
+from evfem.newton.pressure import Pressure
+from evfem.newton.state import (
+    NO_PRESSURE,
+    Balance,
+    Limits,
+    MixedBalance,
+    Reusable,
+    State,
+    StepFailed,
+    findings,
+)
+from evfem.newton.travel import Travel
+from evfem.tissue.body import Body
+
+
+@dataclass(frozen=True, eq=False)
+class Update:
+    """A linear step's changes: contact, bone (2,), displacements (N, 2) in mm, voltage; the usable part."""
+
+    contact: StepSolution
+    bone: Floats
+    u: Floats
+    driven: float
+    fraction: float
+
+
+class FactorisedBody:
+    """The finger's finite elements: contact is solved on their condensed tangent."""
+
+    def __init__(
+        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
+    ) -> None:
+        self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
+        self.size, self.pad = body.space.size, interface.pad
+        self.linearisation = Linearisation(body, interface, attraction, limits)
+        self.pressure = Pressure(body.tissue, self.linearisation)
+        self.record = self.linearisation.record
+        longest = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
+        self.travel = Travel(interface, self._solve, longest)
+        self._anderson = Anderson()
+        self._renewed = False
+        self._scaled_down = False
+
+    # -- a step begins
+
+    def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
+        """Prepare everything for a step, and say where its iterations start."""
+        self.linearisation.begin(old, frozen)
+        state = replace(self._first_guess(start, target), pressure=self.pressure.begin(start.u))
+        travel = abs(target.bone(old.bone)[1] - old.bone[1])
+        self.linearisation.choose_candidates(state, REACH * travel)
+        self.linearisation.start_clock(old, target.duration)
+        self._anderson.reset()
+        self._renewed = False
+        self._scaled_down = False
+        return state
+
+    def _first_guess(self, state: State, target: Target) -> State:
+        """Start of the iterations: the last increment once more, or the bone's if nothing touches."""
+        state = replace(state, voltage=target.voltage.guess(state.voltage))
+        if state.touching.any():
+            return self._extrapolated(state, target)
+        bone = target.bone(state.bone)
+        return replace(state, u=state.u + (bone - state.bone), bone=bone)
+
+    def _extrapolated(self, state: State, target: Target) -> State:
+        """As far along the last increment of the displacements as the bone's next one is along its last."""
+        node = self.body.space.mesh.node_sets["bone"][0]
+        last, ahead = state.last_increment[node], target.increment(state.bone)
+        axis = int(np.argmax(np.abs(ahead)))
+        # where the bone turns off, its last increment along the new way is rounding of either sign
+        if ahead[axis] * last[axis] <= TURNED * ahead[axis] ** 2:
+            return state
+        fraction = min(float(ahead[axis] / last[axis]), self.limits.strategy.reach)
+        u = state.u + fraction * state.last_increment
+        if not self.body.tissue.smallest_J(u) > SMALLEST_J:
+            return state
+        return replace(state, u=u, bone=u[node].copy())
+
+    # -- how far from equilibrium
+
+    def balance(self, state: State, attraction: Floats, target: Target) -> tuple[State, Balance]:
+        """Out-of-balance forces of the reduced unknowns and their relative size."""
+        nodal = self.body.forces(state.u)
+        nodal[self.pad.nodes] -= attraction + self.interface.contact_forces(state)
+        forces = self.body.reduce(nodal)
+        state = replace(state, attraction=attraction, reaction=forces[self.body.bone])
+        residual, mixed = self._largest(state, target, forces), self._with_pressure(state, target, forces)
+        return state, Balance(forces, residual, attraction, mixed)
+
+    def _with_pressure(self, state: State, target: Target, forces: Floats) -> MixedBalance | None:
+        """The balance with the pressure as an unknown, where it is one; `forces` (n,) without."""
+        if not self.pressure.active:
+            return None
+        misfit = self.pressure.misfit(state)
+        further = self.pressure.further_forces(state, misfit)
+        if further is not None:
+            forces = forces + self.body.reduce(further)
+        return MixedBalance(forces, self._largest(state, target, forces), misfit)
+
+    def _largest(self, state: State, target: Target, forces: Floats) -> float:
+        """The largest of the out-of-balance forces (n,), relative to the reaction in them."""
+        reaction = forces[self.body.bone]
+        rounding = self._rounding(state) / self.limits.tolerance
+        largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
+        dim = state.bone.size
+        sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
+        missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
+        if target.hand is not None:
+            missing.append(target.hand.unbalanced(float(state.bone[0]), reaction))
+        free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
+        return max(float(free / largest), target.voltage.lacking(self._pad_state(state)))
+
+    def _rounding(self, state: State) -> float:
+        """Forces (N/mm) below which the balance is rounding: of displacements, stresses and attraction."""
+        epsilon = float(np.finfo(float).eps)
+        travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
+        rounding = epsilon * self.linearisation.stiffest * travel
+        if self.attraction is None or not self.attraction.rounding:
+            return rounding
+        return max(rounding, self.attraction.rounding * float(np.abs(state.attraction).max()))
+
+    # -- one outer iteration
+
+    def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
+        """The next iterate, with the factorisation at hand if that does and a new one if not."""
+        again = self._renewed
+        self._renewed = self.linearisation.refactorise_if_needed(state, self.record.residuals)
+        if self._renewed and not again:
+            self._anderson.reset()
+        try:
+            after = self._linear_step(old, state, target, balance)
+        except ContactNotSolved:
+            if self.linearisation.made_at(state):
+                raise
+            self.linearisation.factorise(state)
+            self._anderson.reset()
+            after = self._linear_step(old, state, target, balance)
+        after = self._grown(old, state, target, balance, after)
+        if self._scaled_down:  # a part of the way to where it leads: no image of the map that is mixed
+            self._anderson.reset()
+            return after
+        return self._mixed(state, after, target)
+
+    def _mixed(self, state: State, after: State, target: Target) -> State:
+        """Anderson's combination of `after` with iterates before; `after` if too far. Prescribed: exact."""
+        mixed = self._anderson.next_iterate(state, after)
+        if mixed is not after and self._goes_too_far(state, mixed, target):
+            self._anderson.reset()
+            return after
+        bone = after.bone.copy()
+        bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
+        voltage = mixed.voltage if target.voltage.free else after.voltage
+        if target.hand is not None:
+            bone[0] = mixed.bone[0]
+        return replace(mixed, bone=bone, voltage=voltage)
+
+    def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
+        """Whether a combination turns cells inside out, or takes away a bone that nothing holds."""
+        travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
+        return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J
+
+    def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
+        """The next iterate; nodes that sank in become candidates, many of them start the way again."""
+        if not self.interface.follows:
+            return after
+        for _ in range(CANDIDATE_ROUNDS):
+            known = self.linearisation.candidates.size
+            gap = self.interface.shallowest_penetration(after)
+            if gap is None:
+                break
+            self.add_candidates(after, gap)
+            if self.linearisation.candidates.size < CANDIDATE_GROWTH * known:
+                break
+            self.linearisation.factorise(state)
+            self._anderson.reset()
+            after = self._linear_step(old, state, target, balance)
+        return after
+
+    def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
+        """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
+        factor = self.linearisation.factor
+        saved, residual = factor.forward(-balance.of_tangent(self.linearisation.made_at(state)))
+        step = self._contact_step(old, state, target, residual)
+        driven = target.voltage.solve(step, self._problem(saved, state))
+        found, bone = self.travel.limited(step, driven.solution, state, target)
+        if driven.change:
+            saved = saved + driven.change * driven.unit
+        delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))
+        update = Update(found, bone, delta, driven.change, self._largest_fraction(state.u, delta))
+        moved = self._moved(state, target, update)
+        if balance.mixed is None:
+            return moved
+        pressure = self.pressure.after(state, balance.mixed.misfit, delta, update.fraction)
+        return replace(moved, pressure=pressure)
+
+    def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
+        """The linear contact problem at an iterate."""
+        linearisation = self.linearisation
+        weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
+        c, rough = linearisation.candidates, linearisation.roughness(state)
+        known = self.interface.candidates(old, state, c, weakening, gain)
+        if rough is not None:
+            known = replace(known, roughness=rough.of(c))
+        return LinearContactStep(
+            body=linearisation.tangent,
+            candidates=known,
+            residual=residual,
+            bone=target.bone(state.bone) - state.bone,
+            unknowns=self._unknowns(state, target),
+        )
+
+    def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
+        """Travels of the bone that are not given: first along y, then along x."""
+        tangent = self.linearisation.tangent
+        height = target.height.unknowns(tangent, float(state.bone[1]))
+        if target.hand is None:
+            return height
+        return (*height, target.hand.unknown(tangent, float(state.bone[0]), state.bone.size))
+
+    def _solve(self, step: LinearContactStep) -> StepSolution:
+        found = step.solve()
+        self.record.contact_solves += found.solves
+        self._scaled_down = found.reduced
+        return found
+
+    def _pad_state(self, state: State) -> PadState:
+        return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
+
+    def _problem(self, saved: Floats, state: State) -> VoltageProblem:
+        """Data for a voltage control; `saved` is the residual's state for the backward solve."""
+        factor, pad, nodes = self.linearisation.factor, self._pad_state(state), self.pad.nodes
+
+        def pushed(forces: Floats) -> tuple[Floats, Floats]:
+            nodal = np.zeros_like(state.u)
+            nodal[nodes] = forces
+            return factor.forward(self.body.reduce(nodal))
+
+        def measured(gradient: Floats, unit: Floats) -> tuple[Floats, float, float]:
+            row = pushed(gradient)[1]
+            moved = [self.body.expand(factor.backward(each, np.zeros(row.size))) for each in (saved, unit)]
+            still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
+            return row, still, own
+
+        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.forces(KILOVOLT))
+        return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
+
+    def _moved(self, state: State, target: Target, update: Update) -> State:
+        """The iterate after the fraction of an update that may be taken."""
+        c, fraction = self.linearisation.candidates, update.fraction
+        force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
+        force[c], status[c] = update.contact.force, update.contact.status
+        whole = fraction == 1.0 and not target.height.free and target.hand is None
+        voltage = state.voltage
+        if update.driven:
+            voltage = target.voltage.after(voltage, fraction * update.driven)
+        return replace(
+            state,
+            u=state.u + fraction * update.u,
+            contact_force=state.contact_force + fraction * (force - state.contact_force),
+            status=status,
+            bone=target.bone(state.bone) if whole else state.bone + fraction * update.bone,
+            voltage=voltage,
+        )
+
+    def _largest_fraction(self, u: Floats, delta: Floats) -> float:
+        """Largest fraction 1, 1/2, 1/4 ... of an update that keeps every sampled volume."""
+        fraction = 1.0
+        while not self.body.tissue.smallest_J(u + fraction * delta) > SMALLEST_J:
+            fraction *= 0.5
+            if fraction < SHORTEST_FRACTION:
+                raise StepFailed("cells would collapse", self.record.residuals)
+        return fraction
+
+    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
+        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as
+        the curvature of a profile may jump. None in three dimensions.
+        """
+        if state.bone.size == 3:
+            return None
+        ahead = self.begin(state, target, frozen=False, start=state)
+        self.linearisation.factorise(state)
+        still = np.zeros(len(self.linearisation.tangent.schur))
+        none, found = np.zeros(self.body.reduce(state.u).size), []
+        for place in (state, ahead):
+            step = self._contact_step(state, place, target, still)
+            also = target.voltage.unknowns(step, self._problem(none, place))
+            found.append(stability_ratio(replace(step, unknowns=(*step.unknowns, *also))))
+        return max(found, key=lambda one: one.ratio)
+
+    # -- a step ends
+
+    def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
+        """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by
+        the tangent at hand and by the one there, else None: iterations may converge to such a state from
+        afar. Not tested for tissue in time, in three dimensions, and for the attraction, whose instability
+        the iterations show; a tangent of the tissue that is not positive definite is not detected.
+        """
+        dynamics, linearisation = self.body.dynamics, self.linearisation
+        crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
+        timed = dynamics is not None and dynamics.step > 0.0
+        if timed or state.bone.size == 3 or not crests.any():
+            return None
+        if linearisation.refused:
+            linearisation.factorise(state)
+        found = self._pushed_out(old, state, target)
+        if found is not None and not linearisation.made_at(state):
+            linearisation.factorise(state)
+            found = self._pushed_out(old, state, target)
+        return found
+
+    def _pushed_out(self, old: State, state: State, target: Target) -> StabilityRatio | None:
+        """Stability ratio by the present tangent without attraction, if slopes exceed 1; else None."""
+        step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
+        unattracted = replace(step.candidates, negative_stiffness=np.zeros(step.candidates.status.size))
+        try:
+            found = stability_ratio(replace(step, candidates=unattracted))
+        except np.linalg.LinAlgError:
+            return None
+        return found if found.cause == SLOPES and found.ratio > 1.0 else None
+
+    def accepted(self, old: State, state: State) -> State:
+        """The converged state with its velocity, its increment and what branches keep of it."""
+        velocity, increment = self.body.velocity(state.u), state.u - old.u
+        state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
+        return replace(state, pressure=NO_PRESSURE)
+
+    def add_candidates(self, state: State, gap: float) -> None:
+        """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""
+        self.linearisation.choose_candidates(state, max(0.0, gap))
+
+    def discard(self) -> None:
+        """Drop the factorisation, so that the next step starts from a fresh one."""
+        self.linearisation.discard()
+
+    def findings(self, state: State, balance: Balance) -> str:
+        """The largest out-of-balance forces, the state of contact and the smallest volume ratio."""
+        return findings(self.body, state, balance)
+
+    def reusable(self) -> Reusable:
+        """Candidates, where the factorisation was made, and the last time step."""
+        dynamics, linearisation = self.body.dynamics, self.linearisation
+        duration = 0.0 if dynamics is None else dynamics.step
+        return Reusable(linearisation.candidates, linearisation.reusable, duration)
+
+    def resume(self, state: State, carried: Reusable) -> None:
+        """Make the factorisation again that the interrupted run had at hand."""
+        self.linearisation.candidates = carried.candidates
+        if (at := carried.tangent_point) is not None:
+            self.pressure.check(at.pressure)
+            self.linearisation.restore(state, at)
+        if self.body.dynamics is not None:
+            self.body.dynamics.step = carried.duration

@@ -1,0 +1,166 @@
+r"""The hand behind the finger: a spring, a damper and a mass between drive and bone.
+
+Without one the bone is moved by the drive itself. With one its x is an unknown of every step, with
+the force that the bone needs, its reaction R, as the equation: over a step of :math:`\Delta t` from
+the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
+
+.. math:: R = k (X - x) + c\,\frac{(X - X_0) - (x - x_0)}{\Delta t}
+          - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
+
+by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
+and the bone comes to rest. Across the slide, the motion prescribes the bone's height.
+
+Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
+100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
+kg, and the cut-off frequency of the friction, that of a first-order system, by 13.8 Hz
+(`Hand.of_finger`). In the plane all three are per mm of depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Within, above, check_fields, number
+from evfem.contact.condensed import CondensedTangent, ExtraUnknown
+from evfem.newton.state import State
+
+#: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
+STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
+_STIFFNESS = number("a stiffness in N/mm, larger than 0", Within(0.0, 1e9, above=True), "N/mm")
+_DAMPING = number("a damping in N s/mm, not negative", Within(0.0, 1e9), "N s/mm")
+_MASS = number("a mass in t, not negative", Within(0.0, 1e3), "t")
+
+
+@dataclass(frozen=True)
+class Hand:
+    """Spring (N/mm), damper (N s/mm) and mass (t) between drive and bone, per mm of depth.
+
+    >>> Hand(stiffness=0.1)
+    Hand(stiffness=0.1, damping=0.0, mass=0.0)
+    """
+
+    stiffness: Annotated[float, _STIFFNESS, "of the spring, per mm of depth"]
+    damping: Annotated[float, _DAMPING, "of the damper beside it, per mm of depth"] = 0.0
+    mass: Annotated[float, _MASS, "that moves with the bone, per mm of depth"] = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @classmethod
+    def of_finger(cls, speed: float, depth: float = 10.0) -> Hand:
+        """The hand of a finger that slides with `speed` (mm/s) and is `depth` mm deep. Spring and mass are
+        proportional to the speed; the source gives no offset.
+
+        The damper is our reading: a spring k and a damper c are a first-order system whose cut-off
+        frequency is k / (2 pi c), so it is the same at every speed. InputError for a speed or a depth
+        that is not above 0.
+
+        >>> hand = Hand.of_finger(20.0)
+        >>> round(hand.stiffness, 9), round(hand.mass, 12), round(hand.damping, 9)
+        (0.00808, 6.46e-08, 4.659e-06)
+        """
+        above("speed", speed, 0.0, "a speed in mm/s above 0")
+        above("depth", depth, 0.0, "a depth in mm above 0")
+        stiffness = STIFFER * speed / depth
+        return cls(stiffness, stiffness / (2.0 * np.pi * FASTER * speed), HEAVIER * speed / depth)
+
+    @property
+    def timed(self) -> bool:
+        """Whether it knows of time."""
+        return self.damping > 0.0 or self.mass > 0.0
+
+    def stored(self, state: State) -> float:
+        """Energy of the spring in N mm."""
+        return 0.5 * self.stiffness * (state.hand[0] - float(state.bone[0])) ** 2
+
+    def kinetic(self, state: State) -> float:
+        """Energy of the mass in N mm."""
+        return 0.5 * self.mass * float(state.hand[1]) ** 2
+
+    def given(self, old: State, new: State) -> float:
+        """Work of the actuator beyond that on the bone, between two states, in N mm."""
+        drive = 0.5 * (old.hand[2] + new.hand[2]) * (new.hand[0] - old.hand[0])
+        return float(drive - 0.5 * (old.reaction[0] + new.reaction[0]) * (new.bone[0] - old.bone[0]))
+
+    def dissipation(self, old: State, new: State, duration: float) -> float:
+        """Dissipation of the damper in so many seconds, in N mm."""
+        if duration == 0.0:
+            return 0.0
+        stretched = (new.hand[0] - old.hand[0]) - (new.bone[0] - old.bone[0])
+        return float(self.damping * stretched**2 / duration)
+
+
+#: drive's x (mm), the bone's velocity (mm/s) and the drive's force (N/mm) at the beginning of a run
+AT_REST: Floats = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class HandControl:
+    """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s)."""
+
+    hand: Hand
+    drive: float = 0.0
+    duration: float = 0.0
+    before: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def begun(self, old: State, drive: float, duration: float) -> HandControl:
+        """In the step from `old` that takes the drive to x = `drive`."""
+        before = (float(old.hand[0]), float(old.bone[0]), float(old.hand[1]))
+        return HandControl(self.hand, drive, duration, before)
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of the hand at the bone, N/mm per mm."""
+        if self.duration == 0.0:
+            return self.hand.stiffness
+        rate = 1.0 / self.duration
+        return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
+
+    @property
+    def increment(self) -> float:
+        """Displacement of the bone if nothing changes (mm)."""
+        return self.before[2] * self.duration
+
+    def velocity(self, x: float) -> float:
+        """Velocity of the bone at the end of the step, in mm/s."""
+        return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0
+
+    def driving(self, x: float) -> float:
+        """Force of the drive (N/mm), that of spring and damper, at the bone's x."""
+        force = self.hand.stiffness * (self.drive - x)
+        if self.duration > 0.0:
+            stretched = (self.drive - self.before[0]) - (x - self.before[1])
+            force += self.hand.damping * stretched / self.duration
+        return force
+
+    def force(self, x: float) -> float:
+        """Force on the bone (N/mm): that of the drive minus the inertia of the mass."""
+        force = self.driving(x)
+        if self.duration > 0.0:
+            force -= self.hand.mass * (self.velocity(x) - self.before[2]) / self.duration
+        return force
+
+    def missing(self, x: float, reaction: Floats) -> float:
+        """Force along x (N/mm) that the bone lacks at its x and reactions (dim,)."""
+        return float(self.force(x) - reaction[0])
+
+    def unbalanced(self, x: float, reaction: Floats) -> float:
+        """The force `missing` beyond rounding, not negative: each of the four places rounds by itself."""
+        largest = max(abs(place) for place in (x, self.drive, *self.before[:2]))
+        rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
+        return max(abs(self.missing(x, reaction)) - rounding, 0.0)
+
+    def unknown(self, tangent: CondensedTangent, x: float, dim: int) -> ExtraUnknown:
+        """The bone's travel from x, in mm."""
+        push = -tangent.schur[:, -dim]
+        push[-dim] -= self.stiffness
+        return ExtraUnknown(push, 0, self.force(x))
+
+    def settled(self, state: State) -> State:
+        """The accepted state with drive, velocity and force."""
+        x = float(state.bone[0])
+        return replace(state, hand=np.array([self.drive, self.velocity(x), self.driving(x)]))

@@ -1,0 +1,382 @@
+r"""The interface of pad and surface: gaps, slips and friction of the pad nodes, and the laws of contact.
+
+Contact forces of a state are along the profile's normal and tangent at the node's x, in three dimensions
+along z too. Slip is counted along the profile, :math:`r\,\Delta x` with its stretch r, from the last accepted
+x, or from the jump of friction that holds the node (`FrictionJumps`), and along z. A slipping node's shear
+force opposes its slip. With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
+and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import (
+    CHANGES,
+    NEIGHBOURS,
+    PIN_OFFSET,
+    SHORT_RAMP,
+    SHORTEST_LENGTH,
+    SMALLEST_FORCE,
+)
+from evfem.contact.condensed import Candidates
+from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
+from evfem.contact.slipping import OscillatingNodes
+from evfem.newton.state import State
+from evfem.protocols import FrictionLaw
+from evfem.surface.friction import Slipping, with_core
+from evfem.surface.pad import Pad, SurfaceState, surface_state
+from evfem.surface.skin import Skin
+
+
+class FrictionJumps:
+    """Nodes that a jump of the friction coefficient holds during one step; `x` (P,) is nan for free nodes.
+
+    A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
+    to the higher limit. At the jump the coefficient has no single value, and iterates alternate between its
+    two sides. Such a node is fixed `PIN_OFFSET` inside the rougher side, where it sticks with the higher
+    coefficient, and is released below the lower limit. A node that began the step on the rougher side is
+    not held.
+    """
+
+    def __init__(self, jumps: Floats, size: int) -> None:
+        """`jumps` (J, 3): position, coefficient before and behind."""
+        self.table, self.size = jumps, size
+        self.begin(np.zeros(size))
+
+    def begin(self, x: Floats) -> None:
+        """Starts a step with the nodes at x (P,) in mm, none held."""
+        self.x = np.full(self.size, np.nan)
+        self.lower = np.zeros(self.size)
+        if len(self.table):
+            self._side, self._begin = np.searchsorted(self.table[:, 0], x, side="right"), x
+            self._changes = np.zeros(self.size, dtype=np.int64)
+            self._released = np.zeros(self.size, dtype=bool)
+
+    @property
+    def held(self) -> Any:
+        """Nodes at a jump, (P,) bool."""
+        return np.isfinite(self.x)
+
+    def watch(self, x: Floats, touching: Any) -> None:
+        """Counts changes of side at the next iterate; holds a node after `CHANGES` of them."""
+        if not len(self.table):
+            return
+        side = np.searchsorted(self.table[:, 0], x, side="right")
+        moved = touching & (side != self._side) & ~self._released
+        self._changes += moved
+        new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
+        place, before, behind = self.table[np.maximum(side, self._side)[new] - 1].T
+        inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
+        from_smoother = (place - self._begin[new]) * inside > 0.0
+        new = new[from_smoother]
+        self.x[new] = (place + inside)[from_smoother]
+        self.lower[new] = np.minimum(before, behind)[from_smoother]
+        self._side = side
+
+    def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
+        """Releases nodes whose shear force is below the lower `limit` (P,); returns if there were any."""
+        return self.let_go(self.held & (np.abs(shear) < limit - weak))
+
+    def let_go(self, loose: Any) -> bool:
+        """Releases these nodes (P,) bool for the rest of the step; returns whether there were any."""
+        self.x[loose] = np.nan
+        if loose.any():
+            self._released |= loose
+        return bool(loose.any())
+
+
+def steps_of_friction(surface: Any, short: float) -> Floats:
+    """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J,
+    3) in ascending order: position, coefficient before and behind. A ramp that a node crosses in
+    one iteration is to it a jump at its rougher end.
+    """
+    jumps, ramps = surface.friction_jumps, getattr(surface, "friction_ramps", np.zeros((0, 4)))
+    begin, end, before, behind = ramps[ramps[:, 1] - ramps[:, 0] < short].T
+    place = np.where(behind > before, end, begin)
+    both = np.concatenate([jumps, np.stack([place, before, behind], axis=1)])
+    return both[np.argsort(both[:, 0], kind="stable")]
+
+
+#: from a voltage (V) to `Attraction.restored`
+Restored = Callable[[float], tuple[Floats, Floats] | None]
+
+
+def nothing_restored(voltage: float) -> None:
+    """From an attraction without a core."""
+
+
+class Interface:
+    """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh.
+
+    Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where each
+    has three unknowns in a dense compliance, the candidates follow the contact: those that are far by now
+    are dropped.
+    """
+
+    _surfaces: tuple[tuple[Floats, SurfaceState], ...] = ()
+
+    def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
+        self.pad, self.surface, self.tolerance = pad, surface, tolerance
+        self.points = points[pad.nodes]
+        self.dim = points.shape[1]
+        self.follows = self.dim == 3
+        self.length = pad.spacing(self.points)
+        self._down = pad.facing(self.points)
+        # coefficients of friction may change over x in three dimensions, but not jump
+        jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
+        self.jumps = FrictionJumps(jumps, pad.nodes.size)
+        self.law: FrictionLaw | None = None
+        self.restored: Restored = nothing_restored
+        self._oscillating = OscillatingNodes(pad.nodes.size)
+        self.duration = 0.0
+        self.neighbourhood = NEIGHBOURS * self.length
+
+    def begin(self, old: State, duration: float) -> None:
+        """A step of so many seconds starts from `old`."""
+        self.jumps.begin(self.positions(old.u)[:, 0])
+        self._oscillating = OscillatingNodes(self.pad.nodes.size)
+        self.duration = duration
+
+    def positions(self, u: Floats) -> Floats:
+        """Current positions of the pad nodes (P, dim) for displacements u (N, dim)."""
+        return self.points + u[self.pad.nodes]
+
+    def surface_at(self, state: State) -> SurfaceState:
+        """The surface below the pad nodes, kept for the last two states, which many ask for."""
+        for u, found in self._surfaces:
+            if u is state.u:
+                return found
+        found = surface_state(self.surface, self.positions(state.u))
+        self._surfaces = ((state.u, found), *self._surfaces[:1])
+        return found
+
+    def resting(self, state: State) -> Floats:
+        """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""
+        position = self.positions(state.u)
+        touching = state.status != OPEN
+        position[touching, 1] -= self.surface_at(state).gap[touching]
+        return position
+
+    def contact_forces(self, state: State) -> Floats:
+        """Contact forces on the pad nodes in the laboratory frame (P, dim)."""
+        surface = self.surface_at(state)
+        slope, force = surface.slope, state.contact_force.copy()
+        normal, shear = state.contact_force[:, :2].T
+        force[:, 0], force[:, 1] = shear - slope * normal, normal + slope * shear
+        force[:, :2] /= surface.stretch[:, None]
+        return force
+
+    def slip(self, old: State, state: State) -> Floats:
+        """Slips of the pad nodes (P, dim - 1) in mm, along the profile and along z."""
+        position = self.positions(state.u)
+        moved = (position - self.positions(old.u))[:, ::2]
+        moved[:, 0] = self.surface_at(state).stretch * (position[:, 0] - self._origin(old))
+        return moved
+
+    def candidates(
+        self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
+    ) -> Candidates:
+        """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
+        position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
+        compliance = self.compliance(old)[c]
+        slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
+        friction = self.friction(old, c, np.where(self.jumps.held[c], self.jumps.x[c], position[:, 0]))
+        known = Candidates(
+            surface=surface,
+            slip=slip,
+            force=state.contact_force[c],
+            status=state.status[c],
+            friction=friction,
+            friction_slope=np.broadcast_to(self.surface.friction_slope(position[:, 0]), friction.shape),
+            interface_compliance=compliance,
+            negative_stiffness=negative_stiffness[c],
+            gain_on_closing=gain_on_closing[c],
+        )
+        return known if self.law is None else self._obeying(self.law, known, old, state, c)
+
+    def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
+        """The candidates c under a law of friction other than Coulomb's.
+
+        Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
+        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem has the part of F
+        that does not grow with dx; with it, slip and yielding are (1 + K C) times as large.
+        """
+        give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
+        way = sizes(known.slip + give[:, None] * known.force[:, 1:])
+        slip = np.where(known.status >= FORWARD, way, 0.0)
+        moving = self._slipping(old, state, c, known.friction, slip)
+        if self.dim == 2:
+            found = self._oscillating.linearised(law, moving, c, known.status, shear)
+        else:  # the direction of a slip turns: the law by the speed of the iterate
+            found = replace(moving.linearised(law), by_speed=np.zeros_like(slip))
+        by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
+        by_slip = by_speed / self.duration if self.duration > 0.0 else np.zeros_like(slip)
+        yielding = np.maximum(by_slip, 0.0) * give
+        series = 1.0 / (1.0 + yielding)
+        normal = np.maximum(known.force[:, 0], 0.0)
+        by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
+        along_normal, along_tangents = np.split(known.interface_compliance, [1], axis=1)
+        return replace(
+            known,
+            slip=known.slip / series[:, None],
+            interface_compliance=np.hstack([along_normal, along_tangents / series[:, None]]),
+            friction=series * found.slope,
+            cohesion=series * (found.offset + yielding * shear),
+            slip_stiffness=series * by_slip if self.duration > 0.0 else None,
+            friction_slope=series * known.friction_slope * by_place,
+        )
+
+    def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
+        """Data of a law of friction at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
+        speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
+        length = self.tributary(state)[nodes]
+        nodal = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
+        found = self.restored(state.voltage)
+        return nodal if found is None else replace(nodal, withheld=found[0][nodes], left=found[1][nodes])
+
+    def withheld(self, state: State) -> Floats:
+        """Part of attraction and pressing force of closed nodes (P,) that a core takes away, N/mm."""
+        found = self.restored(state.voltage)
+        if found is None:
+            return np.zeros(len(self.points))
+        share = self.tributary(state)
+        pressure = np.maximum(state.contact_force[:, 0], 0.0) / share
+        return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
+
+    def tributary_of(self, position: Floats) -> Floats:
+        """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
+        least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
+        return np.maximum(self.pad.tributary(position), least)
+
+    def tributary(self, state: State) -> Floats:
+        """Tributary lengths or areas (P,) in a state."""
+        return self.tributary_of(self.positions(state.u))
+
+    def tributary_at(self, part: tuple[State, State], x: Floats) -> Floats:
+        """Tributary lengths or areas (P,) at x (P,) between two states; in space the mean of both."""
+        if self.dim == 2:
+            return self.tributary_of(x[:, None])
+        old, new = part
+        return 0.5 * (self.tributary(old) + self.tributary(new))
+
+    def age(self, old: State) -> Floats:
+        """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
+        return np.where(old.touching, old.age + self.duration, 0.0)
+
+    def aged(self, old: State, state: State) -> State:
+        """The accepted state, with contact times if a law of friction is given."""
+        if self.law is None:
+            return state
+        return replace(state, age=self.age(old))
+
+    def resistance(self, part: tuple[State, State], x: Floats, normal: Floats, slip: Floats) -> Floats:
+        """Largest shear forces of the pad nodes (P,) at x under contact forces (P,), slipping by (P,)."""
+        old, new = part
+        mu = self.friction(old, np.arange(x.size), x)
+        if self.law is None:
+            return np.asarray(mu * normal)
+        nodal = self._slipping(old, new, np.arange(x.size), mu, slip)
+        return replace(nodal, normal=normal, length=self.tributary_at(part, x)).bound(self.law)
+
+    def limit(self, old: State, state: State, x: Floats, way: Floats) -> Floats:
+        """Bounds of friction (P,) in N/mm of the pad nodes of `state` at x (P,), slipping by `way` (P,)."""
+        mu = self.friction(old, np.arange(x.size), x)
+        if self.law is None:
+            return np.asarray(mu * state.contact_force[:, 0])
+        return self._slipping(old, state, np.arange(x.size), mu, way).bound(self.law)
+
+    def _origin(self, old: State) -> Floats:
+        """Origin of the slip (P,): the last accepted x, or the jump of friction that holds a node."""
+        return np.where(self.jumps.held, self.jumps.x, self.positions(old.u)[:, 0])
+
+    def compliance(self, old: State) -> Floats:
+        """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
+        return np.zeros_like(old.contact_force)
+
+    def friction(self, old: State, nodes: Ints, x: Floats) -> Floats:
+        """Friction coefficient of these pad nodes (k,) at the positions x (k,) in mm; `old` is the
+        last accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask
+        for it here; `FrictionJumps` alone takes the coefficients on both sides of a jump from the surface.
+        """
+        return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
+
+    def fold(self, state: State) -> float | None:
+        """x (mm) where the pad has folded, or None."""
+        return self.pad.fold(self.positions(state.u), state.touching, self._down)
+
+    def shallowest_penetration(self, state: State) -> float | None:
+        """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
+        gap = self.surface_at(state).gap
+        sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
+        return float(gap[sunk].max()) if sunk.any() else None
+
+    def _strayed(self, old: State, state: State, x: Floats) -> Any:
+        """Pinned nodes (P,) that slipped to another coefficient, or whose interface no longer holds them."""
+        nodes = np.arange(x.size)
+        pinned = self.friction(old, nodes, np.where(self.jumps.held, self.jumps.x, x))
+        here, slips = self.friction(old, nodes, x), state.status >= FORWARD
+        yielded = np.abs(x - self.jumps.x) > self.tolerance * self.length
+        beyond = sizes(state.contact_force[:, 1:]) > self._resting_limit(old, state, here) + self._weak(state)
+        return self.jumps.held & (pinned != here) & (slips | (yielded & beyond))
+
+    def _weak(self, state: State) -> float:
+        """Forces (N/mm) below which a law of contact or friction holds."""
+        return self.tolerance * max(float(np.abs(state.contact_force).max()), SMALLEST_FORCE)
+
+    def obeyed(self, old: State, state: State) -> bool:
+        """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
+        position, surface = self.positions(state.u), self.surface_at(state)
+        short = self.tolerance * self.length
+        active = state.status != OPEN
+        weak = self._weak(state)
+        lower = self._resting_limit(old, state, self.jumps.lower)
+        if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
+            return False
+        if self.jumps.let_go(self._strayed(old, state, position[:, 0])):
+            return False
+        normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
+        compliance = self.compliance(old)[active]
+        slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
+        x = np.where(self.jumps.held, self.jumps.x, position[:, 0])[active]
+        status, nodes = state.status[active], np.flatnonzero(active)
+        way, size = sizes(slip), sizes(shear)
+        limit = (mu := self.friction(old, nodes, x)) * normal
+        if self.law is not None:
+            moving = np.where(status == STICK, 0.0, way)
+            limit = self._slipping(old, state, nodes, mu, moving).bound(self.law)
+        sticks = (way <= short) & (size <= limit + weak)
+        # a slip is known to `short`, and its direction accordingly
+        against = sizes(shear + (limit / np.maximum(way, 1e-300))[:, None] * slip)
+        astray = np.where(way > short, against - limit * short / np.maximum(way, short), 0.0)
+        slips = (limit == 0.0) | ((np.abs(size - limit) <= weak) & (astray <= weak))
+        gap = surface.normal_gap[active] + compliance[:, 0] * normal
+        closed = (np.abs(gap) <= short) & (normal >= -weak)
+        return bool((closed & np.where(status == STICK, sticks, slips)).all())
+
+    def _resting_limit(self, old: State, state: State, mu: Floats) -> Floats:
+        """Shear forces (P,) that hold pad nodes with the coefficients mu (P,)."""
+        if self.law is None:
+            return np.asarray(mu * state.contact_force[:, 0])
+        return self._slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
+
+
+class PenaltyInterface(Interface):
+    """An interface that yields by 1 / (penalty x tributary length) per node; N/mm3, normal and tangent."""
+
+    penalties: tuple[float, float] = (np.inf, np.inf)
+
+    def compliance(self, old: State) -> Floats:
+        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
+        return 1.0 / np.outer(self.tributary(old), self.penalties)
+
+
+def slipped(interface: Interface, old: State, new: State) -> Floats:
+    """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left."""
+    status = np.where(new.touching | (old.status == STICK), new.status, old.status)
+    return np.where((status >= FORWARD)[:, None], interface.slip(old, new), 0.0)

@@ -1,0 +1,325 @@
+r"""The body's tangent as a step uses it: which nodes may touch, where it was factorised, and for
+how long that serves.
+
+A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_needed`)::
+
+    factorise at the present state if
+        there is no factorisation, or the contact candidates have changed, or
+        the time step is another one than it was made for, or
+        the residual has stalled, or falls so slowly that more iterations than `patience` would be left
+    S <- Schur complement on (candidates, bone),  C <- (S_cc - coupling)^-1
+
+The coupling is the stiffness that the attraction's tributary lengths add between neighbouring
+nodes; under the full field, once iterations gain nothing, that of the field itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import (
+    FAR,
+    FIRST_CANDIDATES,
+    LEFT_OVER,
+    LONGER,
+    SHORTER,
+    SLOW,
+    SMALLEST_STIFFENING,
+    SPARE,
+    STABLE,
+    STALLED,
+    STEEP,
+    STEEP_IN_SPACE,
+    SUBTRACTED,
+)
+from evfem.contact.attraction import Attraction
+from evfem.contact.condensed import CondensedTangent
+from evfem.contact.signorini import OPEN, STICK, Roughness
+from evfem.newton.condensation import Singular, make_condensation
+from evfem.newton.interface import Interface
+from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
+from evfem.surface.pad import normals, surface_state
+from evfem.tissue.body import Body
+
+
+def no_progress(residuals: list[float], same: bool) -> bool:
+    """Whether iterations stagnate: over the last two with the `same` nodes in contact, or over the last four
+    with the bone in its place.
+
+    >>> no_progress([1e-2, 2e-2, 5e-2], True), no_progress([1e-2, 2e-2, 5e-2], False)
+    (True, False)
+    """
+    if same and len(residuals) > 2 and min(residuals[-2:]) > residuals[-3]:
+        return True
+    return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
+
+
+def limited_gain(gain: Floats) -> Floats:
+    """Gains of the attraction per contact force (P,), limited for the tangent.
+
+    The net force of a contact force of 1 is 1 - gain. At a gain of 1 the node's equilibrium has a fold;
+    above, the force grows by itself until the rough faces are close. Iterations shall leave such a point,
+    and converge to one below 1 with its own tangent: above `STABLE` the tangent has abs(1 - gain), limited
+    to the range from `LEFT_OVER` to 1 - `STABLE`.
+
+    >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
+    [0.5, 0.95, 0.99, 0.95, 0.9]
+    """
+    return np.where(gain > STABLE, 1.0 - np.clip(np.abs(1.0 - gain), LEFT_OVER, 1.0 - STABLE), gain)
+
+
+class Linearisation:
+    """Candidates, factorisation and condensed tangent of a body under an attraction."""
+
+    def __init__(
+        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
+    ) -> None:
+        self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
+        self.pad = interface.pad
+        self.record = Record()
+        self.candidates: Ints = np.zeros(0, dtype=np.int64)
+        depth = float(np.ptp(body.space.mesh.points[:, 1]))
+        self.softest = min(law.shear_modulus for law, _ in body.tissue.groups) / depth
+        self.steep = STEEP * self.softest
+        height = self.interface.points[:, 1]
+        self._deep = height - height.min() <= FAR * limits.deepest
+        self.factor: Any = None
+        self.tangent: Any = None
+        self.stiffest = 0.0
+        self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
+        self.frozen = False
+        self._made_at: TangentPoint | None = None
+        self._outdated = False
+        self._lets_go = True
+        self._status: Ints = np.zeros(0, dtype=np.int64)
+        self._drag_rate = 0.0
+        self.fringes = False
+
+    def begin(self, old: State, frozen: bool) -> None:
+        """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
+        self.touching, self.frozen = old.status != OPEN, frozen
+        self._lets_go = True
+        self._outdated = self.fringes
+        if self.fringes:
+            self.fringes, self._made_at = False, None
+
+    def start_clock(self, old: State, duration: float) -> None:
+        """Start the clock of a step; a factorisation for a much different duration is outdated."""
+        dynamics = self.body.dynamics
+        self._outdated |= self.body.drag_rate != self._drag_rate
+        if dynamics is None:
+            return
+        if self._made_at is not None:
+            self._outdated |= (
+                not SHORTER * self._made_at.duration <= duration <= LONGER * self._made_at.duration
+            )
+        dynamics.begin(old.u, old.velocity, duration, old.inner)
+
+    def choose_candidates(self, state: State, reach: float) -> None:
+        """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
+        position = self.interface.positions(state.u)
+        gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
+        weakening = self.negative_stiffness(state)
+        if self.interface.follows:
+            self._follow(state, gap, weakening > STEEP_IN_SPACE * self.softest * self.pad.tributary(position))
+            return
+        steep, near = self.steep * self.pad.tributary(position), (gap <= reach) | (state.status != OPEN)
+        needed = self.pad.free & (near | (weakening > steep))
+        if not needed.any():
+            needed[np.argmin(gap)] = True
+        if needed[self.candidates].sum() == needed.sum():
+            return
+        # gap below which `SPARE` times as many nodes lie: a new choice costs an analysis of the matrix
+        enough = np.sort(gap)[min(int(SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
+        wider = (gap <= max(enough, self.interface.neighbourhood)) | (SPARE * weakening > steep)
+        wider = self.pad.free & (wider | self._deep) | needed
+        self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
+        self.factor = None
+
+    def _follow(self, state: State, gap: Floats, steep: Any) -> None:
+        """Candidates are nodes in contact and half as many others; those far away are dropped once a step."""
+        needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
+        if self.candidates.size and needed[self.candidates].sum() == needed.sum():
+            return
+        count = max(SPARE * needed.sum(), FIRST_CANDIDATES * self.pad.free.sum())
+        enough = np.sort(gap)[min(int(count), int(self.pad.free.sum()) - 1)]
+        chosen = np.flatnonzero(self.pad.free & (gap <= enough) | needed)
+        self.candidates = chosen if self._lets_go else np.union1d(self.candidates, chosen)
+        self.factor, self._lets_go = None, False
+
+    # -- factorisation
+
+    def discard(self) -> None:
+        """Drops the factorisation: the next iteration makes a new one."""
+        self.factor = None
+
+    def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
+        """Factorises if there is none, iterations stall, or a new one saves time; returns whether it did."""
+        same, self._status = np.array_equal(self._status, state.status), state.status
+        if self._has_fringes(state) and no_progress(history, same):
+            self._outdated |= not self.fringes
+            self.fringes = True
+        if not self.refused and not self._too_old(history):
+            return False
+        self.factorise(state)
+        return True
+
+    @property
+    def refused(self) -> bool:
+        """No factorisation, or one of other candidates, another drag or time step."""
+        return self.factor is None or self._outdated
+
+    def _has_fringes(self, state: State) -> bool:
+        """Whether the attraction at `state` has a stiffness of its own beside that of columns."""
+        has = self.attraction is not None and self.attraction.has_fringes
+        return has and state.voltage != 0.0 and not self.frozen
+
+    def factorise(self, state: State) -> None:
+        """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
+        self._outdated, self._drag_rate = False, self.body.drag_rate
+        if self.factor is None:
+            unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
+            # static condensation keeps candidates and bone
+            kept = np.concatenate([unknowns, self.body.bone])
+            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
+            self.record.backend = type(self.factor).__name__
+        pressure = state.pressure if state.pressure.size else None
+        upper = self.body.tangent(state.u, pressure)
+        if self.interface.follows:
+            self._weaken(upper, state)
+        try:
+            self.factor.factorise(upper)
+        except Singular as error:
+            raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
+        dim = self.body.bone.size
+        self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
+        self.stiffest = float(upper[self.body.pattern.diagonal].max())
+        begin, seconds, inner = self.body.beginning
+        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
+        self._made_at = TangentPoint(*at, state.status, state.pressure, inner)
+        self.record.factorisations += 1
+
+    def _weaken(self, upper: Floats, state: State) -> None:
+        """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
+        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.positions(state.u))
+        weakening = np.minimum(self.negative_stiffness(state), most)
+        weakening[self.candidates] = 0.0
+        weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
+        unknowns = self.body.unknowns[self.pad.nodes[weakened]][:, 1]
+        upper[self.body.pattern.diagonal[unknowns]] -= weakening[weakened]
+
+    def made_at(self, state: State) -> bool:
+        """Whether the factorisation is that of `state`."""
+        return self._made_at is not None and self._made_at.u is state.u
+
+    @property
+    def reusable(self) -> TangentPoint | None:
+        """Point of the factorisation that the next step may use; none with the field's own stiffness."""
+        return None if self.factor is None or self.fringes else self._made_at
+
+    def restore(self, state: State, at: TangentPoint) -> None:
+        """Repeats the factorisation made at `at` by the run that is resumed from `state`."""
+        self.touching, self.frozen = at.touching, at.frozen
+        if self.body.dynamics is not None:
+            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner)
+        self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
+
+    def _too_old(self, history: list[float]) -> bool:
+        if len(history) < 2:
+            return False
+        before, now = history[-2:]
+        if now > STALLED or now > SLOW * before:
+            return True
+        # iterations left at the last rate of convergence, against the strategy's patience
+        tolerance = self.limits.tolerance
+        if now <= tolerance:
+            return False
+        return bool(np.log(tolerance / now) / np.log(now / before) > self.limits.strategy.patience)
+
+    # -- the attraction's part
+
+    def negative_stiffness(self, state: State) -> Floats:
+        """Negative stiffness of the attraction of every pad node, (P,) in N/mm per mm."""
+        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
+            return np.zeros(self.pad.nodes.size)
+        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
+
+    def gain_on_closing(self, state: State) -> Floats:
+        """Increase of the attraction of every pad node when its gap closes, (P,) in N/mm."""
+        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
+            return np.zeros(self.pad.nodes.size)
+        everywhere = replace(state, status=np.full_like(state.status, STICK))
+        # gaps now, and with every node in contact
+        places = [self.interface.resting(s) for s in (state, everywhere)]
+        at = (state.voltage, self.touching, state.contact_force[:, 0])
+        now, closed = (self.attraction.column_forces(place, *at)[:, 1] for place in places)
+        return np.asarray(self.attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
+
+    def roughness(self, state: State) -> Roughness | None:
+        """Derivatives of the attraction of every pad node by its contact force, where rough faces come
+        closer under it, along normal and tangent: on a slope a vertical force has a tangential component.
+        None for smooth faces.
+        """
+        attraction = self.attraction
+        if (
+            attraction is None
+            or attraction.roughness is None
+            or self.frozen
+            or not attraction.acts(state.voltage)
+        ):
+            return None
+        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        unpressed, pressed = (
+            attraction.column_forces(place, state.voltage, self.touching, each)[:, 1]
+            for each in (None, pressing)
+        )
+        factor = attraction.tangent_factor(place, state.voltage, self.touching, pressing)
+        lost = factor * (unpressed - pressed)
+        surface = self.interface.surface_at(state)
+        along = np.zeros_like(state.contact_force)
+        along[:, :2] = np.stack([np.ones_like(lost), surface.slope], axis=1) / surface.stretch[:, None]
+        if attraction.direction == "normal":
+            along[:, 0], along[:, 1] = surface.stretch, 0.0
+        gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)[:, None] * along
+        # the full tangential gain could close a node on a slope by more than the limited normal gain holds
+        gain[:, 1] = np.where(gain[:, 0] > STABLE, 0.0, gain[:, 1])
+        gain[:, 0] = limited_gain(gain[:, 0])
+        return Roughness(gain, lost[:, None] * along, pressing)
+
+    def _coupling(self, state: State) -> Floats | None:
+        """The attraction's stiffness on the candidates but for the weakening with a node's own
+        gap, which belongs to the contact problem: what is left are changes of tributary lengths.
+        None without attraction, or where they are faint: a symmetric compliance takes a third of
+        the time. None with charges too, so that a factorisation does not depend on the step.
+        """
+        if self.attraction is None or state.voltage == 0.0 or self.frozen or self.attraction.charging:
+            return None
+        position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
+        pressing = state.contact_force[:, 0]
+        whole = self.attraction.stiffness(position, state.voltage, self.touching, pressing)
+        if self.fringes:
+            from evfem.contact.fullfield import FieldAttraction
+
+            assert isinstance(self.attraction, FieldAttraction)
+            whole = self.attraction.fringe_stiffness(position, state.voltage, pressing)
+        unknowns = (dim * c[:, None] + np.arange(dim)).ravel()
+        rows = whole[unknowns]
+        inner = np.asarray(rows[:, unknowns].toarray())
+        # nodes beyond the candidates move along with their neighbours, so that sliding changes nothing
+        index = np.arange(unknowns.size)
+        for a in (0, 2)[: dim - 1]:
+            beyond = np.asarray(rows[:, a::dim].sum(axis=1)).ravel() - inner[:, a::dim].sum(axis=1)
+            inner[index, dim * (index // dim) + a] += beyond
+        normal = np.zeros((c.size, dim))
+        normal[:, :2] = normals(surface_state(self.interface.surface, position[c]))
+        own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        # weakening with a node's own gap belongs to the contact problem: not twice
+        blocks = inner.reshape(c.size, dim, c.size, dim)
+        blocks[np.arange(c.size), :, np.arange(c.size)] -= own
+        stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
+        return inner if stiffened.max() > SMALLEST_STIFFENING else None

@@ -1,0 +1,190 @@
+"""Configurations of a body and what is asked of a step: the nouns of the equilibrium solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import NAMED
+from evfem.contact.signorini import OPEN, STICK
+from evfem.newton.strategy import Strategy
+from evfem.tissue.body import Body
+from evfem.tissue.dynamics import NO_BRANCHES
+
+#: the pressure where it is no unknown of the iterations
+NO_PRESSURE: Floats = np.zeros((0, 0))
+#: drive, velocity and force of a hand where there is none
+NO_HAND: Floats = np.zeros(0)
+#: the time since a node touched where nothing depends on it
+NO_AGE: Floats = np.zeros(0)
+#: the charges where the voltage is not resolved in time
+NO_CHARGES: Floats = np.zeros((2, 0))
+
+
+class StepFailed(ArithmeticError):
+    """An equilibrium was not found: its `residuals`, the `reason`, `findings` of the last iterate;
+    `unstable`: the tangent was not positive definite. Of a step that was given up, `last` is its first
+    state and its target, `released` whether the body was released there.
+    """
+
+    def __init__(self, reason: str, residuals: list[float]) -> None:
+        super().__init__(reason)
+        self.reason, self.residuals, self.findings = reason, residuals, ""
+        self.unstable = self.released = False
+        self.last: tuple[State, Any] | None = None
+
+
+class Folded(StepFailed):
+    """The outline of what was found crosses itself; no smaller part and no release helps that."""
+
+
+class LiftedOff(StepFailed):
+    """A released finger that is pulled harder than the attraction holds has lost the surface."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A configuration of a body with N nodes, P of them on the pad.
+
+    Displacements u (N, 2) in mm, contact forces along normal and tangent (P, 2) in N/mm and statuses (P,),
+    the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
+    velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
+    pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
+    Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
+    (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. Maxwell
+    branches keep `inner` (`evfem.tissue.branches`).
+    """
+
+    u: Floats
+    contact_force: Floats
+    status: Ints
+    bone: Floats
+    voltage: float
+    attraction: Floats
+    reaction: Floats
+    velocity: Floats
+    last_increment: Floats
+    pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
+    age: Floats = field(default_factory=lambda: NO_AGE)
+    hand: Floats = field(default_factory=lambda: NO_HAND)
+    charges: Floats = field(default_factory=lambda: NO_CHARGES)
+    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+
+    @property
+    def touching(self) -> Any:
+        """Pad nodes in contact, (P,) bool."""
+        return self.status != OPEN
+
+
+@dataclass(frozen=True, eq=False)
+class TangentPoint:
+    """Point of a tangent: displacements u (N, dim), voltage, pad nodes that touched (P,) when the step began,
+    whether the attraction was frozen, the displacements at the beginning of the time step (N, dim) and its
+    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, and the branches' inner
+    variables when the step began.
+    """
+
+    u: Floats
+    voltage: float
+    touching: Any
+    frozen: bool
+    begin: Floats
+    duration: float
+    status: Ints
+    pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
+    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+
+
+@dataclass(frozen=True, eq=False)
+class Reusable:
+    """Data that the next step reuses: contact candidates (numbers of pad nodes), the point of the
+    factorisation if there is one, and the last time step (s).
+    """
+
+    candidates: Ints
+    tangent_point: TangentPoint | None
+    duration: float
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Tolerance, strategy, threads, and the largest planned indentation in mm (0: unknown)."""
+
+    tolerance: float
+    strategy: Strategy = field(default_factory=Strategy)
+    threads: int = 1
+    deepest: float = 0.0
+
+
+@dataclass
+class Record:
+    """Numbers of iterations, factorisations and dense contact solves, and the residuals of the last step."""
+
+    iterations: int = 0
+    factorisations: int = 0
+    contact_solves: int = 0
+    backend: str = "none"
+    residuals: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class MixedBalance:
+    """Residual of the mixed displacement-pressure problem (`evfem.newton.pressure`): the forces (n,)
+    as the older tangent takes them, the largest of them relative to the reaction, and the pressure of
+    the laws less the iterate's (E, Q) in MPa.
+    """
+
+    forces: Floats
+    residual: float
+    misfit: Floats
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Residual of an iterate: out-of-balance forces (n,) of the reduced unknowns in N/mm, the largest
+    relative to the reaction, the attraction (P, 2), and the mixed problem's residual if it is solved.
+    """
+
+    forces: Floats
+    residual: float
+    attraction: Floats
+    mixed: MixedBalance | None = None
+
+    @property
+    def remaining(self) -> float:
+        """The residual of the unknowns that are iterated."""
+        return self.residual if self.mixed is None else self.mixed.residual
+
+    def of_tangent(self, here: bool) -> Floats:
+        """The forces (n,) that a tangent made at this iterate (`here`), or elsewhere, has to remove."""
+        return self.forces if here or self.mixed is None else self.mixed.forces
+
+
+def findings(body: Body, state: State, balance: Balance) -> str:
+    """Largest out-of-balance forces and their current places, the contact, the smallest volume ratio."""
+    nodal = np.linalg.norm(_free(body, balance.forces), axis=1)
+    worst = np.argsort(nodal)[::-1][:NAMED]
+    places = (body.space.mesh.points + state.u)[worst]
+    unit = "N/mm" if state.bone.size == 2 else "N"
+    at = [", ".join(f"{coordinate:.4g}" for coordinate in place) for place in places]
+    forces = ", ".join(
+        f"{nodal[node]:.1e} {unit} at ({where})" for node, where in zip(worst, at, strict=True)
+    )
+    opened, sticking = int((state.status == OPEN).sum()), int((state.status == STICK).sum())
+    slipping = state.status.size - opened - sticking
+    smallest = body.tissue.smallest_J(state.u)
+    return (
+        f"out of balance: {forces}; contact: {opened} nodes open, {sticking} stick, {slipping} slip; "
+        f"smallest J of a cell: {smallest:.2g}"
+    )
+
+
+def _free(body: Body, reduced: Floats) -> Floats:
+    """Nodal forces (N, 2), without those of the bone, which its motion balances."""
+    kept = reduced.copy()
+    kept[body.bone] = 0.0
+    forces = body.expand(kept)
+    return np.where(np.isnan(forces), np.inf, forces)

@@ -1,0 +1,78 @@
+"""Limits of the step control: lengths of parts and numbers of their iterations.
+
+A step leads from one accepted state to the next. It is tried whole first; a part that fails is halved,
+and after easy ones parts grow again. If short parts fail too, the finger is released and comes to rest
+at another equilibrium (`evfem.solver.relaxation`); if it does not, still shorter parts are tried. What
+happens on the way needs physics instead: `dynamics` "viscous" or "inertial" with a speed.
+
+With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+from evfem.common.checks import Within, check_fields, number, one_of, whole, yes_or_no
+from evfem.common.constants import FALLING, STUCK
+
+_COUNT = whole(10_000)
+_PATIENCE = number("a number of iterations, not negative", Within(0.0))
+_PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
+_GROWTH = number("a factor from 1 to 10", Within(1.0, 10.0))
+_ERROR = number("a share of a force, above 0, at most 1", Within(0.0, 1.0, above=True))
+_RATE = number("a rate, larger than 0, at most 1e3", Within(0.0, 1e3, above=True))
+_REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """How hard steps are tried; the defaults need no tuning in any scene of `evfem study stability`.
+
+    >>> Strategy().iterations, Strategy(growth=2.0).growth
+    (40, 2.0)
+    >>> Strategy(smallest_part=2.0)
+    Traceback (most recent call last):
+    evfem.errors.InputError: smallest_part: given 2.0; allowed: a share of a step, above 0, at most 1
+    """
+
+    iterations: Annotated[
+        int, _COUNT, "most of one part of a step; half as many again if the end is near"
+    ] = 40
+    patience: Annotated[float, _PATIENCE, "iterations with an old factorisation before it is renewed"] = 8.0
+    smallest_part: Annotated[
+        float, _PART, "of what is left of a step before it counts as not converged; its square if time passes"
+    ] = 1.0 / 1024.0
+    easy: Annotated[int, _COUNT, "iterations of a part after which the next one may be longer"] = 8
+    growth: Annotated[float, _GROWTH, "by which factor"] = 1.25
+    reach: Annotated[
+        float, _REACH, "first guess: so many of the last part's displacements ahead, 0: none"
+    ] = 1.5
+    hold: Annotated[
+        float, _RATE, "first rate of the drag that holds a finger whose iterations came over a barrier"
+    ] = 16.0
+    relaxation: Annotated[bool, yes_or_no(), "whether a finger without an equilibrium near is released"] = (
+        True
+    )
+    steps: Annotated[
+        str,
+        one_of("given", "auto"),
+        "one part each unless it fails, or parts as the error of the path allows",
+    ] = "given"
+    path_error: Annotated[float, _ERROR, "of a part, with steps = auto: a share of the force on the bone"] = (
+        1e-3
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+def stuck(history: Sequence[float]) -> bool:
+    """Whether iterations with these residuals or changes (i,) stagnate: the last `STUCK` of them, after
+    as many before, have none below `FALLING` times the least of those before.
+
+    >>> stuck([0.5**i for i in range(30)]), stuck([1e-3, 2e-4] * 4), stuck([1e-3, 2e-4] * 9)
+    (False, False, True)
+    """
+    return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])

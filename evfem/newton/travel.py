@@ -1,0 +1,60 @@
+"""Travel of the bone in one iteration: that of the contact problem, limited to a linear step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.constants import SHORTEST_FLIGHT
+from evfem.contact.condensed import LinearContactStep, StepSolution
+from evfem.contact.signorini import ContactNotSolved
+from evfem.newton.control import Target
+from evfem.newton.interface import Interface
+from evfem.newton.state import State
+
+
+@dataclass(frozen=True)
+class Travel:
+    """The bone's increment (dim,) and its contact solution by `solve`; `longest` (mm) of a linear step."""
+
+    interface: Interface
+    solve: Callable[[LinearContactStep], StepSolution]
+    longest: float
+
+    def limited(
+        self, step: LinearContactStep, found: StepSolution, state: State, target: Target
+    ) -> tuple[StepSolution, Floats]:
+        """The solution and the bone's increment (dim,), shortened where it is too long for a linear step."""
+        if not step.unknowns:
+            return found, step.bone
+        bone = step.bone.copy()
+        for unknown, travel in zip(step.unknowns, found.extra.tolist(), strict=False):
+            bone[unknown.axis] += travel
+        if not target.height.free:
+            return found, bone
+        missing = target.height.missing(float(state.bone[1]), state.reaction)
+        flies = not found.status.any() and bone[1] * missing < 0.0 and self._drawn(step, bone[1])
+        if abs(bone[1]) > self.longest or flies:
+            # a long way may rest on a single node, and a body whose attraction wins flies off: go
+            # part of the way, the way the missing force pushes
+            longest = self._longest_flight(state) if flies else self.longest
+            bone[1] = np.copysign(longest, missing if flies else bone[1])
+            found = self.solve(replace(step, bone=bone, unknowns=()))
+        return found, bone
+
+    def _drawn(self, step: LinearContactStep, travel: float) -> bool:
+        """Whether this travel goes against the force that the bone lacks at rest, or has no solution."""
+        try:
+            found = replace(step, unknowns=()).solve()
+        except ContactNotSolved:
+            return True
+        return travel * step.lacking(found, 0.0) < 0.0
+
+    def _longest_flight(self, state: State) -> float:
+        """Longest travel (mm) in one iteration of a body that touches nothing: twice its gap, or a little."""
+        gap = float(self.interface.surface_at(state).gap.min())
+        least = SHORTEST_FLIGHT * self.longest
+        return float(np.clip(2.0 * gap, least, self.longest))

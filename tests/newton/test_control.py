@@ -1,0 +1,122 @@
+"""What is prescribed in a step: known parts, missing forces, unknowns, bounds of the voltage."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from evfem.contact.condensed import LinearContactStep, StepSolution
+from evfem.contact.signorini import OPEN, STICK
+from evfem.newton.control import (
+    FollowFriction,
+    Force,
+    GivenVoltage,
+    Unsupported,
+    VoltageProblem,
+)
+
+REACTION = np.array([0.2, -3.0])
+
+
+def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
+    """The bone is pressed with 5 N/mm downwards and pushed up with 3: 2 N/mm more are missing,
+    downwards.
+    """
+    force = Force(5.0)
+    assert (force.free, force.known(0.7)) == (True, 0.7)
+    assert force.missing(0.7, REACTION) == pytest.approx(-2.0)
+    assert force.missing(0.7, np.array([0.2, -5.0])) == 0.0
+    assert force.towards(Force(9.0), 0.25) == Force(6.0)
+
+
+# -- the voltage that follows a friction force ----------------------------------------------------------
+
+
+class Friction:
+    """A pad whose friction force is 2 N/mm plus 3 N/mm for each kV^2: contact problems of one
+    number.
+    """
+
+    def __init__(self, squared):
+        self.squared, self.residuals = squared, []
+
+    def drive(self):
+        push = np.array([3.0])
+        return VoltageProblem(self.squared, self.solve, lambda: (np.array([7.0]), push))
+
+    def solve(self, step):
+        self.residuals.append(step.residual.copy())
+        present = 2.0 + 3.0 * self.squared
+        extra = [(unknown.force - present) / unknown.push[0] for unknown in step.unknowns]
+        empty = np.zeros(0)
+        return StepSolution(empty, np.zeros((0, 2)), empty.astype(int), np.array(extra), 1, False)
+
+
+def follow(wish, squared, largest=2000.0, before=1000.0):
+    """The control after one iteration at `squared` kV^2, what it changed, and the contact problems
+    it posed.
+    """
+    control, friction = FollowFriction(wish, largest), Friction(squared)
+    control.begin(SimpleNamespace(voltage=before))
+    step = LinearContactStep(None, None, np.zeros(1), np.zeros(2))
+    return control, control.solve(step, friction.drive()), friction.residuals
+
+
+def test_between_its_bounds_the_squared_voltage_is_what_the_wish_needs():
+    """2 + 3 x = 6.5: x = 1.5, half a kV^2 more than there is; one kV^2 does (7,) to the backward
+    solve.
+    """
+    control, found, posed = follow(6.5, 1.0)
+    assert control.free
+    assert found.change == pytest.approx(0.5)
+    assert found.unit.tolist() == [7.0]
+    assert len(posed) == 1
+    assert control.missing(np.array([6.0, 0.0])) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("wish", "squared"), [(1.0, 0.0), (20.0, 4.0)], ids=["below", "above"])
+def test_at_a_bound_the_voltage_stays_there_and_contact_is_solved_again(wish, squared):
+    """Bounds 0 and 2000 V, 4 kV^2; the change of the attraction then is a known force."""
+    control, found, posed = follow(wish, 1.0)
+    assert not control.free
+    assert 1.0 + found.change == pytest.approx(squared)
+    assert posed[1].tolist() == pytest.approx([3.0 * (squared - 1.0)])
+    assert control.missing(np.array([6.0, 0.0])) == 0.0
+    # and from then on it is given
+    step = LinearContactStep(None, None, np.zeros(1), np.zeros(2))
+    assert control.solve(step, Friction(squared).drive()).change == 0.0
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("wish", "tolerated", "corrected"), [(1.0, 3.0, 0.5), (20.0, 19.0, 21.0)], ids=["at zero", "at limit"]
+)
+def test_a_bound_is_left_only_where_the_voltage_could_help(way, wish, tolerated, corrected):
+    """At 0 V more friction than wished for cannot be helped, less can; at the limit the other way
+    round.
+    """
+    for force, accepted in ((tolerated, True), (corrected, False)):
+        control, _, _ = follow(wish, 1.0)
+        control.force = way * control.force
+        assert control.accepts(way, np.array([way * force, 0.0]), 1e-6) == accepted
+        assert control.free == (not accepted)
+
+
+@pytest.mark.parametrize(
+    ("wish", "status", "kept"),
+    [(20.0, STICK, True), (20.0, OPEN, False), (1.0, STICK, False), (6.5, STICK, False)],
+    ids=["at limit, sticks", "at limit, slips", "at zero", "between"],
+)
+def test_only_at_the_limit_of_a_pad_that_sticks_the_old_voltage_is_kept(wish, status, kept):
+    control, _, _ = follow(wish, 1.0)
+    found, old = SimpleNamespace(status=np.array([status])), SimpleNamespace(voltage=321.0)
+    assert control.fallback(old, found) == (GivenVoltage(321.0) if kept else None)
+    assert control.fallback(old, None) == GivenVoltage(321.0)
+    assert GivenVoltage(5.0).fallback(old, None) is None
+
+
+def test_a_force_acts_on_the_way_from_or_to_a_loose_finger():
+    """The ends themselves keep their own controls (`Run._path`)."""
+    for force in (0.0, 1e-9):
+        assert Unsupported(0.3).towards(Force(force), 0.5) == Force(force)
+        assert Force(force).towards(Unsupported(0.3), 0.5) == Force(force)

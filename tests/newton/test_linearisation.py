@@ -1,0 +1,399 @@
+"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is
+renewed.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import INSULATOR, finger
+from tools.meshes import block
+
+from evfem.common.constants import STABLE
+from evfem.contact.signorini import OPEN, STICK
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.electrostatics.roughness import PowerRoughness
+from evfem.newton.condensation import Singular
+from evfem.newton.linearisation import limited_gain, no_progress
+from evfem.newton.state import StepFailed
+from evfem.scene.motion import Press
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.model import make_model
+from evfem.surface.surfaces import Display, Sinusoid
+
+#: voltages that no insulator stands, to see far attractions from near
+pytestmark = pytest.mark.filterwarnings("ignore:.* V make a field")
+
+SAG = 0.4
+ROUND = finger(block(8, 3, sag=SAG))
+#: with so many nodes that candidates are only some of them
+FINE = finger(block(40, 2, sag=SAG))
+
+
+def made(surface=None, voltage=0.0, law=None, body=ROUND, **options):
+    """A linearisation at rest, its model and its state."""
+    surface = Display(y=-0.1, insulator=INSULATOR) if surface is None else surface
+    law = Kaczmarek() if voltage and law is None else law
+    options = {"solver": Solver(core="off")} | options  # the law itself
+    model = make_model(Scene(body, surface, law, voltage, motion=[Press(force=0.1)], **options))
+    state = model.equilibrium.rest(np.zeros(2), voltage)
+    model.equilibrium.body.linearisation.begin(state, False)
+    return model.equilibrium.body.linearisation, model, state
+
+
+def gaps(model, surface_y=-0.1):
+    """Gaps of the pad at rest: a parabola at the corners of cells, straight between them."""
+    corner = np.unique(model.mesh.points[model.mesh.cells[:, :4], 0])
+    x = model.mesh.points[model.pad.nodes, 0]
+    return np.interp(x, corner, SAG * (0.5 * corner) ** 2) - surface_y
+
+
+# -- candidates ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reach", [0.12, 0.2, 0.6])
+def test_every_node_within_reach_is_a_candidate(reach):
+    linear, model, state = made(body=FINE)
+    linear.choose_candidates(state, reach)
+    assert set(np.flatnonzero(gaps(model) <= reach)) <= set(linear.candidates)
+    # the others are farther than any
+    others = np.setdiff1d(np.arange(model.pad.nodes.size), linear.candidates)
+    assert gaps(model)[others].min(initial=np.inf) >= gaps(model)[linear.candidates].max()
+
+
+def test_the_nearest_node_is_a_candidate_where_none_is_within_reach():
+    linear, model, state = made(Display(y=-5.0), body=FINE)
+    linear.choose_candidates(state, 0.1)
+    assert np.argmin(gaps(model)) in linear.candidates
+    assert gaps(model)[linear.candidates].max() < gaps(model).min() + 0.01
+
+
+def test_touching_nodes_and_steep_attractions_are_candidates_at_any_gap():
+    linear, model, state = made(Display(y=-5.0), body=FINE)
+    far = int(np.argmax(gaps(model)))
+    touching = replace(state, status=np.where(np.arange(state.status.size) == far, STICK, OPEN))
+    linear.choose_candidates(touching, 0.1)
+    assert far in linear.candidates
+    # 5e5 V pull from 2.5 mm as hard as a kilovolt from 5 um
+    linear, model, state = made(Display(y=-2.5, insulator=INSULATOR), voltage=5e5, body=FINE)
+    linear.choose_candidates(state, 0.1)
+    inner = model.pad.length(model.mesh.points[model.pad.nodes, 0]) > 0.0
+    assert set(np.flatnonzero(inner)) <= set(linear.candidates)
+
+
+def test_a_candidate_stays_one_when_it_has_let_go():
+    linear, model, state = made(body=finger(block(40, 2, sag=1.2)))
+    far = int(np.argmax(model.mesh.points[model.pad.nodes, 1]))
+    status = np.where(np.arange(state.status.size) == far, STICK, OPEN)
+    linear.choose_candidates(replace(state, status=status), 0.11)
+    known = len(linear.candidates)
+    linear.choose_candidates(state, 0.5)
+    assert len(linear.candidates) > known
+    assert far in linear.candidates
+
+
+# -- the condensed body ----------------------------------------------------------------------------------
+
+
+def bent(model, state):
+    """The state with a smooth deformation, the bone at rest."""
+    x, y = model.mesh.points.T
+    return replace(state, u=0.03 * np.column_stack([np.sin(x) * (2.0 - y), np.cos(2.0 * x) * (2.0 - y)]))
+
+
+def test_the_compliance_is_the_motion_under_unit_forces_with_the_bone_held():
+    linear, model, state = made()
+    state = bent(model, state)
+    linear.choose_candidates(state, 0.2)
+    linear.factorise(state)
+    body = model.body
+    K = body.pattern.full(body.tangent(state.u)).toarray()
+    kept = body.unknowns[model.pad.nodes[linear.candidates]].ravel()
+    C = np.linalg.inv(K[:-2, :-2])
+    found = linear.tangent.compliance
+    np.testing.assert_allclose(found, C[np.ix_(kept, kept)], atol=1e-10 * np.abs(found).max())
+    assert linear.made_at(state)
+    assert not linear.made_at(replace(state, u=state.u.copy()))
+    assert linear.stiffest == pytest.approx(np.diagonal(K).max(), rel=1e-14)
+
+
+def test_a_singular_tangent_is_a_failed_step():
+    linear, _, state = made()
+    linear.choose_candidates(state, 0.2)
+    linear.factorise(state)
+
+    def refuse(upper):
+        raise Singular("as told")
+
+    linear.factor.factorise = refuse
+    with pytest.raises(StepFailed, match="singular \\(as told\\)"):
+        linear.factorise(state)
+
+
+# -- how long it is kept ---------------------------------------------------------------------------------
+
+#: relative residuals, tolerance 1e-8, and whether patience 8 wants a new factorisation
+HISTORIES = [
+    ([1.0], False),
+    ([1e-2, 1e-3], False),  # five more tenths
+    ([1e-2, 4e-3], True),  # fourteen more
+    ([1e-3, 6e-4], True),  # stalls
+    ([1e-3, 2e-3], True),  # grows
+    ([10.0, 0.2], True),  # still far away, however quick
+    ([2e-8, 9e-9], False),  # there
+]
+
+
+@pytest.mark.parametrize(("history", "anew"), HISTORIES)
+def test_a_factorisation_is_kept_while_few_iterations_are_left(history, anew):
+    linear, _, state = made(solver=Solver(tolerance=1e-8))
+    linear.choose_candidates(state, 0.2)
+    assert linear.refactorise_if_needed(state, history)  # there is none
+    assert linear.refactorise_if_needed(state, history) == anew
+    assert linear.record.factorisations == 1 + anew
+    linear.discard()
+    assert linear.reusable is None
+    assert linear.refactorise_if_needed(state, history)
+
+
+@pytest.mark.parametrize(("factor", "anew"), [(0.6, True), (0.7, False), (1.4, False), (1.6, True)])
+def test_another_time_step_asks_for_a_new_factorisation(factor, anew):
+    body = replace(ROUND, viscosity=0.01)
+    scene = Scene(
+        body, Display(y=-0.1), motion=[Press(indentation=0.1, speed=1.0)], solver=Solver(dynamics="viscous")
+    )
+    model = make_model(scene)
+    linear, state = model.equilibrium.body.linearisation, model.equilibrium.rest(np.zeros(2), 0.0)
+    linear.choose_candidates(state, 0.2)
+    linear.start_clock(state, 1e-3)
+    linear.factorise(state)
+    linear.start_clock(state, factor * 1e-3)
+    assert model.body.dynamics.step == factor * 1e-3
+    assert linear.refactorise_if_needed(state, [1.0]) == anew
+
+
+@pytest.mark.parametrize("how", ["air", "no air", "frozen"])
+def test_a_resumed_run_makes_the_same_factorisation_again(how):
+    """To the last bit, although the state it goes on from is another one; who touched then carries
+    the attraction where there is no air."""
+    options = {"voltage": 2e5, "air_layer": how != "no air"}
+    linear, model, state = made(**options)
+    state = bent(model, state)
+    linear.begin(
+        replace(state, status=np.where(np.arange(state.status.size) % 2, STICK, OPEN)), how == "frozen"
+    )
+    linear.choose_candidates(state, 0.6)
+    linear.factorise(state)
+    at, before = linear.reusable, linear.tangent
+    again, _, rest = made(**options)
+    again.candidates = linear.candidates
+    again.restore(replace(rest, u=0.5 * state.u, voltage=10.0), at)
+    np.testing.assert_array_equal(again.tangent.schur, before.schur)
+    np.testing.assert_array_equal(again.tangent.compliance, before.compliance)
+    # which is that of the voltage, but where it is frozen
+    again.restore(rest, replace(at, voltage=1e5))
+    assert np.array_equal(again.tangent.compliance, before.compliance) == (how == "frozen")
+
+
+# -- the attraction's part -------------------------------------------------------------------------------
+
+THIN = Layer(1e-3, 3.35)
+attracted = pytest.mark.parametrize("law", [Kaczmarek(), StrongTroxel()], ids=["kaczmarek", "strong_troxel"])
+
+
+@attracted
+@pytest.mark.parametrize(
+    "surface", [Display(THIN, y=-0.1), Sinusoid(terms=[[0.02, 2.0, 0.4]], y=-0.1, insulator=THIN)]
+)
+def test_fall_and_closing_are_those_of_the_law(law, surface):
+    """Per node: -dp/dg A by central differences, and (p(0) - p(g)) A; touching nodes have neither."""
+    linear, model, state = made(surface, voltage=500.0, law=law)
+    state = replace(state, status=np.where(np.arange(state.status.size) % 4 == 1, STICK, OPEN))
+    x, y = model.mesh.points[model.pad.nodes].T
+    gap, A, layers = y - surface.y - surface.height(x), model.pad.length(x), model.attraction.layers
+
+    def pull(g):
+        return law.traction(g, 500.0, layers) * A
+
+    free = state.status == OPEN
+    fall, closing = linear.negative_stiffness(state), linear.gain_on_closing(state)
+    np.testing.assert_allclose(fall[free], -((pull(gap + 1e-5) - pull(gap - 1e-5)) / 2e-5)[free], rtol=1e-6)
+    np.testing.assert_allclose(closing[free], (pull(0.0 * gap) - pull(gap))[free], rtol=1e-12)
+    assert closing[free].max() > 10.0 * pull(gap).max()
+    assert not fall[~free].any()
+    assert np.abs(closing[~free]).max() < 1e-9 * closing.max()
+
+
+@pytest.mark.parametrize(("direction", "neighbours"), [("vertical", 1e-6), ("normal", 5e-3)])
+def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_axes(direction, neighbours):
+    """The change of the force on a sloped surface per contact force, by central differences, turned into
+    the frames of the nodes; and what is lost with the contact force. Along the normal of the surface
+    a potential also pushes the neighbours apart, which is left out.
+    """
+    rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
+    wave = Sinusoid(terms=[[0.15, 2.0, 0.4]], y=-0.2, insulator=THIN)
+    linear, model, state = made(
+        wave, voltage=60.0, law=StrongTroxel(), direction=direction, roughness_gap=rough
+    )
+    pressing = 0.002 + 0.001 * np.arange(state.status.size)
+    force = np.column_stack([pressing, np.zeros_like(pressing)])
+    state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
+    place, surface = model.equilibrium.interface.resting(state), linear.interface.surface_at(state)
+
+    def pull(pressed):
+        x, y = model.attraction.forces(place, 60.0, linear.touching, pressed).T
+        along_normal, along_tangent = y - surface.slope * x, x + surface.slope * y
+        return np.stack([along_normal, along_tangent], axis=1) / surface.stretch[:, None]
+
+    found, h = linear.roughness(state), 1e-6
+    assert np.abs(surface.slope).max() > 0.1
+    gain = -(pull(pressing + h) - pull(pressing - h)) / (2.0 * h)
+    np.testing.assert_allclose(found.gain, gain, atol=neighbours * gain.max())
+    loss = pull(0.0 * pressing) - pull(pressing)
+    np.testing.assert_allclose(found.loss_on_opening, loss, atol=neighbours * loss.max())
+    np.testing.assert_array_equal(found.present, pressing)
+    assert 0.01 < found.gain.max() < STABLE
+
+
+def test_beyond_a_fold_the_tangent_repels_and_before_it_is_exact():
+    """The scalar problem f(p) = p - 2 sqrt(p) + b folds at p = 1, where the gain 1 / sqrt(p) is 1. An
+    iteration with the limited gain comes fast to the upper root, from below the fold too, and leaves
+    the lower one.
+    """
+
+    def followed(p, b):
+        for count in range(1, 200):
+            step = -(p - 2.0 * np.sqrt(p) + b) / (1.0 - limited_gain(np.array([p**-0.5]))[0])
+            p = max(p + step, 1e-3)
+            if abs(step) < 1e-10:
+                return p, count
+        return p, count
+
+    for b in (0.999, 0.9, 0.0):
+        low, high = (1.0 - np.sqrt(1.0 - b)) ** 2, (1.0 + np.sqrt(1.0 - b)) ** 2
+        for begin in (1.01 * low + 1e-2, 1.0, high + 1.0):
+            p, count = followed(begin, b)
+            assert p == pytest.approx(high, rel=1e-8)
+            assert count < 40
+
+
+def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_it():
+    """The same wave at twenty times the voltage: most gains are above 0.9 now."""
+    rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
+    wave = Sinusoid(terms=[[0.15, 2.0, 0.4]], y=-0.2, insulator=THIN)
+    linear, _, state = made(wave, voltage=1200.0, law=StrongTroxel(), roughness_gap=rough)
+    pressing = 0.002 + 0.001 * np.arange(state.status.size)
+    force = np.column_stack([pressing, np.zeros_like(pressing)])
+    state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
+    place, slope = linear.interface.resting(state), linear.interface.surface_at(state).slope
+    whole = linear.attraction.gain_on_pressing(place, 1200.0, linear.touching, pressing)
+    normal, tangent = linear.roughness(state).gain.T
+    folded = whole > STABLE * np.hypot(1.0, slope)
+    assert folded.any()
+    assert (slope[folded] != 0.0).all()
+    assert (normal[folded] <= 0.99 + 1e-12).all()
+    np.testing.assert_array_equal(tangent[folded], 0.0)
+    held = ~folded & (whole > 0.0)
+    np.testing.assert_allclose(tangent[held], slope[held] * normal[held], rtol=1e-12)
+
+
+@pytest.mark.parametrize("direction", ["vertical", "normal"])
+def test_the_coupling_knows_lengths_but_not_the_nodes_own_gaps(direction):
+    """Over level ground the stiffness that the attraction adds vanishes for a pad that slides as a
+    whole; its weakening with a node's own gap belongs to the contact problem.
+    """
+    linear, model, state = made(voltage=2e5, body=FINE, direction=direction)
+    x = model.mesh.points[model.pad.nodes, 0]
+    linear.candidates = c = np.flatnonzero(np.abs(x) < 1.0)
+    linear.factorise(state)
+    tangent = linear.tangent
+    coupling = tangent.schur[:-2, :-2] - np.linalg.inv(tangent.compliance)
+    size = np.abs(coupling).max()
+    assert size > 1e-3 * tangent.schur.max()
+    np.testing.assert_allclose(coupling[:, 0::2].sum(axis=1), 0.0, atol=1e-7 * size)
+    np.testing.assert_allclose(np.diagonal(coupling)[1::2], 0.0, atol=1e-7 * size)
+    # between neighbours, a middle of an edge and its end, it is the derivative of the attraction
+    j, k = (int(np.argmin(np.abs(x - place))) for place in (0.05, 0.1))
+    place, nobody = linear.interface.positions(state.u), np.zeros(state.status.size, dtype=bool)
+    step = np.zeros_like(place)
+    step[k, 0] = 1e-6
+    ahead, behind = (model.attraction.forces(place + s * step, 2e5, nobody) for s in (1, -1))
+    row, column = (int(np.flatnonzero(c == node)[0]) for node in (j, k))
+    found = coupling[2 * row : 2 * row + 2, 2 * column]
+    np.testing.assert_allclose(found, (ahead - behind)[j] / 2e-6, atol=1e-5 * size)
+    assert np.abs(found).max() > 0.1 * size
+
+
+@pytest.mark.parametrize("how", ["no law", "no voltage", "frozen"])
+def test_an_attraction_that_does_not_change_has_no_part(how):
+    linear, _, state = made() if how == "no law" else made(voltage=500.0)
+    if how == "no voltage":
+        state = replace(state, voltage=0.0)
+    linear.begin(state, how == "frozen")
+    assert not linear.negative_stiffness(state).any()
+    assert not linear.gain_on_closing(state).any()
+    linear.choose_candidates(state, 0.6)
+    linear.factorise(state)
+    np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)
+
+
+def test_what_the_deepest_press_may_reach_is_chosen_at_once():
+    """The outline is a parabola: what lies 0.8 mm above its lowest point is reached by that much."""
+    steep, surface, chosen = finger(block(40, 2, sag=1.5)), Display(y=-0.1, insulator=INSULATOR), []
+    for motion in ([Press(indentation=0.1), Press(indentation=0.8)], [Press(force=0.1)]):
+        model = make_model(Scene(steep, surface, motion=motion))
+        linear = model.equilibrium.body.linearisation
+        linear.choose_candidates(model.equilibrium.rest(np.zeros(2), 0.0), 0.101)
+        chosen.append(set(linear.candidates))
+    height = model.mesh.points[model.pad.nodes, 1]
+    inside = set(np.flatnonzero(height - height.min() <= 0.8))
+    assert inside <= chosen[0]
+    assert not inside <= chosen[1]
+
+
+# -- the field's own stiffness ---------------------------------------------------------------------------
+
+#: a voltage whose coupling is not faint
+VOLTS = 4000.0
+#: residuals that gain nothing
+VAIN = [0.5, 0.02, 0.01, 0.03, 0.02, 0.03, 0.02, 0.03, 0.02]
+
+
+def test_iterations_in_vain_are_known_from_the_residuals():
+    assert no_progress(VAIN, False)
+    assert not no_progress(VAIN[:8], False)
+    assert not no_progress([*VAIN, 9e-3], False)
+    assert not no_progress([*VAIN, 2.0], False)  # the bone is still on its way
+
+
+@pytest.fixture
+def under_the_field():
+    """A linearisation under the full field, its model, and a state 0.1 mm above the display."""
+    linear, model, state = made(voltage=VOLTS, law=StrongTroxel(), field="full", direction="normal")
+    linear.choose_candidates(state, 0.5)
+    linear.refactorise_if_needed(state, [])
+    return linear, model, state
+
+
+def coupled(linear, state):
+    """The factorised tangent's compliance."""
+    linear.refactorise_if_needed(state, VAIN)
+    return linear.tangent.compliance
+
+
+def test_in_vain_the_tangent_is_that_of_the_field(under_the_field):
+    """But for what weakens with a node's own gap: that belongs to the contact problem."""
+    linear, model, state = under_the_field
+    found = coupled(linear, state)
+    assert linear.fringes
+    unknowns = (2 * linear.candidates[:, None] + np.arange(2)).ravel()
+    attraction, place = model.equilibrium.attraction, linear.interface.resting(state)
+    field = attraction.fringe_stiffness(place, VOLTS, state.contact_force[:, 0]).toarray()
+    own = np.zeros_like(unknowns, dtype=float)
+    own[1::2] = linear.negative_stiffness(state)[linear.candidates]
+    coupling = field[np.ix_(unknowns, unknowns)] - np.diag(own)
+    inner = slice(4, -4)  # nodes outside move along with the outermost candidates
+    known = (linear.tangent.schur[:-2, :-2] - np.linalg.inv(found))[inner, inner]
+    np.testing.assert_allclose(known, coupling[inner, inner], atol=1e-6 * np.abs(coupling).max())
+    by_columns = attraction.stiffness(place, VOLTS, linear.touching).toarray()[np.ix_(unknowns, unknowns)]
+    assert np.abs(field[np.ix_(unknowns, unknowns)] - by_columns).max() > 0.01 * np.abs(coupling).max()
