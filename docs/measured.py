@@ -200,7 +200,7 @@ def times(found: dict[str, Found], text: str) -> str:
         seconds = one["provenance"].get("seconds")
         row = took.setdefault(study, {"study": study, "whole": "", "quick": ""})
         if seconds is not None:
-            row["quick" if one["provenance"]["quick"] else "whole"] = f"{max(seconds, 0.1):.2g}"
+            row["quick" if one["provenance"]["quick"] else "whole"] = f"{float(f'{max(seconds, 0.1):.2g}'):g}"
     rows = [",".join(took[name].values()) for name in NAMES if name in took]
     return "\n".join(["study,whole,quick", *rows]) + "\n"
 

@@ -529,7 +529,7 @@ def test_mesh_writes_the_mesh_the_scene_computes_on(tmp_path, element, kind, end
 
 def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path):
     status, out, err = run_process(tmp_path, "study", "section321", "--quick", "--out", "here")
-    assert (status, err) == (0, "study section321: not measured how long\n")
+    assert (status, err) == (0, "study section321: a few seconds\n")
     assert files(tmp_path / "here") == ["section321.csv", "section321.json", "section321.png"]
     assert "76.2 um      here 76.17     as printed" in out
     assert out.splitlines()[-1] == "here/section321.json"

@@ -7,7 +7,8 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
 .. math:: R = k (X - x) + c\,\frac{(X - X_0) - (x - x_0)}{\Delta t}
           - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
 
-by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
+by backward Euler; beside tissue with mass by its differences of second order
+(`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts
 and the bone comes to rest. Across the slide, the motion prescribes the bone's height.
 
 Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
@@ -18,7 +19,7 @@ kg, and the cut-off frequency of the friction, that of a first-order system, by 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
@@ -27,6 +28,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, check_fields, number
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
 from evfem.newton.state import State
+from evfem.tissue.dynamics import Difference
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
 STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
@@ -94,30 +96,42 @@ class Hand:
         return float(self.damping * stretched**2 / duration)
 
 
-#: drive's x (mm), the bone's velocity (mm/s) and the drive's force (N/mm) at the beginning of a run
-AT_REST: Floats = np.zeros(3)
+#: drive's x (mm), the bone's velocity (mm/s) and the drive's force (N/mm) at the beginning of a run, and mean
+#: rates of the drive's x, the bone's and its velocity over the part before
+AT_REST: Floats = np.zeros(6)
 
 
 @dataclass(frozen=True)
 class HandControl:
-    """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s)."""
+    """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s), and
+    their mean rates over the part before, which the step's `difference` may count.
+    """
 
     hand: Hand
     drive: float = 0.0
     duration: float = 0.0
     before: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rates: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    difference: Difference = field(default_factory=Difference)
 
     def begun(self, old: State, drive: float, duration: float) -> HandControl:
         """In the step from `old` that takes the drive to x = `drive`."""
         before = (float(old.hand[0]), float(old.bone[0]), float(old.hand[1]))
-        return HandControl(self.hand, drive, duration, before)
+        along, moved, faster = old.hand[3:].tolist()
+        difference = Difference.over(duration, old.seconds)
+        return HandControl(self.hand, drive, duration, before, (along, moved, faster), difference)
+
+    def _rate(self, number: int, end: float) -> float:
+        """Rate at the end of the step of one of the three that were `before`."""
+        mean = (end - self.before[number]) / self.duration
+        return self.difference.share * mean - self.difference.lag * self.rates[number]
 
     @property
     def stiffness(self) -> float:
         """Stiffness of the hand at the bone, N/mm per mm."""
         if self.duration == 0.0:
             return self.hand.stiffness
-        rate = 1.0 / self.duration
+        rate = self.difference.share / self.duration
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
 
     @property
@@ -127,21 +141,20 @@ class HandControl:
 
     def velocity(self, x: float) -> float:
         """Velocity of the bone at the end of the step, in mm/s."""
-        return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0
+        return self._rate(1, x) if self.duration > 0.0 else 0.0
 
     def driving(self, x: float) -> float:
         """Force of the drive (N/mm), that of spring and damper, at the bone's x."""
         force = self.hand.stiffness * (self.drive - x)
         if self.duration > 0.0:
-            stretched = (self.drive - self.before[0]) - (x - self.before[1])
-            force += self.hand.damping * stretched / self.duration
+            force += self.hand.damping * (self._rate(0, self.drive) - self._rate(1, x))
         return force
 
     def force(self, x: float) -> float:
         """Force on the bone (N/mm): that of the drive minus the inertia of the mass."""
         force = self.driving(x)
         if self.duration > 0.0:
-            force -= self.hand.mass * (self.velocity(x) - self.before[2]) / self.duration
+            force -= self.hand.mass * self._rate(2, self.velocity(x))
         return force
 
     def missing(self, x: float, reaction: Floats) -> float:
@@ -161,6 +174,9 @@ class HandControl:
         return ExtraUnknown(push, 0, self.force(x))
 
     def settled(self, state: State) -> State:
-        """The accepted state with drive, velocity and force."""
+        """The accepted state with what the hand keeps."""
         x = float(state.bone[0])
-        return replace(state, hand=np.array([self.drive, self.velocity(x), self.driving(x)]))
+        ends = (self.drive, x, self.velocity(x))
+        changes = np.array(ends) - self.before
+        rates = changes / self.duration if self.duration > 0.0 else 0.0 * changes
+        return replace(state, hand=np.array([self.drive, ends[2], self.driving(x), *rates]))

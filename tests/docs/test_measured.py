@@ -129,4 +129,4 @@ def test_times_of_the_studies_are_those_of_the_files():
     assert MEASURED["times"]({}, text) == text
     found = {"fig09": {"provenance": {"seconds": 123.4, "quick": False}}}
     rows = {row["study"]: row for row in csv.DictReader(MEASURED["times"](found, text).splitlines())}
-    assert rows["fig09"]["whole"] == "1.2e+02"
+    assert rows["fig09"]["whole"] == "120"
