@@ -26,11 +26,11 @@ from .relaxation import SHARES, pad
 
 DEPTHS = (0.3, 0.6, 1.0)
 AXES = ("normal", "tangential")
-STICKS, LITTLE = 3.0, 1e-4
+STICKS, LITTLE = 50.0, 1e-4
 ASSUMPTIONS = {
     "shares": "0.8, 0.5, 0.4 of the shear modulus at rest, illustrative; 4 ms, 70 ms, 1.4 s",
     "density": "1e-9 t/mm3",
-    "friction": "3: the pad sticks",
+    "friction": "50: the pad sticks",
     "plane strain": "per mm of depth; a whole fingertip has less tissue to move along",
 }
 

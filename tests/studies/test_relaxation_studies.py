@@ -27,5 +27,5 @@ def test_the_contact_lies_ahead_of_a_cylinder_that_is_drawn(numbers_of):
 def test_a_slow_impedance_is_the_slope_of_a_press(numbers_of):
     found = numbers_of("impedance")
     slope = found["slope_of_a_press.mN_per_mm2"]
-    assert found["slow.mN_per_mm2"] == pytest.approx(slope, rel=2e-3)
+    assert found["slow.mN_per_mm2"] == pytest.approx(slope, rel=1e-4)
     assert found["vanishes_Hz.tangential.0.6_mm.onset"] < found["vanishes_Hz.normal.0.6_mm.onset"]
