@@ -21,6 +21,8 @@ _NAMES = {
     "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
     "calibration.parameters": ("Parameter",),
     "calibration.result": ("FitResult",),
+    "surface.adhesion": ("Capillary", "Dugdale"),
+    "surface.elastic": ("ElasticLayer", "ElasticStack"),
     "surface.friction": (
         "AdhesiveFriction",
         "AgeingFriction",

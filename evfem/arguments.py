@@ -71,6 +71,7 @@ def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
         ("init", "write a commented scene to begin with", _init_options),
         ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument),
         ("check", "run a scene by several ways and compare where they end", _scene_argument),
+        ("sensitivities", "derivatives of forces, works and energies by keys of a scene", _response_options),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
         ("sweep", "run many scenes side by side and write one table of all", _sweep_options),
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
@@ -95,6 +96,13 @@ def _run_options(run: argparse.ArgumentParser) -> None:
     _again(run, "go on with the interrupted run in the folder", "replace what an earlier run left there")
     run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
+
+
+def _response_options(command: argparse.ArgumentParser) -> None:
+    _path(command, "scene", "SCENE.toml", help="the scene")
+    said = "dotted keys of the scene, as surface.friction"
+    command.add_argument("--by", nargs="+", metavar="KEY", required=True, help=said)
+    _results(command)
 
 
 def _study_options(study: argparse.ArgumentParser) -> None:
