@@ -46,7 +46,7 @@ class Equations:
         interface.begin(old, target.duration)
         interface.jumps.x = pins
         if model.body.dynamics is not None:
-            model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner)
+            model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
         if attraction is not None and attraction.charging is not None:
             pressing = old.contact_force[:, 0]
             charged = attraction.charged(interface.resting(old), old.voltage, pressing, old.charges)
