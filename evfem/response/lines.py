@@ -58,6 +58,11 @@ def differentiable(column: str) -> bool:
     return UNITS.get(column, "N") not in ("", "s") and column not in WHOLE
 
 
+def is_work(column: str) -> bool:
+    """Whether a column is a work or an energy."""
+    return column.endswith(("_work", "_energy", "_dissipation"))
+
+
 def difference(values: Sequence[Any], step: float) -> Any:
     """Derivative from values of numbers or arrays at the `PLACES`, so many steps apart.
 
@@ -148,7 +153,7 @@ class Beside:
 class Line:
     """One parameter: `beside`, runs of changed scenes at the `PLACES` in steps of `step`, and `centre`, one
     of the scene itself, for places along the states at most `longest` apart; derivatives of state, books and
-    sums so far, and what was found step by step.
+    sums so far, and what was found step by step. Books are kept if it `works`.
     """
 
     name: str
@@ -157,6 +162,7 @@ class Line:
     beside: list[Beside]
     centre: Beside
     lengths: Callable[[State], Floats]
+    works: bool
     state: Change = field(default_factory=dict)
     books: Change = field(default_factory=dict)
     sums: dict[str, float] = field(default_factory=dict)
@@ -168,7 +174,12 @@ class Line:
 
     @classmethod
     def of(
-        cls, scene: Scene, parameter: Parameter, centre: Beside, lengths: Callable[[State], Floats]
+        cls,
+        scene: Scene,
+        parameter: Parameter,
+        centre: Beside,
+        lengths: Callable[[State], Floats],
+        works: bool,
     ) -> Line:
         """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
         step = longest = STEP * parameter.size
@@ -179,7 +190,7 @@ class Line:
             last = Beside.of(scene, parameter, PLACES[-1] * step)
         beside = [*(Beside.of(scene, parameter, place * step) for place in PLACES[:-1]), last]
         state = changes([one.run.state for one in beside], step)
-        return cls(parameter.name, step, longest, beside, centre, lengths, state)
+        return cls(parameter.name, step, longest, beside, centre, lengths, works, state)
 
     # -- a part
 
@@ -270,7 +281,8 @@ class Line:
         nearest = float(reach.min(initial=np.inf))
         self.reach = min(self.reach, nearest)
         self.way = self._way(part, change, nearest)
-        self._book(part, jumps, state, self.way)
+        if self.works:
+            self._book(part, jumps, state, self.way)
         self.state = state
 
     def _book(self, part: Accepted, jumps: Floats, state: Change, way: float) -> None:
@@ -302,10 +314,10 @@ class Line:
         way, along = self.way, []
         for place in PLACES:
             far = place * way
-            of_sums = {name: value + far * self.sums[name] for name, value in sums.items()}
+            of_sums = {name: value + far * self.sums.get(name, 0.0) for name, value in sums.items()}
             here = moved(state, self.state, far), step, moved(books, self.books, far), of_sums
             along.append(self.centre.row(*here))
-        names = [name for name in fixed[0] if differentiable(name)]
+        names = [name for name in fixed[0] if differentiable(name) and (self.works or not is_work(name))]
         found = {}
         for name in names:
             by_parameter = difference([one[name] for one in fixed], self.step)

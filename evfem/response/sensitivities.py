@@ -50,11 +50,13 @@ from evfem.errors import InputError, unknown
 from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
 from evfem.newton.control import FollowFriction, Target, Unsupported
 from evfem.newton.state import State
-from evfem.response.lines import NEAR, SMOOTH, Accepted, Beside, Line, differentiable
+from evfem.planning.plan import scene_mesh
+from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
 from evfem.response.parameters import Parameter, parameter_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
+from evfem.simulation.history import COLUMNS, SPATIAL
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
@@ -75,8 +77,8 @@ class _Followed(Ledger):
 
     def accept(self, old: State, new: State) -> bool:
         before = self.mark()
-        if found := super().accept(old, new):
-            self.snapped = True
+        if (found := super().accept(old, new)) and before[1] is not None:
+            self.snapped = True  # in a first part, whose loads are raised in full, it is none of stability
         self.told(old, new, before)
         return found
 
@@ -84,12 +86,12 @@ class _Followed(Ledger):
 class _Differentiated:
     """A run that is followed, its parameters' lines, and the factorised matrix of the last part."""
 
-    def __init__(self, scene: Scene, parameters: Mapping[str, Parameter]) -> None:
+    def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
         self.run = Run(scene, None)
         self.ledger = self.run.ledger = _Followed(self.run.model)
         self.ledger.told = self._accepted
         self.centre = Beside.of(scene, None, 0.0)
-        self.lines = [Line.of(scene, one, self.centre, self._lengths) for one in parameters.values()]
+        self.lines = [Line.of(scene, one, self.centre, self._lengths, works) for one in parameters.values()]
         for line in self.lines:
             self._check(line)
         self._calls: list[tuple[float, float]] = []
@@ -138,7 +140,7 @@ class _Differentiated:
             each.request = next(each.requests)
         self._request, self._calls = request, []
         self.run.advance(replace(request, path=path))
-        if not self.stopped and self.run.rows[-1]["jumps"]:
+        if not self.stopped and self.run.rows[-1]["relaxations"]:
             self._stop(SNAPPED)
         for line in self.lines:
             if self.stopped or line.reason:
@@ -245,9 +247,36 @@ class Sensitivities:
         return self.values[column, parameter]
 
     @property
+    def warnings(self) -> Sequence[str]:
+        """The warnings of the run."""
+        return self.result.warnings
+
+    @property
     def elasticity(self) -> Elasticity:
         """d ln column / d ln parameter (steps,) by column and parameter; nan where the column is 0."""
         return Elasticity(self)
+
+    def moved(self, changes: Mapping[str, float]) -> Result:
+        """The run as its derivatives say it is with parameters changed by so much; columns without stay."""
+        columns: dict[str, Any] = {}
+        for name in (one for one in self.columns if differentiable(one)):
+            more = sum((change * self[name, key] for key, change in changes.items()), np.zeros(1))
+            columns[name] = np.asarray(self.result[name]) + more
+        own: dict[str, Any] = {name: value for name, value in columns.items() if name in COLUMNS}
+        space = {name: columns.get(name, value) for name, value in self.result.in_space.items()}
+        return replace(self.result, **own, in_space=space)
+
+    def gradient(self, function: Callable[[Result], float]) -> dict[str, float]:
+        """Derivatives by every parameter of a number that a smooth `function` makes of a run.
+
+        ``found.gradient(lambda run: run.tangential_force.mean())``
+        """
+        found = {}
+        for key, value in self.parameters.items():
+            way = STEP * (abs(value) or 1.0) / 10.0
+            more, less = (float(function(self.moved({key: sign * way}))) for sign in (1.0, -1.0))
+            found[key] = (more - less) / (2.0 * way)
+        return found
 
     def table(self) -> Any:
         """A row for each step, a column `COLUMN by PARAMETER` for each pair: a `pandas.DataFrame`, without
@@ -323,7 +352,7 @@ def sensitivities(
     >>> scene = Scene(pad, Display(), Kaczmarek(), 100.0, Hover(gap=0.3, steps=1))
     >>> found = sensitivities(scene, ["electrostatics.voltage"], ["electrostatic_force"])
     >>> round(float(found.elasticity["electrostatic_force", "electrostatics.voltage"][0]), 5)
-    2.00001
+    2.00005
     """
     if not isinstance(scene, Scene):
         from evfem.scene.file import scene_at
@@ -334,8 +363,8 @@ def sensitivities(
     )
     known = {one.name: one for one in (parameter_of(scene, each) for each in given)}
     with blas_limits(), notices.shown(progress):
-        run = _Differentiated(scene, known)
-        wanted = _columns(run, columns)
+        wanted = _columns(scene_mesh(scene)[0].dim, columns)
+        run = _Differentiated(scene, known, any(map(is_work, wanted)))
         bar = notices.bar(scene.total_steps, "step", 0, progress)
         try:
             for request in run.run.requests():
@@ -346,11 +375,9 @@ def sensitivities(
     return _gathered(run, known, wanted)
 
 
-def _columns(run: _Differentiated, columns: Sequence[str] | None) -> tuple[str, ...]:
+def _columns(dim: int, columns: Sequence[str] | None) -> tuple[str, ...]:
     """The columns asked for."""
-    from evfem.simulation.history import COLUMNS, SPATIAL
-
-    names = COLUMNS if run.run.model.mesh.dim == 2 else (*COLUMNS, *SPATIAL)
+    names = COLUMNS if dim == 2 else (*COLUMNS, *SPATIAL)
     numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
     for name in columns or ():
         if name not in numbers:
