@@ -13,7 +13,7 @@ import sys as _sys
 from importlib import import_module as _import_module
 from typing import Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 
 #: module -> the public names it gives
 _NAMES = {
@@ -45,6 +45,7 @@ _NAMES = {
     "finger.fingertip": ("Fingertip",),
     "finger.scan": ("RidgeScan",),
     "loading": ("load",),
+    "response.impedance": ("Impedance", "impedance"),
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),

@@ -154,6 +154,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
         "init": _init,
         "plan": _plan,
         "check": _check,
+        "sensitivities": _sensitivities,
         "study": _study,
         "sweep": _sweep,
         "mesh": _mesh,
@@ -306,6 +307,19 @@ def _check(given: argparse.Namespace) -> int:
     return DONE if found.agrees else DIFFERENT
 
 
+def _sensitivities(given: argparse.Namespace) -> int:
+    from evfem.response.sensitivities import sensitivities
+    from evfem.runfolder import write_sensitivities
+
+    scene = _scene(given.scene)
+    folder = given.out or Path(f"{scene.name}-out")
+    found = sensitivities(scene, given.by, progress=True)
+    for key in (key for key in found.parameters if key in found.reasons):
+        notices.tell(f"{key}: {found.reasons[key]}")
+    print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
+    return DONE
+
+
 def _study(given: argparse.Namespace) -> int:
     known = studies()
     names: list[str] = []
@@ -316,10 +330,13 @@ def _study(given: argparse.Namespace) -> int:
             raise InputError("study", quoted(name), f"{', '.join(known.NAMES)}, all")
     sample = _sample(given)
     for name in dict.fromkeys(names):
-        print(f"study {name}", file=sys.stderr, flush=True)
+        print(f"study {name}: {known.expected(name, given.quick)}", file=sys.stderr, flush=True)
         with notices.status(name):
-            known.run(name, given.quick, given.out, sample)
+            result = known.run(name, given.quick, given.out, sample)
+        print(known.beside_the_paper(result), end="")
         print(given.out / f"{name}.json", flush=True)
+    if "all" in given.names:
+        print(*known.report(given.out), sep="\n")
     return DONE
 
 

@@ -26,14 +26,14 @@ TENSION, ANGLE = 0.0728, 40.0
 ASSUMPTIONS = {
     "water": "0.0728 N/m, contact angle 40 degrees on both faces, one height everywhere",
     "faces": "1 um apart where they touch, whatever the pressure",
-    "finger": "without ridges, plane strain, 0.05 N/mm",
+    "finger": "without ridges, coarse, plane strain, 0.05 N/mm",
     "skin": "permittivity and conductivity of dry skin at every film",
 }
 
 
-def slid(film: float, frequency: float | None, quick: bool) -> ev.Result:
+def slid(film: float, frequency: float | None) -> ev.Result:
     """Pressed and slid, below a film (um), without a voltage if there is no frequency (Hz)."""
-    finger = ev.FingerPad(ridges=False, resolution="coarse" if quick else "medium")
+    finger = ev.FingerPad(ridges=False, resolution="coarse")
     water = None if film == 0.0 else ev.Capillary(TENSION, ANGLE, 1e-3 * film)
     motion = [ev.Press(force=LOAD, steps=3), ev.Slide(distance=3.0, steps=4, hold="force")]
     more: dict[str, Any] = {"adhesion": water, "output": ev.Output(every=100)}
@@ -51,14 +51,14 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Friction, adhesion and attraction over the film, and what the voltage adds to friction."""
     films, frequencies = (FILMS[::2], FREQUENCIES[1:2]) if quick else (FILMS, FREQUENCIES)
     numbers, series = {}, []
-    off = [slid(film, None, quick) for film in films]
+    off = [slid(film, None) for film in films]
     friction = [float(one.tangential_force[-1]) for one in off]
     adhesion = [float(one.adhesive_force[-1]) for one in off]
     for film, shear, pull in zip(films, friction, adhesion, strict=True):
         numbers |= {f"off.{film:g}um.friction": shear, f"off.{film:g}um.adhesion": pull}
     series += [Series("off.friction", films, friction, "N/mm"), Series("adhesion", films, adhesion, "N/mm")]
     for frequency in frequencies:
-        on = [slid(film, frequency, quick) for film in films]
+        on = [slid(film, frequency) for film in films]
         gain = [
             100.0 * (float(one.tangential_force[-1]) / f - 1.0) for one, f in zip(on, friction, strict=True)
         ]

@@ -28,13 +28,13 @@ MEASURES = {
 }
 ASSUMPTIONS = {
     "surface": "linear, nu 0.48, bonded to a rigid base; the insulator bends with it and keeps its thickness",
-    "finger": "without ridges, plane strain, 0.05 N/mm",
+    "finger": "without ridges, coarse, plane strain, 0.05 N/mm",
 }
 
 
-def pressed(elastic: Any, quick: bool) -> ev.Result:
+def pressed(elastic: Any) -> ev.Result:
     """Pressed, and slid until all of it slips."""
-    finger = ev.FingerPad(ridges=False, resolution="coarse" if quick else "medium")
+    finger = ev.FingerPad(ridges=False, resolution="coarse")
     display = ev.Display(friction=FRICTION, elastic=elastic)
     motion = [ev.Press(force=LOAD, steps=3), ev.Slide(distance=3.0, steps=4, hold="force")]
     output = ev.Output(every=100)
@@ -49,11 +49,11 @@ def measured(result: ev.Result) -> dict[str, float]:
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """The measures over the modulus, one curve for each thickness."""
     moduli, thicknesses = (MODULI[1:2], THICKNESSES[1:2]) if quick else (MODULI, THICKNESSES)
-    rigid = measured(pressed(None, quick))
+    rigid = measured(pressed(None))
     numbers = {f"rigid.{name}": value for name, value in rigid.items()}
     series = []
     for thickness in thicknesses:
-        found = [measured(pressed(ev.ElasticLayer(E, NU, thickness), quick)) for E in moduli]
+        found = [measured(pressed(ev.ElasticLayer(E, NU, thickness))) for E in moduli]
         for E, one in zip(moduli, found, strict=True):
             numbers |= {f"E_{E:g}MPa.h_{thickness:g}mm.{name}": value for name, value in one.items()}
         for name, label in MEASURES.items():

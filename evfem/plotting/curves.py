@@ -7,6 +7,7 @@ along the abscissa: any column that grows or falls, by default the one that the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,7 @@ from evfem.plotting.labels import (
     column_text,
     kind_of,
     named,
+    on_lines,
     quantity_label,
     units_of,
     values_of,
@@ -71,7 +73,7 @@ TRACTIONS = {
 }
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
 #: width of a letter of a motion's name in inches, and height of its line in points
-LETTER, HIGH = 0.085, 12.0
+LETTER, HIGH = 0.085, 13.0
 OVER = ("step", "position", "position_z", "time", "indentation", "voltage", "applied_force")
 #: so many frequencies are lines from 0, more are a curve; points: a line in front of another is thinner
 FEW, THICK = 100, 4.0
@@ -96,7 +98,12 @@ def _changes(values: Floats) -> bool:
     return steps.size > 0 and bool(np.all(steps > least) or np.all(steps < -least))
 
 
-def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
+def forces(
+    result: Result,
+    over: str | None = None,
+    ax: Axes | None = None,
+    sd: Mapping[str, Any] | None = None,
+) -> Axes:
     """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
 
     Parameters
@@ -109,6 +116,8 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
         finger waits, else the step, with the motions marked.
     ax
         Axes to draw in; None: new ones.
+    sd
+        Standard deviations of columns (steps,), as `evfem.uncertainty` gives: bands of one around them.
 
     Returns
     -------
@@ -120,18 +129,25 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
     InputError
         Another `over`.
     """
-    return _of_one_kind(ax, result, FORCES, "applied_force", over)
+    return _of_one_kind(ax, result, FORCES, "applied_force", over, sd or {})
 
 
 def energies(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Works, stored energy and dissipations (N) over `over`, as in `forces`."""
-    return _of_one_kind(ax, result, ENERGIES, "external_work", over)
+    return _of_one_kind(ax, result, ENERGIES, "external_work", over, {})
 
 
 def _of_one_kind(
-    ax: Axes | None, result: Result, texts: Mapping[str, tuple[str, str, str]], always: str, over: str | None
+    ax: Axes | None,
+    result: Result,
+    texts: Mapping[str, tuple[str, str, str]],
+    always: str,
+    over: str | None,
+    sd: Mapping[str, Any],
 ) -> Axes:
-    """Lines of columns of one kind; those that are 0 throughout only if they must `always` be there."""
+    """Lines of columns of one kind, with bands of their `sd`; those that are 0 throughout only if they must
+    `always` be there.
+    """
     over = checked_over(over, result)
     x, drawn = along(result, over, over), {name: along(result, name, over) for name in texts}
     least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
@@ -141,6 +157,11 @@ def _of_one_kind(
         if name == always or np.any(np.abs(drawn[name]) > least)
     ]
     ax = _marked(curves(ax, lines, "", axis_label(always, result.units)), over, result)
+    for name, (_, colour, _) in ((name, look) for name, look in texts.items() if name in sd):
+        middle, wide = np.asarray(result[name]), np.asarray(sd[name])
+        moved: list[dict[str, Any]] = [{name: middle - wide}, {name: middle + wide}]
+        ends = (along(replace(result, **one), name, over) for one in moved)
+        ax.fill_between(x, *ends, color=colour, alpha=0.2, linewidth=0)
     ax.legend()
     return ax
 
@@ -178,16 +199,18 @@ def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
-    """A thin line where a motion ends, its name above; names that would collide stand in rows."""
-    ends = [*np.flatnonzero(np.diff(result.motion_index)).tolist(), len(result.step) - 1]
+    """A thin line where a motion ends, its name above, once for neighbours of one name; names that would
+    collide stand in rows.
+    """
+    for last in np.flatnonzero(np.diff(result.motion_index)):
+        ax.axvline(result.step[last] + 0.5, color="0.6", linewidth=0.8)
+    ends = [*np.flatnonzero(result.motion[1:] != result.motion[:-1]).tolist(), len(result.step) - 1]
     letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
     rows: list[float] = []  # where the last name of each row ends
     start = 0
     for end in ends:
         if end < 0:
             return
-        if end < len(result.step) - 1:
-            ax.axvline(result.step[end] + 0.5, color="0.6", linewidth=0.8)
         middle = 0.5 * (result.step[start] + result.step[end])
         half = 0.5 * letter * (len(result.motion[end]) + 1)
         row = next((row for row, last in enumerate(rows) if last <= middle - half), len(rows))
@@ -199,6 +222,7 @@ def _mark_motions(ax: Axes, result: Result) -> None:
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
             ha="center",
+            va="bottom",
         )
         start = end + 1
 
@@ -220,7 +244,7 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
         texts = {column_text(name, result.units[name]): y for name, y in drawn.items()}
         label = column_label if len(drawn) == 1 else axis_label
         lines = [(x, y, look) for y, look in styled(texts)]
-        curves(ax, lines, "", label(next(iter(drawn)), result.units))
+        curves(ax, lines, "", on_lines(label(next(iter(drawn)), result.units)))
     _marked(panels[0], over, result).set_xlabel("")
     panels[-1].set_xlabel(column_label(over, result.units))
     return panels

@@ -167,7 +167,7 @@ class Checkpoint:
         except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
             raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
         if version != evfem.__version__:
-            given = f"{self.path}, written by evfem {version[:40]!r}"
+            given = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
             raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
             raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")

@@ -21,6 +21,7 @@ from evfem.common.pools import Died, Pool, open_pool
 from evfem.common.storage import alone_in
 from evfem.errors import InputError, NotConverged
 from evfem.scene.file import loads
+from evfem.scene.scene import Scene
 from evfem.simulation.provenance import origin
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate

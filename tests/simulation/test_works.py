@@ -223,7 +223,7 @@ def test_only_a_way_through_a_thin_layer_is_taken_at_more_than_eight_places(thic
     # the outline falls faster than the bone
     fallen = replace(rest, u=rest.u - [0.0, fall])
     law.asked = 0
-    SubstepWork(model, rest, fallen).electrostatic()
+    SubstepWork(model, rest, fallen).pulled()[0]
     assert law.asked == places
 
 

@@ -1,0 +1,89 @@
+"""Which parameters a number of a run depends on, and how stiff a finger is at a frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from evfem.errors import InputError
+from evfem.plotting.figures import BLUE, VERMILION, Panels, axes_or_new, curves, new_panels, styled
+from evfem.response.impedance import Impedance
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: height in inches of a bar, and of what is beside the bars
+BAR, REST = 0.32, 1.1
+
+
+def tornado(found: Any, column: str = "tangential_force", step: int = -1, ax: Axes | None = None) -> Axes:
+    """Bars of how much of a column each parameter makes at a step, the longest one on top.
+
+    Parameters
+    ----------
+    found
+        What `evfem.sensitivities` found: relative derivatives; or `evfem.uncertainty`: the change for one
+        standard deviation.
+    column
+        A column of the history.
+    step
+        Number of the step from 0; -1: the last one.
+    ax
+        Axes to draw in; None: new ones.
+
+    Returns
+    -------
+    Axes
+        The axes of the bars.
+
+    Raises
+    ------
+    InputError
+        A column or a step without derivatives.
+    """
+    effects, label = found.effects(column, step)
+    known = {key: value for key, value in effects.items() if np.isfinite(value)}
+    if not known:
+        raise InputError("column", f"{column}, which has no derivative at that step", "one that has")
+    order = sorted(known, key=lambda key: abs(known[key]))
+    ax = axes_or_new(ax, REST + BAR * len(order))
+    colours = [BLUE if known[key] >= 0.0 else VERMILION for key in order]
+    ax.barh(range(len(order)), [known[key] for key in order], color=colours)
+    ax.set_yticks(range(len(order)), order)
+    ax.axvline(0.0, color="black", linewidth=0.8)
+    ax.set_xlabel(label)
+    ax.grid(alpha=0.3, axis="x")
+    return ax
+
+
+def impedance(found: Impedance | Mapping[str, Impedance]) -> Panels:
+    """Magnitude and phase of the stiffness over the frequency, of one finger or of several by their names.
+
+    The phase is positive where the force is ahead of the displacement.
+
+    Raises
+    ------
+    InputError
+        Nothing to draw, or stiffnesses of different units.
+    """
+    named = {"": found} if isinstance(found, Impedance) else dict(found)
+    units = {one.unit for one in named.values()}
+    if len(units) != 1:
+        given = "no impedance" if not units else "some of the plane, some in space"
+        raise InputError("found", given, "one impedance, or {name: impedance, ...} of one unit")
+    upper, lower = new_panels(2, 6.0)
+    sizes, phases = [], []
+    for one, look in styled(named):
+        sizes.append((one.frequency, np.abs(one.stiffness), look))
+        phases.append((one.frequency, np.degrees(np.angle(one.stiffness)), look))
+    curves(upper, sizes, "", f"magnitude ({units.pop()})")
+    curves(lower, phases, "frequency (Hz)", "phase (degrees)")
+    upper.set(xscale="log", yscale="log")
+    lower.set_yticks(np.arange(-180, 181, 45))
+    degrees = np.concatenate([y for _, y, _ in phases])
+    lower.set_ylim(max(-185.0, degrees.min() - 10.0), min(185.0, degrees.max() + 10.0))
+    if (legend := lower.get_legend()) is not None:
+        legend.remove()
+    return Panels((upper, lower))
