@@ -160,3 +160,21 @@ def test_a_scene_with_adhesion_is_written_and_read():
 def test_what_is_no_adhesion_is_refused(make, message):
     with pytest.raises(ev.InputError, match=message):
         make()
+
+
+def test_a_resumed_run_remembers_where_it_came_off():
+    class Stop:
+        def step(self, row, frame, checkpoint):
+            if row["step"] == 4:
+                self.saved = checkpoint()
+                raise ev.StopRun("enough")
+
+    motion = [ev.Press(indentation=0.1, steps=1), ev.Press(indentation=-0.25, steps=4)]
+    scene = ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, adhesion=MOIST)
+    whole, stop = ev.simulate(scene), Stop()
+    part = ev.simulate(scene, observers=[stop])
+    again = ev.simulate(scene, resume=ev.result.Saved(stop.saved, part.rows))
+    for name in ("applied_force", "adhesive_force", "adhesive_work"):
+        assert again[name].tolist() == whole[name].tolist()
+    assert again.warnings == whole.warnings
+    assert any("came off" in one for one in again.warnings)
