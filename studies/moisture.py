@@ -35,7 +35,7 @@ def slid(film: float, frequency: float | None) -> ev.Result:
     """Pressed and slid, below a film (um), without a voltage if there is no frequency (Hz)."""
     finger = ev.FingerPad(ridges=False, resolution="coarse")
     water = None if film == 0.0 else ev.Capillary(TENSION, ANGLE, 1e-3 * film)
-    motion = [ev.Press(force=LOAD, steps=3), ev.Slide(distance=3.0, steps=4, hold="force")]
+    motion = [ev.Press(force=LOAD, steps=3), ev.Slide(distance=6.0, steps=5, hold="force")]
     more: dict[str, Any] = {"adhesion": water, "output": ev.Output(every=100)}
     display = ev.Display(ev.TOUCHSCREEN, friction=FRICTION)
     if frequency is None:
