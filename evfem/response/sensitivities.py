@@ -150,7 +150,7 @@ class _Differentiated:
         for line in self.lines:
             if self.stopped or line.reason:
                 line.rows.append({})
-                line.valid_to.append(0.0)
+                line.valid_to.append(np.nan)
                 continue
             assert self.ledger.end is not None
             line.ends(request.step, self.run.state, self.ledger.end, self.ledger.sums, self.run.rows[-1])
