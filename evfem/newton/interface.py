@@ -24,6 +24,7 @@ from evfem.common.constants import (
     SHORTEST_LENGTH,
     SMALLEST_FORCE,
 )
+from evfem.contact.bed import Bed, Yielding
 from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.contact.slipping import OscillatingNodes
@@ -119,7 +120,7 @@ class Interface:
     are dropped.
     """
 
-    _surfaces: tuple[tuple[Floats, SurfaceState], ...] = ()
+    _surfaces: tuple[tuple[Floats, Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -131,6 +132,10 @@ class Interface:
         # coefficients of friction may change over x in three dimensions, but not jump
         jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
         self.jumps = FrictionJumps(jumps, pad.nodes.size)
+        elastic, least = getattr(surface, "elastic", None), SHORTEST_LENGTH * self.length
+        self.bed: Bed | None = None
+        if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
+            self.bed = Bed(elastic, pad, self.length, least)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
         self._oscillating = OscillatingNodes(pad.nodes.size)
@@ -139,7 +144,7 @@ class Interface:
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
-        self.jumps.begin(self.positions(old.u)[:, 0])
+        self.jumps.begin(self.places(old)[:, 0])
         self._oscillating = OscillatingNodes(self.pad.nodes.size)
         self.duration = duration
 
@@ -147,18 +152,55 @@ class Interface:
         """Current positions of the pad nodes (P, dim) for displacements u (N, dim)."""
         return self.points + u[self.pad.nodes]
 
+    def places(self, state: State) -> Floats:
+        """Current positions of the pad nodes (P, dim) relative to the surface, as if it were rigid."""
+        return self.positions(state.u) if self.bed is None else self.positions(state.u) + state.given
+
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states, which many ask for."""
-        for u, found in self._surfaces:
-            if u is state.u:
+        for u, given, found in self._surfaces:
+            if u is state.u and given is state.given:
                 return found
-        found = surface_state(self.surface, self.positions(state.u))
-        self._surfaces = ((state.u, found), *self._surfaces[:1])
+        found = surface_state(self.surface, self.places(state))
+        if self.bed is not None:
+            shortened, sunk = state.strain.T
+            found = replace(found, slope=(found.slope - sunk) / (1.0 - shortened))
+        self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
+
+    def below(self, state: State) -> Yielding:
+        """The elastic surface below the pad."""
+        assert self.bed is not None
+        position = self.positions(state.u)
+        return self.bed.below(self.places(state), surface_state(self.surface, position).gap)
+
+    def tilted(self, state: State, force: Floats) -> Floats:
+        """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
+        if self.bed is None:
+            return force
+        (shortened, sunk), (along, up) = state.strain.T, force.T
+        return np.stack([(along + sunk * up) / (1.0 - shortened), up], axis=1)
+
+    def untilted(self, state: State, force: Floats) -> Floats:
+        """The same attraction as above a surface that has not sunk, whose work is that of the field."""
+        if self.bed is None:
+            return force
+        (shortened, sunk), (along, up) = state.strain.T, force.T
+        return np.stack([along * (1.0 - shortened) - sunk * up, up], axis=1)
+
+    def unyielded(self, state: State, force: Floats) -> float:
+        """By how much, over the tolerances' lengths, what an elastic surface gives way by misses what the
+        forces on the nodes (P, 2) ask for; 0 of a rigid one.
+        """
+        if self.bed is None:
+            return 0.0
+        below = self.below(state)
+        missing = np.abs(below.given(force) - state.given).max() / self.length
+        return float(max(missing, np.abs(below.change(force) - state.strain).max()))
 
     def resting(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""
-        position = self.positions(state.u)
+        position = self.places(state)
         touching = state.status != OPEN
         position[touching, 1] -= self.surface_at(state).gap[touching]
         return position
@@ -174,8 +216,8 @@ class Interface:
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes (P, dim - 1) in mm, along the profile and along z."""
-        position = self.positions(state.u)
-        moved = (position - self.positions(old.u))[:, ::2]
+        position = self.places(state)
+        moved = (position - self.places(old))[:, ::2]
         moved[:, 0] = self.surface_at(state).stretch * (position[:, 0] - self._origin(old))
         return moved
 
@@ -183,7 +225,7 @@ class Interface:
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
         """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
-        position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
+        position, surface = self.places(state)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
         friction = self.friction(old, c, np.where(self.jumps.held[c], self.jumps.x[c], position[:, 0]))
@@ -256,7 +298,7 @@ class Interface:
 
     def tributary(self, state: State) -> Floats:
         """Tributary lengths or areas (P,) in a state."""
-        return self.tributary_of(self.positions(state.u))
+        return self.tributary_of(self.places(state))
 
     def tributary_at(self, part: tuple[State, State], x: Floats) -> Floats:
         """Tributary lengths or areas (P,) at x (P,) between two states; in space the mean of both."""
@@ -293,7 +335,7 @@ class Interface:
 
     def _origin(self, old: State) -> Floats:
         """Origin of the slip (P,): the last accepted x, or the jump of friction that holds a node."""
-        return np.where(self.jumps.held, self.jumps.x, self.positions(old.u)[:, 0])
+        return np.where(self.jumps.held, self.jumps.x, self.places(old)[:, 0])
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
@@ -331,7 +373,7 @@ class Interface:
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
-        position, surface = self.positions(state.u), self.surface_at(state)
+        position, surface = self.places(state), self.surface_at(state)
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self._weak(state)

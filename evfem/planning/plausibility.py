@@ -19,6 +19,7 @@ from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import path_points
+from evfem.protocols import ForceLaw
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
 from evfem.tissue.laws import NeoHookean
@@ -44,6 +45,9 @@ PRESSED = 0.02
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
 HEAVIEST = 100.0
+#: plane modulus over shear modulus of tissue that keeps its volume; strain to which an elastic surface is
+#: taken as linear
+INCOMPRESSIBLE, LARGEST_STRAIN = 4.0, 0.1
 #: distance (mm) of the places at which a profile's height is looked at
 WAY_STEP = 0.02
 
@@ -59,6 +63,7 @@ def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[
         *_breakdown(scene),
         *_unbearable(scene),
         *_hovering(scene, mesh),
+        *_strained(scene, mesh, min(moduli.values())),
     )
 
 
@@ -118,6 +123,31 @@ def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
             yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
 
 
+def _strained(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
+    """An elastic surface whose strain, by Hertz's contact with the softest tissue (shear `modulus` in MPa,
+    hardly compressible), is too large for a linear one.
+    """
+    layers = getattr(scene.ground.elastic, "layers", ())
+    if not layers or mesh.dim == 3:
+        return
+    soft = min(layers, key=lambda one: one.E)
+    surface, tissue = soft.E / (1.0 - soft.nu**2), INCOMPRESSIBLE * modulus
+    both = surface * tissue / (surface + tissue)
+    width, depth = np.ptp(mesh.points[mesh.node_sets["pad"]], axis=0).tolist()
+    if depth == 0.0:
+        return
+    radius = width**2 / (8.0 * depth)
+    deepest = max((one.indentation or 0.0 for one in scene.courses), default=0.0)
+    load = max((one.force or 0.0 for one in scene.courses), default=0.0)
+    half = max(math.sqrt(4.0 * load * radius / (math.pi * both)), math.sqrt(radius * max(deepest, 0.0)))
+    strain = both * half / (2.0 * radius) / surface
+    if strain > LARGEST_STRAIN:
+        yield (
+            f"the elastic surface is strained by about {strain:.0%} (contact pressure over plane modulus, by "
+            f"Hertz): it is linear, which holds to about {LARGEST_STRAIN:.0%}"
+        )
+
+
 def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
     """Presses down to the bone, or with a force over the finger that is many times its `modulus` (MPa)."""
     bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))
@@ -148,17 +178,17 @@ def _breakdown(scene: Scene) -> Iterator[str]:
             )
 
 
-def touching_traction(scene: Scene) -> float | None:
-    """Attraction (MPa) of touching skin at the largest voltage by the law's closed form, as far as that is
-    known: not under a charge, or a friction force that sets the voltage. Rough faces are as far apart as
-    under `PRESSED`.
+def touching_traction(scene: Scene, law: ForceLaw | None = None) -> float | None:
+    """Attraction (MPa) of touching skin at the largest voltage by the closed form of the scene's law, or of
+    another, as far as that is known: not under a charge, or a friction force that sets the voltage. Rough
+    faces are as far apart as under `PRESSED`.
     """
     if not scene.electrics.acts or isinstance(scene.voltage, (FollowForce, ChargeControl)):
         return None
-    law, layers = scene.electrics.attraction
+    own, layers = scene.electrics.attraction
     rough = roughness_of(scene.roughness_gap)
     gap = 0.0 if rough is None else float(rough.separation(PRESSED))
-    return float(np.max(law.traction(gap, scene.electrics.largest_voltage, layers)))
+    return float(np.max((law or own).traction(gap, scene.electrics.largest_voltage, layers)))
 
 
 def _unbearable(scene: Scene) -> Iterator[str]:

@@ -45,6 +45,10 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     if len(scene.ground.friction_jumps):
         allowed = "a number, or a table without jumps: a short ramp from one coefficient to the next"
         found.append(("surface.friction", f"a jump of the coefficient {SOLID}", allowed))
+    if scene.ground.elastic is not None:
+        found.append(
+            ("surface.elastic", f"an elastic surface {SOLID}", "a rigid one, or a finger in the plane")
+        )
     if scene.hand is not None and any(course.travel[1] for course in scene.courses):
         found.append(("hand", "a hand on a slide across x", "angle 0 or 180: its spring acts along x"))
     if scene.solver.contact != "exact":

@@ -33,6 +33,7 @@ from evfem.surface.surfaces import (
     MOST_TERMS,
     Flat,
     Friction,
+    GivesWay,
     Insulator,
     Profile,
     RigidSurface,
@@ -85,6 +86,7 @@ class Grating(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -152,6 +154,7 @@ class SelfAffine(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
