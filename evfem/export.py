@@ -55,7 +55,7 @@ class FieldFiles:
         >>> from evfem.scene.scene import default_scene
         >>> scene = default_scene()
         >>> print(FieldFiles.of(scene, scene.finger.mesh()))
-        fields of every 4th step and the last of each motion, single precision: 29 files, 25 MB
+        fields of every 5th step and the last of each motion, single precision: 22 files, 20 MB
         """
         output, steps = scene.output, scene.total_steps
         every, single = output.every or 1, output.precision == "single"
