@@ -277,7 +277,7 @@ def electrode_charge(seen: Seen) -> Reading:
     by_gap, by_length = charging.charge_slopes(at)
     by_gap = np.where(surface.gap > CLOSED, by_gap, 0.0)
     by_position = np.zeros_like(seen.position)
-    by_position[:, 0], by_position[:, 1] = -by_gap * surface.slope, by_gap
+    by_position[:, ::2], by_position[:, 1] = -by_gap[:, None] * surface.slope, by_gap
     of, moved, value = seen.attraction.pad.tributary_gradient(seen.position)
     by_position += np.bincount(moved, by_length[of] * value, by_position.size).reshape(by_position.shape)
     return Reading(charging.electrode_charge(at), KILOVOLT * charging.capacity(at), by_position)
@@ -287,5 +287,5 @@ def smallest_gap(seen: Seen) -> Reading:
     """The smallest vertical gap of the pad (mm)."""
     least = int(np.argmin(seen.surface.gap))
     by_position = np.zeros_like(seen.position)
-    by_position[least, :2] = -seen.surface.slope[least], 1.0
+    by_position[least, ::2], by_position[least, 1] = -seen.surface.slope[least], 1.0
     return Reading(float(seen.surface.gap[least]), 0.0, by_position)

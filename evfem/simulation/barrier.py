@@ -86,7 +86,7 @@ def _rubbed(part: Part) -> float:
     if not length.any():
         return 0.0
     interface, normal = part.model.equilibrium.interface, np.maximum(part.new.contact_force[:, 0], 0.0)
-    return float(np.sum(interface.resistance((part.old, part.new), part.x[1], normal, length) * length))
+    return float(np.sum(interface.resistance((part.old, part.new), part.places[1], normal, length) * length))
 
 
 def _lifted(part: Part) -> Floats:

@@ -184,7 +184,7 @@ class Equilibrium:
             if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
-            self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
+            self.interface.pins.watch(self.interface.places(state), state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 

@@ -333,7 +333,7 @@ class FactorisedBody:
         that gives way by itself, a negative compliance, is not seen.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
-        crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
+        crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
         timed = dynamics is not None and dynamics.step > 0.0
         if timed or state.bone.size == 3 or not crests.any():
             return None

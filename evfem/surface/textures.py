@@ -31,6 +31,7 @@ from evfem.surface.surfaces import (
     FARTHEST,
     HIGHEST,
     MOST_TERMS,
+    Angle,
     Flat,
     Friction,
     Insulator,
@@ -85,6 +86,7 @@ class Grating(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    angle: Angle = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -152,6 +154,7 @@ class SelfAffine(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    angle: Angle = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
