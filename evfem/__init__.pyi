@@ -56,6 +56,8 @@ from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file
 from evfem.mesh.mesh import Mesh as Mesh
+from evfem.newton.hand import Hand as Hand
+from evfem.newton.strategy import Strategy as Strategy
 from evfem.planning.plan import plan as plan
 from evfem.scene import file as _scene_file
 from evfem.scene.motion import Hover as Hover
@@ -76,8 +78,6 @@ from evfem.simulation.result import Frame as Frame
 from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate
 from evfem.simulation.spectrum import spectrum as spectrum
-from evfem.solver.hand import Hand as Hand
-from evfem.solver.strategy import Strategy as Strategy
 from evfem.surface import surfaces as surfaces
 from evfem.surface.friction import AdhesiveFriction as AdhesiveFriction
 from evfem.surface.friction import AgeingFriction as AgeingFriction

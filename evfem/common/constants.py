@@ -3,7 +3,7 @@
 None of them decides what is accepted: an accepted step satisfies the scene's tolerance whatever
 they are. They decide how an equilibrium is found, and how soon. Brackets name the scenes in
 which another value was worse; the groups are those of `evfem study stability`, A and B the scenes
-of `evfem study peers`. What a user may change is in `evfem.solver.strategy`.
+of `evfem study peers`. What a user may change is in `evfem.newton.strategy`.
 """
 
 #: forces are compared with the largest reaction, N/mm, or with this

@@ -2,7 +2,7 @@ r"""Voltage as a function of position, its effective value, and what a carrier a
 
 The laws need the effective voltage across skin and insulator. Units: V, mm (of bone position), s.
 
-What a voltage may be asked to bring about (`evfem.solver.control.Met`) stands here too: the electrode's
+What a voltage may be asked to bring about (`evfem.newton.control.Met`) stands here too: the electrode's
 charge and the smallest gap of a pad, with their derivatives.
 """
 

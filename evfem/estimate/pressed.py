@@ -29,8 +29,8 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.contact.signorini import OPEN
 from evfem.estimate.parametric import SLIP_PER_FORCE, STEPS_BEFORE, Parametric, sliding
+from evfem.newton.condensation import make_condensation
 from evfem.simulation.run import Run
-from evfem.solver.condensation import make_condensation
 from evfem.surface.pad import outline_nodes
 from evfem.surface.surfaces import Flat
 

@@ -19,6 +19,7 @@ from evfem.errors import ABSENT, InputError, Mistakes, StorageError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.finger.fingertip import FINGERS
 from evfem.finger.layers import TABLE_2
+from evfem.newton.hand import Hand
 from evfem.scene.format import (
     HOMES,
     SURFACES,
@@ -33,7 +34,6 @@ from evfem.scene.keys import VERSION, at, check_size, kind_of, read, read_kind, 
 from evfem.scene.motion import MOTIONS, Motion
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.serialiser import dump
-from evfem.solver.hand import Hand
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.surface.surfaces import Display
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from evfem.common.checks import GONE, Checked, Within, among, check_fields, number, real, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
-from evfem.solver.strategy import Strategy
+from evfem.newton.strategy import Strategy
 from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.space import ELEMENTS, elements_on
 

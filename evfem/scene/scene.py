@@ -21,12 +21,12 @@ from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
+from evfem.newton.hand import Hand
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive, without_field
 from evfem.scene.motion import MOTIONS, VOLTAGE, Course, Motion, Press, Slide
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
-from evfem.solver.hand import Hand
 from evfem.surface.friction import Coulomb
 from evfem.surface.usersurface import completed
 from evfem.tissue.forms import Form

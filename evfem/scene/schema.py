@@ -18,13 +18,13 @@ from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
 from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.finger.fingertip import FINGERS
+from evfem.newton.hand import Hand
+from evfem.newton.strategy import Strategy
 from evfem.scene import format as file
 from evfem.scene.keys import VERSION
 from evfem.scene.motion import MOTIONS
 from evfem.scene.probes import Probe
 from evfem.scene.scene import Output, Solver
-from evfem.solver.hand import Hand
-from evfem.solver.strategy import Strategy
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.tissue.laws import LAWS
 

@@ -28,8 +28,8 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.newton.control import Target
 from evfem.simulation.works import Part
-from evfem.solver.control import Target
 from evfem.surface.pad import surface_state
 
 #: where the potential is taken on the way, and, denser at its ends, the attraction

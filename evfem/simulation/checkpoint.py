@@ -21,12 +21,12 @@ import evfem
 from evfem.common.checks import plain
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
+from evfem.newton.state import Reusable, State, TangentPoint
 from evfem.simulation.history import COLUMNS, NEEDED, SUMS, columns_of
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
-from evfem.solver.state import Reusable, State, TangentPoint
 
 CHECKPOINT_FORMAT = "evfem-checkpoint-6"
 ANOTHER = "a run of another scene"

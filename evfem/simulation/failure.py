@@ -9,11 +9,11 @@ import numpy as np
 
 from evfem.common.constants import CRITICAL, SOFTENED
 from evfem.errors import InputError
+from evfem.newton.control import Target
+from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.planning.plausibility import weakens
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
-from evfem.solver.control import Target
-from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 
 
 def advice(scene: Scene, model: Model, failed: StepFailed) -> str:

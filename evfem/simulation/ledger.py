@@ -10,11 +10,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.contact.signorini import FORWARD, OPEN
+from evfem.newton.state import State
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import Books, Part, tells_source, unloaded
-from evfem.solver.state import State
 from evfem.surface.pad import Pad, reach, surface_state
 
 

@@ -17,15 +17,15 @@ from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
+from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.factorised import FactorisedBody
+from evfem.newton.interface import Interface, PenaltyInterface
+from evfem.newton.state import Limits
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.factorised import FactorisedBody
-from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.state import Limits
 from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.skin import Skin, make_skin

@@ -21,6 +21,20 @@ from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
+from evfem.newton.control import (
+    FollowFriction,
+    Force,
+    GivenGap,
+    GivenVoltage,
+    HeightControl,
+    Indentation,
+    KeptCharge,
+    Target,
+    Unsupported,
+    VoltageControl,
+)
+from evfem.newton.hand import AT_REST, Grip
+from evfem.newton.state import State, StepFailed
 from evfem.planning.pathdependence import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
@@ -42,20 +56,6 @@ from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.simulation.works import Part
-from evfem.solver.control import (
-    FollowFriction,
-    Force,
-    GivenGap,
-    GivenVoltage,
-    HeightControl,
-    Indentation,
-    KeptCharge,
-    Target,
-    Unsupported,
-    VoltageControl,
-)
-from evfem.solver.hand import AT_REST, Grip
-from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
 

@@ -85,10 +85,10 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charging, Flow
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
+from evfem.newton.interface import slipped
+from evfem.newton.state import State
 from evfem.simulation.history import SUMS
 from evfem.simulation.model import Model
-from evfem.solver.interface import slipped
-from evfem.solver.state import State
 
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5

@@ -2,8 +2,8 @@ r"""Equilibrium steps of a body in contact: the algorithm from the outside in, o
 
 **Problem.** A body with nodal displacements u, its bone translated by b, touches a rigid profile.
 A step goes from an accepted state to a target: a place of the bone or a force on it, a voltage or a
-friction force (`control`). With the gap g of a pad node, its slip s since the accepted state, and
-contact forces :math:`\lambda` along the profile's normal and tangent, the state sought obeys
+friction force (`evfem.newton.control`). With the gap g of a pad node, its slip s since the accepted
+state, and contact forces :math:`\lambda` along the profile's normal and tangent, the state sought obeys
 
 .. math:: R = f_{int}(u) - f_{el}(u) - \lambda = 0, \qquad
           g \ge 0,\; \lambda_n \ge 0,\; g\lambda_n = 0, \qquad
@@ -27,7 +27,7 @@ is refused where the potential with the loads of the part's end,
 rises on the straight way to it (`evfem.simulation.barrier`): the body would have to climb. That is
 necessary, not sufficient: where several states lie downhill, the nearest branch is not told from others.
 
-**1. A step is cut into parts** (`stepping`; the user's numbers: `strategy`)::
+**1. A step is cut into parts** (`stepping`; the user's numbers: `evfem.newton.strategy`)::
 
     part <- the length that worked last
     repeat until the step's end is reached
@@ -39,7 +39,7 @@ necessary, not sufficient: where several states lie downhill, the nearest branch
 
 With `steps = "auto"` the length follows the difference of one part and two halves (`path`).
 
-**2. One equilibrium** (`equilibrium`)::
+**2. One equilibrium** (`evfem.newton.equilibrium`)::
 
     u <- extrapolated along the increment of the last part
     repeat
@@ -48,9 +48,9 @@ With `steps = "auto"` the length follows the difference of one part and two halv
         fail if the residual is not finite or stagnates, or after the strategy's iterations
         u, lambda <- the linear contact step (3)
 
-**3. A linear contact step** (`factorised`). The tangent K of the tissue, often that of an earlier
-iterate, is condensed onto the nodes c that may touch and the bone (`linearisation`,
-`condensation`; PARDISO or SuperLU), and :math:`C = S_{cc}^{-1}`:
+**3. A linear contact step** (`evfem.newton.factorised`, beside it what 2 to 4 name). The tangent K of the
+tissue, often that of an earlier iterate, is condensed onto the nodes c that may touch and the bone
+(`linearisation`, `condensation`; PARDISO or SuperLU), and :math:`C = S_{cc}^{-1}`:
 
 .. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta b = g_c + \lambda^+ - \lambda + \Delta f_{el}, \qquad
           S_{bc}\,\Delta u_c + S_{bb}\,\Delta b = g_b + F_b .
@@ -92,7 +92,7 @@ friction's growth in the compliance    8       iterations x12.6, factorisations 
 turning contact forces (`follower`)    23      iterations x2.2, factorisations x4.6
 attraction scaled to what is held      8       iterations x1.9, factorisations x3.8
 gain between rough faces limited       49      4 scenes do not end (`linearisation.steadied`)
-bracketed friction (`slipping`)        12      iterations x1.2, factorisations x1.5
+bracketed friction (contact.slipping)   12      iterations x1.2, factorisations x1.5
 pins at jumps of friction              1       1 scene does not end (`interface.Pins`)
 release (`relaxation`)                 2       1 scene does not end
 longer parts after a release           4       iterations x2.2 (`stepping`)

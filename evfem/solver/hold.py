@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.solver.control import Target
-from evfem.solver.state import State, StepFailed
+from evfem.newton.control import Target
+from evfem.newton.state import State, StepFailed
 from evfem.tissue.body import Body
 
 #: the largest rate of drag and the least, by how much it falls, and when it falls no further

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.constants import PATH_CHANGE, PATH_SAFETY, SMALLEST_FORCE
-from evfem.solver.state import State
+from evfem.newton.state import State
 
 
 def apart(once: State, twice: State) -> float:

@@ -51,8 +51,8 @@ from evfem.common.constants import (
     DRAG_STEPS,
     IMPERFECTION,
 )
-from evfem.solver.control import GivenVoltage, Target
-from evfem.solver.state import Folded, LiftedOff, State, StepFailed
+from evfem.newton.control import GivenVoltage, Target
+from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.tissue.body import Body
 
 #: a speed (mm) that is none

@@ -35,13 +35,13 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
-from evfem.solver.control import Met, Target
-from evfem.solver.equilibrium import Equilibrium
+from evfem.newton.control import Met, Target
+from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.state import Folded, LiftedOff, State, StepFailed
+from evfem.newton.strategy import stuck
 from evfem.solver.hold import Hold
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
-from evfem.solver.state import Folded, LiftedOff, State, StepFailed
-from evfem.solver.strategy import stuck
 from evfem.tissue.body import Body
 
 #: why an equilibrium is refused that lies behind a barrier

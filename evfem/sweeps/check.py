@@ -19,11 +19,11 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.errors import NotConverged
+from evfem.newton.condensation import other_solver
 from evfem.scene.file import load
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
-from evfem.solver.condensation import other_solver
 
 #: what is compared, and by how much it may differ
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")

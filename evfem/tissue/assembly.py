@@ -238,7 +238,7 @@ class Integral:
     def cell_tangents(self, u: Floats, pressure: Floats | None = None) -> Floats:
         """Derivatives of the cells' forces, (C, n dim, n dim), unknowns ordered (node, component).
 
-        With a `pressure` (C, Q) of the iterations (`evfem.solver.pressure`), the curvature of ln J
+        With a `pressure` (C, Q) of the iterations (`evfem.newton.pressure`), the curvature of ln J
         is weighted with it instead of the form's own flux of theta.
         """
         state, dim = self.state(u), self.parts.dim

@@ -205,7 +205,7 @@ def plane_modulus(law: SplitLaw, dim: int) -> float:
 
 def nearly_incompressible(law: SplitLaw, dim: int, times: float | None = None) -> bool:
     """Whether a law is at rest so many `times` stiffer against a change of volume than in shear, d2W/dtheta2
-    / mu; by default so that its pressure is worth an unknown of its own (`evfem.solver.pressure`).
+    / mu; by default so that its pressure is worth an unknown of its own (`evfem.newton.pressure`).
 
     For a neo-Hookean law the ratio is 2 nu / (1 - 2 nu). Laws of small strain never need it: their
     theta is linear in the displacements.

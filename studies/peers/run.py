@@ -25,8 +25,8 @@ LATE = ("evfem.simulation.model", "evfem.scene.file", "skfem", "tqdm.auto", "sci
 def _evfem() -> Callable[..., dict[str, Any]]:
     for name in LATE:
         import_module(name)
+    from evfem.newton.condensation import pardiso_library
     from evfem.simulation.run import simulate
-    from evfem.solver.condensation import pardiso_library
 
     from ..precision.scenes import Case, build
 
@@ -45,7 +45,7 @@ def _evfem() -> Callable[..., dict[str, Any]]:
 
 
 def _felupe() -> Callable[..., dict[str, Any]]:
-    from evfem.solver.condensation import pardiso_library
+    from evfem.newton.condensation import pardiso_library
 
     pardiso_library()  # tells pypardiso where the library is
     from .with_felupe import solve

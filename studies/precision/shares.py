@@ -27,13 +27,13 @@ PARTS = ("assembly", "factorisation", "solve", "contact", "output", "rest")
 #: part -> module, class (or none) and functions that do its work
 WORK: Mapping[str, tuple[tuple[str, str, str], ...]] = {
     "assembly": (("tissue.body", "Body", "forces tangent"), ("tissue.weakform", "Tissue", "smallest_J")),
-    "factorisation": tuple(("solver.condensation", name, "factorise") for name in ("Pardiso", "SuperLU")),
-    "solve": tuple(("solver.condensation", name, "forward backward") for name in ("Pardiso", "SuperLU")),
+    "factorisation": tuple(("newton.condensation", name, "factorise") for name in ("Pardiso", "SuperLU")),
+    "solve": tuple(("newton.condensation", name, "forward backward") for name in ("Pardiso", "SuperLU")),
     "contact": (
         ("contact.condensed", "LinearContactStep", "solve"),
         ("contact.condensed", "", "_inverse"),
-        ("solver.interface", "Interface", "candidates obeyed shallowest_penetration contact_forces"),
-        ("solver.linearisation", "Linearisation", "choose_candidates"),
+        ("newton.interface", "Interface", "candidates obeyed shallowest_penetration contact_forces"),
+        ("newton.linearisation", "Linearisation", "choose_candidates"),
     ),
     "output": (("simulation.ledger", "Ledger", "accept row"), ("simulation.run", "", "frame_of")),
 }

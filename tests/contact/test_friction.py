@@ -9,12 +9,12 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.contact.slipping import Returned, speed_under
 from evfem.errors import InputError
 from evfem.planning.plan import plan
 from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
 from evfem.simulation.result import Saved
-from evfem.solver.slipping import Returned, speed_under
 from evfem.surface.friction import KINDS, Slipping
 
 pytestmark = pytest.mark.solver

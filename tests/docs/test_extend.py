@@ -116,8 +116,8 @@ finger = ev.MeshedFinger(block, {"block": ev.NeoHookean(E=0.1, nu=0.4)})
 scene = ev.Scene(finger, ev.Flat(friction=0.3), motion=[ev.Press(indentation=0.1), ev.Slide(0.2, steps=4)])
 dense = ev.simulate(scene)
 assert dense.provenance["solver"]["backend"] == "Dense", dense.provenance["solver"]["backend"]
-from evfem.solver import linearisation
-linearisation.make_condensation = evfem.solver.condensation.SuperLU
+from evfem.newton import linearisation
+linearisation.make_condensation = evfem.newton.condensation.SuperLU
 usual = ev.simulate(scene)
 assert usual.provenance["solver"]["backend"] == "SuperLU"
 np.testing.assert_allclose(dense.tangential_force, usual.tangential_force, rtol=1e-9, atol=1e-15)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
+from evfem.newton.state import Reusable, State, TangentPoint
 from evfem.simulation.checkpoint import reusable_arrays, state_arrays, usable
 from evfem.simulation.result import Saved
-from evfem.solver.state import Reusable, State, TangentPoint
 
 N, P = 6, 4
 RANDOM = np.random.default_rng(1)

@@ -10,14 +10,14 @@ from tools.meshes import block
 from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
+from evfem.newton.control import Target
+from evfem.newton.state import Folded, LiftedOff, StepFailed
+from evfem.newton.strategy import Strategy
 from evfem.planning.plan import plan
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.failure import advice
 from evfem.simulation.run import Run, simulate
-from evfem.solver.control import Target
-from evfem.solver.state import Folded, LiftedOff, StepFailed
-from evfem.solver.strategy import Strategy
 from evfem.surface.friction import RateFriction
 from evfem.surface.surfaces import Flat
 

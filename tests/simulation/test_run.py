@@ -8,11 +8,11 @@ from tools.builders import INSULATOR, balance, benchmark_scene, finger
 from tools.meshes import block
 
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
+from evfem.newton.strategy import Strategy
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import Run, simulate
-from evfem.solver.strategy import Strategy
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))

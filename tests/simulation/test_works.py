@@ -15,6 +15,7 @@ from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek, Layers, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.finger.fingerpad import MeshedFinger
+from evfem.newton.control import GivenVoltage, Indentation, Target
 from evfem.reference import pull_in_strong_troxel
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
@@ -22,7 +23,6 @@ from evfem.simulation import works
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.simulation.works import Part
-from evfem.solver.control import GivenVoltage, Indentation, Target
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import LinearElastic
 

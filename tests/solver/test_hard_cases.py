@@ -17,10 +17,10 @@ from tools.meshes import between, held
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel, eps_0
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import Electrical, MeshedFinger
+from evfem.newton.strategy import Strategy
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.run import Run, simulate
-from evfem.solver.strategy import Strategy
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import LinearElastic
 

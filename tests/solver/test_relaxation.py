@@ -18,14 +18,14 @@ from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.electrostatics.timesignals import Sampled
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import MeshedFinger
+from evfem.newton.control import Target
+from evfem.newton.hand import Hand
+from evfem.newton.state import StepFailed
 from evfem.scene.motion import Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.solver.control import Target
-from evfem.solver.hand import Hand
 from evfem.solver.relaxation import Relaxation
-from evfem.solver.state import StepFailed
 from evfem.surface.surfaces import Display, Sinusoid
 from evfem.tissue.laws import LinearElastic
 

@@ -8,12 +8,12 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
+from evfem.newton.state import Record, StepFailed
+from evfem.newton.strategy import Strategy
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
-from evfem.solver.state import Record, StepFailed
 from evfem.solver.stepping import Stepper
-from evfem.solver.strategy import Strategy
 from evfem.surface.surfaces import Flat
 
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.mesh.mesh import raised
-from evfem.solver.control import Target
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.interface import Interface
-from evfem.solver.state import Balance, Limits, Record
-from evfem.solver.strategy import Strategy
+from evfem.newton.control import Target
+from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.interface import Interface
+from evfem.newton.state import Balance, Limits, Record
+from evfem.newton.strategy import Strategy
 from evfem.surface.pad import make_pad
 from evfem.tissue.dynamics import NO_BRANCHES
 from tools.meshes import block

@@ -12,13 +12,13 @@ from tools.meshes import block
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.contact.stability import StabilityRatio
 from evfem.electrostatics.laws import Kaczmarek
+from evfem.newton.anderson import Anderson
+from evfem.newton.control import FollowFriction, Force, GivenVoltage, Indentation, Target
+from evfem.newton.factorised import FactorisedBody
 from evfem.scene.motion import Hover, Press, VoltageRamp
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.solver.anderson import Anderson
-from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target
-from evfem.solver.factorised import FactorisedBody
 from evfem.surface.surfaces import Display
 
 ROUND = finger(block(8, 3, sag=0.4))

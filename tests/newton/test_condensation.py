@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evfem.solver.condensation import Pardiso, Singular, SuperLU, mkl_library
+from evfem.newton.condensation import Pardiso, Singular, SuperLU, mkl_library
 from evfem.tissue.pattern import Pattern
 
 #: PARDISO is part of evfem[fast]; without it there is one back end to test
@@ -189,7 +189,7 @@ def test_the_library_of_this_installation_is_found_where_its_package_is():
 COLLECTED = """
 import contextvars, gc
 import numpy as np
-from evfem.solver.condensation import Pardiso
+from evfem.newton.condensation import Pardiso
 from evfem.tissue.pattern import Pattern
 
 others = [contextvars.ContextVar(str(k)) for k in range(3)]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evfem.contact.signorini import ContactNotSolved
-from evfem.solver.travel import Travel
+from evfem.newton.travel import Travel
 
 
 @dataclass

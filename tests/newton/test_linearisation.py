@@ -13,12 +13,12 @@ from evfem.common.constants import STABLE
 from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.roughness import PowerRoughness
+from evfem.newton.condensation import Singular
+from evfem.newton.linearisation import in_vain, steadied
+from evfem.newton.state import StepFailed
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
-from evfem.solver.condensation import Singular
-from evfem.solver.linearisation import in_vain, steadied
-from evfem.solver.state import StepFailed
 from evfem.surface.surfaces import Display, Sinusoid
 
 #: voltages that no insulator stands, to see far attractions from near

@@ -16,10 +16,10 @@ from tools.meshes import block
 import evfem as ev
 from evfem import meshes
 from evfem.mesh.file import read
+from evfem.newton.pressure import Pressure
 from evfem.simulation.checkpoint import reusable_of
 from evfem.simulation.result import Saved
 from evfem.simulation.run import Run, simulate
-from evfem.solver.pressure import Pressure
 from evfem.tissue import splitlaw
 from evfem.tissue.weakform import Tissue
 

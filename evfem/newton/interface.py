@@ -28,9 +28,9 @@ from evfem.common.constants import (
 )
 from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
+from evfem.contact.slipping import Returned
+from evfem.newton.state import State
 from evfem.protocols import FrictionLaw
-from evfem.solver.slipping import Returned
-from evfem.solver.state import State
 from evfem.surface.friction import Slipping, with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin

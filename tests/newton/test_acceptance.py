@@ -10,11 +10,11 @@ from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, l
 
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, StabilityRatio
-from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.interface import PenaltyInterface
-from evfem.solver.state import Folded, Limits, StepFailed
-from evfem.solver.strategy import Strategy
+from evfem.newton.control import FollowFriction, GivenVoltage, Indentation, Target
+from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.interface import PenaltyInterface
+from evfem.newton.state import Folded, Limits, StepFailed
+from evfem.newton.strategy import Strategy
 from evfem.surface.friction import RateFriction
 from evfem.surface.surfaces import Flat
 

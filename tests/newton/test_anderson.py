@@ -9,8 +9,8 @@ import pytest
 
 from evfem.common.constants import KILOVOLT
 from evfem.contact.signorini import OPEN, STICK
-from evfem.solver.anderson import Anderson
-from evfem.solver.state import State
+from evfem.newton.anderson import Anderson
+from evfem.newton.state import State
 
 NODES = 2
 

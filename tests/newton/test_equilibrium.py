@@ -10,13 +10,13 @@ from tools.meshes import block
 
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.errors import NotConverged
+from evfem.newton.control import Target
+from evfem.newton.state import Balance, StepFailed
+from evfem.newton.strategy import Strategy, stuck
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.solver.control import Target
-from evfem.solver.state import Balance, StepFailed
-from evfem.solver.strategy import Strategy, stuck
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))

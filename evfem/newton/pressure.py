@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 from evfem.common.arrays import Floats
 from evfem.errors import InputError
-from evfem.solver.linearisation import Linearisation
-from evfem.solver.state import NO_PRESSURE, State
+from evfem.newton.linearisation import Linearisation
+from evfem.newton.state import NO_PRESSURE, State
 from evfem.tissue.weakform import Tissue
 
 

@@ -6,7 +6,7 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
     state <- the body's first guess for the target
     repeat
         f <- attraction at the iterate (or frozen)
-        R, residual <- balance of the body, with the shares of the controls (`evfem.solver.control`)
+        R, residual <- balance of the body, with the shares of the controls (`evfem.newton.control`)
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
         give up if what would be accepted has an outline that crosses itself, or is not stable
@@ -14,7 +14,7 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
-The body is `evfem.solver.factorised.FactorisedBody`. Friction is counted from the last accepted
+The body is `evfem.newton.factorised.FactorisedBody`. Friction is counted from the last accepted
 state; nothing is committed before acceptance.
 """
 
@@ -30,11 +30,11 @@ from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import StabilityRatio
 from evfem.electrostatics.signals import Seen
-from evfem.solver.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
-from evfem.solver.factorised import FactorisedBody
-from evfem.solver.interface import Interface
-from evfem.solver.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
-from evfem.solver.strategy import stuck
+from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
+from evfem.newton.factorised import FactorisedBody
+from evfem.newton.interface import Interface
+from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
+from evfem.newton.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"

@@ -10,9 +10,9 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.errors import InputError
+from evfem.newton.hand import Grip
 from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
-from evfem.solver.hand import Grip
 
 pytestmark = pytest.mark.solver
 #: hardly deforms: 4 mm on 0.02 mm of 50 MPa

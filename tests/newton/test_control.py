@@ -7,7 +7,7 @@ import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import OPEN, STICK
-from evfem.solver.control import (
+from evfem.newton.control import (
     FollowFriction,
     Force,
     GivenVoltage,

@@ -7,8 +7,7 @@ import pytest
 from tools.grids import rectangle
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.solver.findings import findings
-from evfem.solver.state import Balance, State
+from evfem.newton.state import Balance, State, findings
 from evfem.tissue.body import Body
 from evfem.tissue.laws import NeoHookean
 

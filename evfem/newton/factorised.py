@@ -1,4 +1,4 @@
-r"""The finger's finite elements in an equilibrium step (`evfem.solver.equilibrium`): factorise, solve
+r"""The finger's finite elements in an equilibrium step (`evfem.newton.equilibrium`): factorise, solve
 contact, move.
 
 Algorithm (`FactorisedBody.advance`), one outer iteration::
@@ -8,7 +8,7 @@ Algorithm (`FactorisedBody.advance`), one outer iteration::
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
-    next iterate <- Anderson's combination with those before (`evfem.solver.anderson`), unless it goes
+    next iterate <- Anderson's combination with those before (`evfem.newton.anderson`), unless it goes
         too far, or the attraction's negative stiffness had to be scaled down; a new tangent after an
         older one begins anew
 
@@ -38,14 +38,22 @@ from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolutio
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import Seen
-from evfem.solver.anderson import Anderson
-from evfem.solver.control import Target, VoltageProblem
-from evfem.solver.findings import findings
-from evfem.solver.interface import Interface
-from evfem.solver.linearisation import Linearisation
-from evfem.solver.pressure import Pressure
-from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
-from evfem.solver.travel import Travel
+from evfem.newton.anderson import Anderson
+from evfem.newton.control import Target, VoltageProblem
+from evfem.newton.interface import Interface
+from evfem.newton.linearisation import Linearisation
+from evfem.newton.pressure import Pressure
+from evfem.newton.state import (
+    NO_PRESSURE,
+    Balance,
+    Limits,
+    MixedBalance,
+    Reusable,
+    State,
+    StepFailed,
+    findings,
+)
+from evfem.newton.travel import Travel
 from evfem.tissue.body import Body
 
 

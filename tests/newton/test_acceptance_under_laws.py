@@ -9,11 +9,11 @@ import pytest
 from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, legal, node, pushed, shifted
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.solver.control import GivenVoltage, Indentation, Target
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.state import Limits
-from evfem.solver.strategy import Strategy
+from evfem.newton.control import GivenVoltage, Indentation, Target
+from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.interface import Interface, PenaltyInterface
+from evfem.newton.state import Limits
+from evfem.newton.strategy import Strategy
 from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.surface.surfaces import Flat
 

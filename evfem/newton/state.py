@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.signorini import OPEN
-from evfem.solver.strategy import Strategy
+from evfem.common.constants import NAMED
+from evfem.contact.signorini import OPEN, STICK
+from evfem.newton.strategy import Strategy
+from evfem.tissue.body import Body
 from evfem.tissue.dynamics import NO_BRANCHES
 
 #: the pressure where it is no unknown of the iterations
@@ -51,7 +53,7 @@ class State:
     Displacements u (N, 2) in mm, contact forces along normal and tangent (P, 2) in N/mm and statuses (P,),
     the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
-    pressure as an unknown, that (E, Q) in MPa (`evfem.solver.pressure`). With a law of friction other than
+    pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
     Coulomb's `age` (P,) in s; with a hand x of the drive, velocity of the bone, force of the drive, `hand`
     (3,) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. Maxwell
     branches keep `inner` (`evfem.tissue.branches`).
@@ -131,7 +133,7 @@ class Record:
 
 @dataclass(frozen=True)
 class MixedBalance:
-    """Residual of the mixed displacement-pressure problem (`evfem.solver.pressure`): the forces (n,)
+    """Residual of the mixed displacement-pressure problem (`evfem.newton.pressure`): the forces (n,)
     as the older tangent takes them, the largest of them relative to the reaction, and the pressure of
     the laws less the iterate's (E, Q) in MPa.
     """
@@ -160,3 +162,30 @@ class Balance:
     def seen(self, here: bool) -> Floats:
         """The forces (n,) that a tangent has to remove which was made `here`, or elsewhere."""
         return self.forces if here or self.mixed is None else self.mixed.forces
+
+
+def findings(body: Body, state: State, balance: Balance) -> str:
+    """Largest out-of-balance forces and their current places, the contact, the smallest volume ratio."""
+    nodal = np.linalg.norm(_free(body, balance.forces), axis=1)
+    worst = np.argsort(nodal)[::-1][:NAMED]
+    places = (body.space.mesh.points + state.u)[worst]
+    unit = "N/mm" if state.bone.size == 2 else "N"
+    at = [", ".join(f"{coordinate:.4g}" for coordinate in place) for place in places]
+    forces = ", ".join(
+        f"{nodal[node]:.1e} {unit} at ({where})" for node, where in zip(worst, at, strict=True)
+    )
+    opened, sticking = int((state.status == OPEN).sum()), int((state.status == STICK).sum())
+    slipping = state.status.size - opened - sticking
+    smallest = body.tissue.smallest_J(state.u)
+    return (
+        f"out of balance: {forces}; contact: {opened} nodes open, {sticking} stick, {slipping} slip; "
+        f"smallest J of a cell: {smallest:.2g}"
+    )
+
+
+def _free(body: Body, reduced: Floats) -> Floats:
+    """Nodal forces (N, 2), without those of the bone, which its motion balances."""
+    kept = reduced.copy()
+    kept[body.bone] = 0.0
+    forces = body.expand(kept)
+    return np.where(np.isnan(forces), np.inf, forces)

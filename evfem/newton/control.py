@@ -34,8 +34,8 @@ from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
 from evfem.electrostatics.signals import Reading, Seen, electrode_charge, smallest_gap
-from evfem.solver.hand import Grip
-from evfem.solver.state import State, StepFailed
+from evfem.newton.hand import Grip
+from evfem.newton.state import State, StepFailed
 
 #: a voltage (V) that is none
 TINY = 1e-300

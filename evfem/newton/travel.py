@@ -11,9 +11,9 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import SHORTEST_FLIGHT
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import ContactNotSolved
-from evfem.solver.control import Target
-from evfem.solver.interface import Interface
-from evfem.solver.state import State
+from evfem.newton.control import Target
+from evfem.newton.interface import Interface
+from evfem.newton.state import State
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from tools.meshes import block
 
 from evfem.common.constants import CHANGES, PIN_OFFSET
 from evfem.contact.signorini import OPEN, STICK
+from evfem.newton.interface import Pins, steps_of_friction
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
-from evfem.solver.interface import Pins
 from evfem.surface.surfaces import Flat
 
 ROUND = finger(block(8, 3, sag=0.4))

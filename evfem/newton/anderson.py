@@ -21,7 +21,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
-from evfem.solver.state import State
+from evfem.newton.state import State
 
 
 class Anderson:

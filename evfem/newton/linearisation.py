@@ -39,9 +39,9 @@ from evfem.common.constants import (
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
-from evfem.solver.condensation import Singular, make_condensation
-from evfem.solver.interface import Interface
-from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
+from evfem.newton.condensation import Singular, make_condensation
+from evfem.newton.interface import Interface
+from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import surface_state
 from evfem.tissue.body import Body
 
