@@ -187,13 +187,20 @@ class ExtraUnknown:
     settles it, or another `condition`.
 
     `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y, 2 z) whose
-    force shall be `force` (N/mm).
+    force shall be `force` (N/mm), or that `along` a unit vector (dim,).
     """
 
     push: Floats
     axis: int
     force: float
     condition: Condition | None = None
+    along: Floats | None = None
+
+    def part(self, components: Floats) -> Floats:
+        """What of the bone's components (dim, ...), which come last, is that of its force (...)."""
+        if self.along is None:
+            return np.asarray(components[self.axis - len(components)])
+        return np.asarray(np.tensordot(self.along, components, axes=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,10 +366,17 @@ class LinearContactStep:
         sides (p,), and what forces on the candidates add (p, m - dim); the bone's balance along their axes,
         or a condition.
         """
-        axis = [unknown.axis - self.body.dim for unknown in self.unknowns]
-        S, carried = self.body.schur[axis], self.body.bone_rows[axis]
-        share = -np.stack([unknown.push[axis] for unknown in self.unknowns], axis=1)
-        wanted = self.residual[axis] + np.array([unknown.force for unknown in self.unknowns])
+        dim = self.body.dim
+        S, carried, pushed, residual = (
+            np.stack([unknown.part(rows) for unknown in self.unknowns])
+            for rows in (
+                self.body.schur[-dim:],
+                self.body.bone_rows,
+                np.stack([unknown.push[-dim:] for unknown in self.unknowns], axis=1),
+                self.residual[-dim:],
+            )
+        )
+        share, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:
                 S[i], share[i], wanted[i] = condition.row, condition.share, condition.wanted
@@ -372,8 +386,8 @@ class LinearContactStep:
     def _held(self, pivot: Floats, free: Floats) -> Floats:
         """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
         dim = self.body.dim
-        axis = [unknown.axis - dim for unknown in self.unknowns]
-        floor = SMALLEST_PIVOT * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
+        S = np.stack([unknown.part(self.body.schur[-dim:]) for unknown in self.unknowns])
+        floor = SMALLEST_PIVOT * np.abs(S[:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
         return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
 

@@ -153,7 +153,7 @@ class VoltageControl:
         return voltage
 
     def missing(self, reaction: Floats) -> float:
-        """Force on the bone along x (N/mm) that the control's equation lacks at these reactions (2,)."""
+        """Force on the bone (N/mm) that the control's equation lacks at these reactions (dim,)."""
         return 0.0
 
     def lacking(self, seen: Seen) -> float:
@@ -177,8 +177,8 @@ class VoltageControl:
         """The voltage where it follows what the pad does, or nothing."""
         return ()
 
-    def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
-        """Whether the equation, or its bound, holds for a bone that moves `forward` (+1 or -1)."""
+    def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
+        """Whether the equation, or its bound, holds for a bone that moves by `travel` (d,) along the display."""
         return True
 
     def fallback(self, old: State, found: State | None) -> VoltageControl | None:
@@ -280,7 +280,8 @@ class GivenGap(Met):
 
 @dataclass
 class FollowFriction(VoltageControl):
-    """The voltage, from 0 to `voltage` (V), makes the bone's force along x `force` (N/mm).
+    """The voltage, from 0 to `voltage` (V), makes the bone's force along a `way` in the plane of the display,
+    x or x and z of a unit vector, `force` (N/mm).
 
     Friction hardly depends on the voltage of a pad that sticks: there the wish has no sensible
     answer, and the voltage stays as it was.
@@ -288,6 +289,7 @@ class FollowFriction(VoltageControl):
 
     force: float
     voltage: float
+    way: tuple[float, ...] = (1.0,)
     _mode: str = field(default=UNKNOWN, repr=False, compare=False)
     follows = True
 
@@ -300,13 +302,19 @@ class FollowFriction(VoltageControl):
         self._mode = AT_ZERO if old.voltage == 0.0 else UNKNOWN
 
     def missing(self, reaction: Floats) -> float:
-        return float(self.force - reaction[0]) if self.free else 0.0
+        return self._lacks(reaction) if self.free else 0.0
+
+    def _lacks(self, reaction: Floats) -> float:
+        return float(self.force - reaction[::2] @ np.array(self.way))
 
     def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         if not self.free:
             return DrivenStep(drive.solve(step))
         unit, push = drive.unit()
-        found = drive.solve(replace(step, unknowns=(*step.unknowns, ExtraUnknown(push, 0, self.force))))
+        along = np.zeros(step.body.dim)
+        along[::2] = self.way
+        unknown = ExtraUnknown(push, 0, self.force, along=along)
+        found = drive.solve(replace(step, unknowns=(*step.unknowns, unknown)))
         most, change = (self.voltage / KILOVOLT) ** 2, float(found.extra[-1])
         if not 0.0 <= drive.squared + change <= most:
             self._mode = AT_ZERO if drive.squared + change < 0.0 else AT_LIMIT
@@ -314,11 +322,12 @@ class FollowFriction(VoltageControl):
             found = drive.solve(replace(step, residual=step.residual + change * push))
         return DrivenStep(found, change, unit)
 
-    def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
+    def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
         """At a bound the force may miss the wish as the bound forbids, else the voltage is unknown again."""
         if self.free:
             return True
-        lacking = forward * (self.force - reaction[0])
+        forward = float(np.sign(travel @ np.array(self.way))) or 1.0
+        lacking = forward * self._lacks(reaction)
         if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
             self._mode = UNKNOWN
             return False
@@ -338,8 +347,8 @@ def sticks(state: State) -> bool:
 @dataclass(frozen=True)
 class Target:
     """Where a step goes: x of the bone (mm), what settles its height and the voltage, its seconds,
-    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x is then that of
-    the drive, and the bone's an unknown.
+    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x and z are then those of
+    the drive, and the bone's unknowns.
     """
 
     x: float
@@ -361,22 +370,29 @@ class Target:
 
     def bone(self, present: Floats) -> Floats:
         """Translation of the bone (dim,) as far as it is known; the `present` one where it is not."""
-        x = self.x if self.hand is None else float(present[0])
-        along = [] if self.z is None else [self.z]
-        return np.array([x, self.height.known(float(present[1])), *along])
+        bone = np.array(present, dtype=float)
+        bone[1] = self.height.known(float(present[1]))
+        if self.hand is None:
+            bone[::2] = self.place
+        return bone
+
+    @property
+    def place(self) -> Floats:
+        """x[, z] of the drive (d,)."""
+        return np.array([self.x] if self.z is None else [self.x, self.z])
 
     def way(self, present: Floats) -> Floats:
         """Expected displacement of the bone from its `present` translation (dim,)."""
         way = self.bone(present) - present
         if self.hand is not None:
-            way[0] = self.hand.way
+            way[::2] = self.hand.way
         return way
 
     def begun(self, old: State) -> Target:
         """The target of a step that starts from `old`."""
         if self.hand is None:
             return self
-        return replace(self, hand=self.hand.begun(old, self.x, self.duration))
+        return replace(self, hand=self.hand.begun(old, self.place, self.duration))
 
     def reached(self, bone: Floats) -> bool:
         """Whether the bone's translation is, to the last digit, what is known of it."""

@@ -201,9 +201,9 @@ class Equilibrium:
     def _accepts(self, old: State, state: State, target: Target) -> bool:
         if not self.obeys_contact(old, state):
             return False
-        forward = float(np.sign(target.x - old.bone[0])) or 1.0
+        travel = target.place - old.bone[::2]
         slack = self.tolerance * max(np.abs(state.reaction).max(), SMALLEST_FORCE)
-        return target.drive.accepts(forward, state.reaction, slack)
+        return target.drive.accepts(travel, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:
         """Whether contact and friction hold here; a node that penetrates becomes a candidate."""

@@ -151,7 +151,7 @@ class FactorisedBody:
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = [target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction)]
         if target.hand is not None:
-            missing.append(target.hand.unbalanced(float(state.bone[0]), reaction))
+            missing.append(target.hand.unbalanced(state.bone[::2], reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
         return max(float(free / largest), target.drive.lacking(self._seen(state)))
 
@@ -196,7 +196,7 @@ class FactorisedBody:
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.drive.free else after.voltage
         if target.hand is not None:
-            bone[0] = mixed.bone[0]
+            bone[::2] = mixed.bone[::2]
         return replace(mixed, bone=bone, voltage=voltage)
 
     def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
@@ -255,12 +255,12 @@ class FactorisedBody:
         )
 
     def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
-        """Travels of the bone that are not given: first along y, then along x."""
+        """Travels of the bone that are not given: first along y, then along x[, z]."""
         tangent = self.linearisation.tangent
         height = target.height.unknowns(tangent, float(state.bone[1]))
         if target.hand is None:
             return height
-        return (*height, target.hand.unknown(tangent, float(state.bone[0]), state.bone.size))
+        return (*height, *target.hand.unknowns(tangent, state.bone))
 
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()

@@ -8,7 +8,8 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
           - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
 
 by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
-and the bone comes to rest. Across the slide, the bone's height stays what the motion says.
+and the bone comes to rest. In three dimensions the same holds along z, with the same spring, damper and
+mass. The bone's height stays what the motion says.
 
 Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
 100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
@@ -19,7 +20,7 @@ kg, and the cut-off frequency of the friction, that of a first-order system, by 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -75,42 +76,47 @@ class Hand:
 
     def stored(self, state: State) -> float:
         """Energy of the spring in N mm."""
-        return 0.5 * self.stiffness * (state.hand[0] - float(state.bone[0])) ** 2
+        return 0.5 * self.stiffness * float(np.sum((state.hand[0] - state.bone[::2]) ** 2))
 
     def kinetic(self, state: State) -> float:
         """Energy of the mass in N mm."""
-        return 0.5 * self.mass * float(state.hand[1]) ** 2
+        return 0.5 * self.mass * float(np.sum(state.hand[1] ** 2))
 
     def given(self, old: State, new: State) -> float:
         """Work of the actuator beyond that on the bone, between two states, in N mm."""
         drive = 0.5 * (old.hand[2] + new.hand[2]) * (new.hand[0] - old.hand[0])
-        return float(drive - 0.5 * (old.reaction[0] + new.reaction[0]) * (new.bone[0] - old.bone[0]))
+        bone = 0.5 * (old.reaction + new.reaction) * (new.bone - old.bone)
+        return float(np.sum(drive - bone[::2]))
 
     def dissipation(self, old: State, new: State, duration: float) -> float:
         """Dissipation of the damper in so many seconds, in N mm."""
         if duration == 0.0:
             return 0.0
-        stretched = (new.hand[0] - old.hand[0]) - (new.bone[0] - old.bone[0])
-        return float(self.damping * stretched**2 / duration)
+        stretched = (new.hand[0] - old.hand[0]) - (new.bone - old.bone)[::2]
+        return float(self.damping * np.sum(stretched**2) / duration)
 
 
-#: drive's x (mm), the bone's velocity (mm/s) and the drive's force (N/mm) at the beginning of a run
-AT_REST: Floats = np.zeros(3)
+def at_rest(dim: int) -> Floats:
+    """The drive's x[, z] (mm), the bone's velocity (mm/s) and the drive's force (N/mm) along them, (3, d), at
+    the beginning of a run.
+    """
+    return np.zeros((3, dim - 1))
 
 
 @dataclass(frozen=True)
 class Grip:
-    """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s)."""
+    """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), and
+    its velocity (mm/s), (d,) each.
+    """
 
     hand: Hand
-    drive: float = 0.0
+    drive: Any = 0.0
     duration: float = 0.0
-    before: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    before: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
 
-    def begun(self, old: State, drive: float, duration: float) -> Grip:
-        """In the step from `old` that takes the drive to x = `drive`."""
-        before = (float(old.hand[0]), float(old.bone[0]), float(old.hand[1]))
-        return Grip(self.hand, drive, duration, before)
+    def begun(self, old: State, drive: Floats, duration: float) -> Grip:
+        """In the step from `old` that takes the drive to x[, z] = `drive` (d,)."""
+        return Grip(self.hand, drive, duration, (old.hand[0], old.bone[::2], old.hand[1]))
 
     @property
     def stiffness(self) -> float:
@@ -121,46 +127,51 @@ class Grip:
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
 
     @property
-    def way(self) -> float:
-        """Displacement of the bone if nothing changes (mm)."""
+    def way(self) -> Any:
+        """Displacement of the bone if nothing changes (d,) in mm."""
         return self.before[2] * self.duration
 
-    def velocity(self, x: float) -> float:
-        """Velocity of the bone at the end of the step, in mm/s."""
-        return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0
+    def velocity(self, x: Any) -> Any:
+        """Velocity of the bone at the end of the step, (d,) in mm/s."""
+        return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0 * x
 
-    def driving(self, x: float) -> float:
-        """Force of the drive (N/mm), that of spring and damper, at the bone's x."""
+    def driving(self, x: Any) -> Any:
+        """Force of the drive (d,) in N/mm, that of spring and damper, at the bone's x[, z] (d,)."""
         force = self.hand.stiffness * (self.drive - x)
         if self.duration > 0.0:
             stretched = (self.drive - self.before[0]) - (x - self.before[1])
             force += self.hand.damping * stretched / self.duration
         return force
 
-    def force(self, x: float) -> float:
-        """What of it comes to the bone (N/mm), the mass taken off."""
+    def force(self, x: Any) -> Any:
+        """What of it comes to the bone (d,) in N/mm, the mass taken off."""
         force = self.driving(x)
         if self.duration > 0.0:
             force -= self.hand.mass * (self.velocity(x) - self.before[2]) / self.duration
         return force
 
-    def missing(self, x: float, reaction: Floats) -> float:
-        """Force along x (N/mm) that the bone lacks at its x and reactions (dim,)."""
-        return float(self.force(x) - reaction[0])
+    def missing(self, x: Any, reaction: Floats) -> Floats:
+        """Forces along x[, z] (d,) in N/mm that the bone lacks there and at reactions (dim,)."""
+        return np.asarray(self.force(x) - reaction[::2])
 
-    def unbalanced(self, x: float, reaction: Floats) -> float:
-        """The force `missing` beyond rounding, not negative: each of the four places rounds by itself."""
-        largest = max(abs(place) for place in (x, self.drive, *self.before[:2]))
+    def unbalanced(self, x: Any, reaction: Floats) -> float:
+        """The largest force `missing` beyond rounding, not negative: each of the four places rounds by
+        itself.
+        """
+        largest = max(float(np.max(np.abs(place))) for place in (x, self.drive, *self.before[:2]))
         rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
-        return max(abs(self.missing(x, reaction)) - rounding, 0.0)
+        return max(float(np.abs(self.missing(x, reaction)).max()) - rounding, 0.0)
 
-    def unknown(self, tangent: CondensedTangent, x: float, dim: int) -> ExtraUnknown:
-        """The bone's travel from x, in mm."""
-        push = -tangent.schur[:, -dim]
-        push[-dim] -= self.stiffness
-        return ExtraUnknown(push, 0, self.force(x))
+    def unknowns(self, tangent: CondensedTangent, bone: Floats) -> tuple[ExtraUnknown, ...]:
+        """The bone's travels along x[, z] from its translation (dim,), in mm."""
+        found = []
+        for axis, force in zip((0, 2), self.force(bone[::2]).tolist(), strict=False):
+            push = -tangent.schur[:, axis - bone.size]
+            push[axis - bone.size] -= self.stiffness
+            found.append(ExtraUnknown(push, axis, force))
+        return tuple(found)
 
     def settled(self, state: State) -> State:
         """The accepted state with drive, velocity and force."""
-        x = float(state.bone[0])
-        return replace(state, hand=np.array([self.drive, self.velocity(x), self.driving(x)]))
+        x = state.bone[::2]
+        return replace(state, hand=np.stack([self.drive, self.velocity(x), self.driving(x)]))

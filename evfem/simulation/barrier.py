@@ -61,7 +61,7 @@ def _carried(part: Part, target: Target) -> Floats:
     if target.height.free:
         travel[1] = 0.0
     if target.hand is not None:
-        travel[0] = 0.0
+        travel[::2] = 0.0
     return np.where((part.old.touching & part.new.touching)[:, None], 0.0, travel)
 
 
@@ -120,5 +120,5 @@ def _hand(part: Part) -> Floats:
     hand = part.model.scene.hand
     if hand is None:
         return np.zeros_like(PLACES)
-    short = float(part.new.bone[0] - part.old.bone[0]) * (1.0 - PLACES)
-    return 0.5 * hand.stiffness * (short**2 - short[0] ** 2)
+    square = float(np.sum((part.new.bone - part.old.bone)[::2] ** 2))
+    return 0.5 * hand.stiffness * square * ((1.0 - PLACES) ** 2 - (1.0 - PLACES[0]) ** 2)

@@ -9,7 +9,7 @@ from tools.meshes import block
 
 from evfem.common.constants import CHANGES, PIN_OFFSET
 from evfem.contact.signorini import OPEN, STICK
-from evfem.newton.interface import Pins, steps_of_friction
+from evfem.newton.interface import Pins
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
