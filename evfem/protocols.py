@@ -122,6 +122,10 @@ class CompleteSurface(Surface, Protocol):
         """Whether the friction coefficient is positive anywhere."""
 
     @property
+    def crosses(self) -> bool:
+        """Whether it varies otherwise than along x, so that a finger in the plane cannot have it."""
+
+    @property
     def friction_jumps(self) -> Any:
         """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on."""
 

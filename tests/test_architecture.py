@@ -44,7 +44,7 @@ ROOMS = {
         {"numpy", "scipy", "skfem"},
         "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "friction surfaces textures usersurface pad skin"),
+    "surface": ({"numpy", "scipy"}, "ways friction surfaces relief textures usersurface pad skin"),
     "contact": (
         {"numpy", "scipy"},
         "charging attraction fullfield drivenfield signorini slipping solve follower condensed stability",

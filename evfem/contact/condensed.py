@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class Candidates:
     N).
 
     The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
-    N/mm, statuses (c,), friction coefficients (c,) and their slopes (c, d) in 1/mm. `interface_compliance` (c,
+    N/mm, statuses (c,), friction coefficients (c,), their slopes (c, d) in 1/mm. `interface_compliance` (c,
     1 + d) in mm per N/mm: 0, or 1 / (penalty x tributary length). A law of friction gives its derivative by
     the contact force as the coefficient, `cohesion` (c,) in N/mm, and the growth with the slip,
     `slip_stiffness` (c,) in N/mm per mm. Attraction: see `AttractionStiffness`.
@@ -122,7 +123,7 @@ class Candidates:
             growth -= self.slip_stiffness[:, None, None] * (held @ self.surface.travel)
         steep = np.trace(growth, axis1=1, axis2=2)
         gives = np.sum(np.where(along, way**2, 1.0 / way.shape[1]) * own, axis=1)
-        kept = (steep < 0.0) | (steep * gives < STABLE)
+        kept: Any = (steep < 0.0) | (steep * gives < STABLE)
         return np.asarray(np.where(kept[:, None, None], growth, 0.0))
 
 

@@ -1,8 +1,8 @@
 r"""Stiffness of contact forces that turn with the profile, in the small block of the nodes near contact.
 
-A node that moves along a profile, by dx[, dz], takes the direction of its contact force along, and at a slope
-of the friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body that gives :math:`u = C
-(f + T u)`, so :math:`(1 - C T)^{-1} C` takes the place of C, and the same of free motions.
+A node that moves along a profile, by dx[, dz], takes the direction of its contact force along, and at a
+slope of the friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body that gives
+:math:`u = C (f + T u)`, so :math:`(1 - C T)^{-1} C` takes the place of C, and the same of free motions.
 
 Where the feedback C T of the slipping nodes exceeds 1, the forces push them aside harder than the
 tissue holds them: stability is lost, and the linear problem has no solution, or one the wrong way.

@@ -279,7 +279,9 @@ class FieldAttraction(Attraction):
     ) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
         x, levels = self.outline(position, lines, pressing)
-        field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope[:, 0], near)
+        field, forces = self._solved(
+            x, levels, surface_state(self.surface, lines @ position).slope[:, 0], near
+        )
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:

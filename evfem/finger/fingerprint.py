@@ -137,7 +137,9 @@ def read(path: Path, pixel: float, height: float, dark: str | None = None) -> He
     does. Raises `InputError`.
     """
     if path.suffix.lower() == ".csv":
-        return HeightMap(*gridded("finger.ridges", *read_columns(path, ["x", "z", "height"], "finger.ridges")))
+        return HeightMap(
+            *gridded("finger.ridges", *read_columns(path, ["x", "z", "height"], "finger.ridges"))
+        )
     return _from_image(path, pixel, height, dark)
 
 

@@ -178,7 +178,9 @@ class VoltageControl:
         return ()
 
     def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
-        """Whether the equation, or its bound, holds for a bone that moves by `travel` (d,) along the display."""
+        """Whether the equation, or its bound, holds for a bone that moves along the display by `travel`
+        (d,).
+        """
         return True
 
     def fallback(self, old: State, found: State | None) -> VoltageControl | None:

@@ -41,10 +41,10 @@ class Pins:
     """Nodes that a jump of friction holds back during one step; `place` (P, d) is nan for free nodes.
 
     A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
-    to the higher limit. By its own place the coefficient has no consistent value: iterations put it before the
-    jump, behind it, before it again. It is pinned a hair inside the rougher side, where its way has crossed
-    the jump, sticking with the higher coefficient, and released below the lower limit. A node that began the
-    step on the rougher side is not held.
+    to the higher limit. By its own place the coefficient has no consistent value: iterations put it before
+    the jump, behind it, before it again. It is pinned a hair inside the rougher side, where its way has
+    crossed the jump, sticking with the higher coefficient, and released below the lower limit. A node that
+    began the step on the rougher side is not held.
     """
 
     def __init__(self, steps: Sequence[Steps], begin: Floats) -> None:

@@ -55,8 +55,8 @@ class State:
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
     pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
     Coulomb's `age` (P,) in s; with a hand x[, z] of the drive, velocity of the bone, force of the
-    drive, `hand` (3, d) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. Maxwell
-    branches keep `inner` (`evfem.tissue.branches`).
+    drive, `hand` (3, d) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in
+    V/mm. Maxwell branches keep `inner` (`evfem.tissue.branches`).
     """
 
     u: Floats

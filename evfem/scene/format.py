@@ -34,11 +34,13 @@ from evfem.scene.scene import (
     Solver,
 )
 from evfem.surface import textures
-from evfem.surface.surfaces import Flat, Friction, Insulator, Profile, Shift
+from evfem.surface.relief import Relief
+from evfem.surface.surfaces import Angle, Flat, Friction, Insulator, Profile, Shift
 
 Table = Mapping[str, Any]
 Pairs = list[list[float]]
 _HEIGHTS = "the path of a csv file with the header x,height"
+_RELIEF = "the path of a csv file with the header x,z,height"
 _CSV = {"file": lambda name: name.lower().endswith(".csv")}
 _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
@@ -122,16 +124,43 @@ class ProfileTable:
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    angle: Angle = 0.0
 
     def made(self) -> Profile:
         """The profile of the file or of the points."""
-        common: Any = {"friction": self.friction, "y": self.y, "insulator": self.insulator}
+        common: Any = {name: getattr(self, name) for name in ("friction", "y", "insulator", "angle")}
         if (self.file is None) == (self.points is None):
             given = ABSENT if self.file is None else "file and points"
             raise InputError("surface.file", given, _HEIGHTS)
         if self.points is not None:
             return Profile(*columns("surface.points", self.points), **common)
         return Profile.from_csv(self.file or "", **common)
+
+
+@dataclass(frozen=True)
+class ReliefTable:
+    """[surface] of the kind relief."""
+
+    file: Annotated[str | None, _path(_RELIEF), "heights over x and z"] = None
+    x: Annotated[list[float] | None, instance("x in mm", list, unit="mm"), "of the heights' columns"] = None
+    z: Annotated[list[float] | None, instance("z in mm", list, unit="mm"), "of the heights' rows"] = None
+    height: Annotated[
+        Pairs | None, _rows("heights in mm, a row for each z", "mm"), "the same in the scene file"
+    ] = None
+    friction: Friction = 0.3
+    y: Shift = None
+    insulator: Insulator = None
+
+    def made(self) -> Relief:
+        """The surface of the file or of the heights."""
+        common: Any = {name: getattr(self, name) for name in ("friction", "y", "insulator")}
+        here = [name for name in ("x", "z", "height") if getattr(self, name) is not None]
+        if len(here) != (0 if self.file is not None else 3):
+            given = " and ".join([*(["file"] if self.file is not None else []), *here]) or ABSENT
+            raise InputError("surface.file", given, f"{_RELIEF}; or x, z and height")
+        if self.file is not None:
+            return Relief.from_csv(self.file, **common)
+        return Relief(self.x, self.z, self.height, **common)
 
 
 @dataclass(frozen=True)
@@ -282,7 +311,7 @@ class Electrostatics:
             return Drive(resolved=given.pop("drive") == "resolved", **given)
 
 
-SURFACES: Mapping[str, Any] = {**textures.SURFACES, "profile": ProfileTable}
+SURFACES: Mapping[str, Any] = {**textures.SURFACES, "profile": ProfileTable, "relief": ReliefTable}
 
 
 def names(*classes: Any) -> list[str]:

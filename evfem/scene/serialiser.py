@@ -24,6 +24,7 @@ from evfem.finger.fingerpad import MeshedFinger
 from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
 from evfem.surface.friction import KINDS, Coulomb
+from evfem.surface.relief import Relief
 from evfem.surface.surfaces import Display, Profile
 from evfem.surface.textures import SURFACES
 
@@ -41,6 +42,8 @@ def dump(scene: Scene) -> str:
     if isinstance(scene.surface, Profile):
         rows = zip(scene.surface.x.tolist(), scene.surface.samples.tolist(), strict=True)
         surface["points"] = [list(row) for row in rows]
+    if isinstance(scene.surface, Relief):
+        surface |= scene.surface.columns
     if type(scene.friction_law) is not Coulomb:
         surface["friction_law"] = _of_kind(scene.friction_law, KINDS, "surface.friction_law")
     tables = {

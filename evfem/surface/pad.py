@@ -261,8 +261,9 @@ class SurfaceState:
     r"""The surface below (or above) the pad nodes: vertical gap (P,), slopes (P, d) and curvatures (P, d, d)
     along x, in space along x and z.
 
-    With the slopes p, q and :math:`r_1 = \sqrt{1 + p^2}`, :math:`r = \sqrt{1 + p^2 + q^2}` a node's frame in
-    (x, y, z) is :math:`n = (-p, 1, -q)/r`, :math:`t_1 = (1, p, 0)/r_1`, :math:`t_2 = (-pq, q, r_1^2)/(r_1 r)`.
+    With the slopes p, q and :math:`r_1 = \sqrt{1 + p^2}`, :math:`r = \sqrt{1 + p^2 + q^2}` a node's frame
+    in (x, y, z) is :math:`n = (-p, 1, -q)/r`, :math:`t_1 = (1, p, 0)/r_1`,
+    :math:`t_2 = (-pq, q, r_1^2)/(r_1 r)`.
     """
 
     gap: Floats
@@ -274,7 +275,7 @@ class SurfaceState:
         return SurfaceState(self.gap[nodes], self.slope[nodes], self.curvature[nodes])
 
     @cached_property
-    def _sizes(self) -> tuple[Floats, Floats, Floats | float, Floats]:
+    def _sizes(self) -> tuple[Floats, Floats | float, Floats, Floats]:
         """Slopes p and q, 0 in the plane, and the lengths r_1 and r, (P,) each."""
         p, q = self.slope[:, 0], self.slope[:, 1] if self.slope.shape[1] > 1 else 0.0
         first = np.sqrt(1.0 + p**2)

@@ -96,8 +96,13 @@ class Relief(RigidSurface):
         return f"Relief({', '.join([size, *more])})"
 
     @property
+    def columns(self) -> dict[str, Any]:
+        """Its samples as a scene file holds them."""
+        return {"x": self.x.tolist(), "z": self.z.tolist(), "height": self.samples.tolist()}
+
+    @property
     def crosses(self) -> bool:
-        """It differs along z."""
+        """It does."""
         return True
 
     @cached_property

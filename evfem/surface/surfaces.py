@@ -86,12 +86,14 @@ class RigidSurface(OneWay, Checked):
 
     @property
     def crosses(self) -> bool:
-        """Whether height or friction differ along z."""
+        """Whether a finger in the plane cannot have it."""
         return super().crosses or isinstance(self.friction, FrictionMap)
 
     def friction_at(self, place: Array) -> Array:
         """Coefficients of friction (...) at places (..., d)."""
-        return self.friction.at(place) if isinstance(self.friction, FrictionMap) else super().friction_at(place)
+        if isinstance(self.friction, FrictionMap):
+            return self.friction.at(place)
+        return super().friction_at(place)
 
     def friction_gradient(self, place: Array) -> Array:
         """Derivatives (..., d) of the coefficient along x and z, in 1/mm, jumps left out."""
@@ -272,8 +274,8 @@ class Sinusoid(RigidSurface):
 
     @property
     def crosses(self) -> bool:
-        """Whether height or friction differ along z."""
-        return super().crosses or any(way % 180.0 != 0.0 for _, _, _, *own in self._all for way in own)
+        """Whether a finger in the plane cannot have it."""
+        return super().crosses or any(way != 0.0 for _, _, _, *own in self._all for way in own)
 
     @property
     def _all(self) -> Rows:
@@ -404,7 +406,8 @@ def _friction(key: str, given: Any) -> float | Rows | FrictionMap:
         return given
     if isinstance(given, Mapping):
         if set(given) != {"x", "z", "friction"}:
-            raise InputError(key, f"a table of {', '.join(map(str, given)) or 'nothing'}", "x, z and friction")
+            found = ", ".join(map(str, given)) or "nothing"
+            raise InputError(key, f"a table of {found}", "x, z and friction")
         return FrictionMap(**given)
     if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
         return real(key, given, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)

@@ -27,6 +27,7 @@ import numpy as np
 
 from evfem.common.checks import SEED, Within, number, real, set_frozen
 from evfem.errors import InputError
+from evfem.surface.relief import Relief
 from evfem.surface.surfaces import (
     FARTHEST,
     HIGHEST,
@@ -218,4 +219,5 @@ SURFACES: Mapping[str, Any] = {
     "profile": Profile,
     "grating": Grating,
     "self_affine": SelfAffine,
+    "relief": Relief,
 }

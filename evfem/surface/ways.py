@@ -48,8 +48,8 @@ class OneWay:
 
     @property
     def crosses(self) -> bool:
-        """Whether it differs along z, so that a finger in the plane cannot have it."""
-        return self.angle % 180.0 != 0.0
+        """Whether x is not the direction in which it varies, so that a finger in the plane cannot have it."""
+        return self.angle != 0.0
 
     def relief(self: Any, place: Floats) -> tuple[Floats, Floats, Floats]:
         """Heights (...) in mm at places (..., d), slopes (..., d) along x and z, and curvatures (..., d, d)
@@ -171,7 +171,8 @@ class FrictionMap:
     def steps(self) -> tuple[Steps, ...]:
         """Its jumps along x and along z."""
         found = []
-        for axis, grid, over, value in ((0, self.x, self.z, self.friction.T), (1, self.z, self.x, self.friction)):
+        ways = (0, self.x, self.z, self.friction.T), (1, self.z, self.x, self.friction)
+        for axis, grid, over, value in ways:
             at = np.flatnonzero(np.diff(grid) == 0.0)
             at = at[(value[at] != value[at + 1]).any(axis=1)]
             if at.size:

@@ -32,7 +32,11 @@ def candidates(rng, curved, **changes):
     shear = np.choose(status, [0.0, 0.1, -0.4, 0.4]) * normal
     force = np.where((status == OPEN)[:, None], 0.0, np.stack([normal, shear], axis=1))
     slope, curvature = (curved * rng.uniform(-0.5, 0.5, (2, K))) if curved else np.zeros((2, K))
-    surface = SurfaceState(np.where(status == OPEN, 0.5, 1e-3) * rng.uniform(0.5, 1.0, K), slope[:, None], curvature[:, None, None])
+    surface = SurfaceState(
+        np.where(status == OPEN, 0.5, 1e-3) * rng.uniform(0.5, 1.0, K),
+        slope[:, None],
+        curvature[:, None, None],
+    )
     zero = np.zeros(K)
     known = Candidates(
         surface=surface,
@@ -249,7 +253,9 @@ def test_nodes_and_bone_feel_how_the_attraction_changes(seed):
 def test_crests_that_push_harder_than_the_body_holds_have_no_solution(seed):
     crests = candidates(np.random.default_rng(seed), 1.0).surface
     held, lost = (
-        step_of(np.random.default_rng(seed), 1.0, surface=replace(crests, curvature=np.full((K, 1, 1), curvature)))
+        step_of(
+            np.random.default_rng(seed), 1.0, surface=replace(crests, curvature=np.full((K, 1, 1), curvature))
+        )
         for curvature in (-0.1, -5.0)
     )
     check(*held)

@@ -67,7 +67,9 @@ def test_a_force_turns_with_its_node_and_grows_with_friction():
 
     def force(x):
         mu = 0.3 + 0.1 * x
-        return np.einsum("a,ak->k", [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8], known(x, [0.0, 0.0, 0.0]).surface.axes[0])
+        return np.einsum(
+            "a,ak->k", [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8], known(x, [0.0, 0.0, 0.0]).surface.axes[0]
+        )
 
     at, h = 0.7, 1e-5
     mu = 0.3 + 0.1 * at
