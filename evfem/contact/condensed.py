@@ -116,10 +116,10 @@ class Candidates:
         """
         way = self.shear_direction
         growth = way[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
-        along = way.any(axis=1)[:, None]
+        along = np.any(way, axis=1, keepdims=True)
         if self.slip_stiffness is not None:
             # a node that slips is held along its slip, one that sticks either way
-            held = np.where(along[..., None], way[:, :, None] * way[:, None, :], np.eye(way.shape[1]))
+            held = np.where(along[:, :, None], way[:, :, None] * way[:, None, :], np.eye(way.shape[1]))
             growth -= self.slip_stiffness[:, None, None] * (held @ self.surface.travel)
         steep = np.trace(growth, axis1=1, axis2=2)
         gives = np.sum(np.where(along, way**2, 1.0 / way.shape[1]) * own, axis=1)

@@ -126,15 +126,3 @@ class Relief(RigidSurface):
         slope = np.stack([p, q], axis=-1)
         curvature = np.stack([np.stack([xx, xz], axis=-1), np.stack([xz, zz], axis=-1)], axis=-1)
         return h, slope[..., :d], curvature[..., :d, :d]
-
-    def height(self, x: Array) -> Array:
-        """Height (mm) of the unshifted profile at x (mm), on z = 0."""
-        return self.relief(np.asarray(x)[..., None])[0]
-
-    def slope(self, x: Array) -> Array:
-        """Derivative of the height at x (mm), on z = 0."""
-        return self.relief(np.asarray(x)[..., None])[1][..., 0]
-
-    def curvature(self, x: Array) -> Array:
-        """Second derivative (1/mm) of the height at x (mm), on z = 0."""
-        return self.relief(np.asarray(x)[..., None])[2][..., 0, 0]

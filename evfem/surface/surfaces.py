@@ -174,15 +174,15 @@ class RigidSurface(OneWay, Checked):
 
     def height(self, x: Array) -> Array:
         """Height (mm) of the unshifted profile at x (mm)."""
-        raise NotImplementedError
+        return self.relief(np.asarray(x)[..., None])[0]
 
     def slope(self, x: Array) -> Array:
         """Derivative of the height at x (mm)."""
-        raise NotImplementedError
+        return self.relief(np.asarray(x)[..., None])[1][..., 0]
 
     def curvature(self, x: Array) -> Array:
         """Second derivative (1/mm) of the height at x (mm)."""
-        raise NotImplementedError
+        return self.relief(np.asarray(x)[..., None])[2][..., 0, 0]
 
 
 class _Level(RigidSurface):
@@ -293,26 +293,6 @@ class Sinusoid(RigidSurface):
             parts.append((wave, slope, (-(k**2) * wave)[..., None, None] * np.outer(way, way)))
         height, slope, curvature = (sum(each) for each in zip(*parts, strict=True))
         return np.asarray(height), np.asarray(slope), np.asarray(curvature)
-
-    def _sum(self, x: Array, order: int) -> Array:
-        """Derivative of the given order: each one is a factor k and a quarter of a turn; on z = 0."""
-        total: Any = 0.0
-        for a, k, phase, *own in self._all:
-            along = k * direction(sum(own))[0] if own else k
-            total = total + a * along**order * np.sin(along * x + phase + order * np.pi / 2)
-        return total
-
-    def height(self, x: Array) -> Array:
-        """Height (mm) of the unshifted profile at x (mm)."""
-        return self._sum(x, 0)
-
-    def slope(self, x: Array) -> Array:
-        """Derivative of the height at x (mm)."""
-        return self._sum(x, 1)
-
-    def curvature(self, x: Array) -> Array:
-        """Second derivative (1/mm) of the height at x (mm)."""
-        return self._sum(x, 2)
 
 
 @dataclass(frozen=True, eq=False, init=False)
