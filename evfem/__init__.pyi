@@ -74,6 +74,8 @@ from evfem.scene.terms import Boundary as Boundary
 from evfem.scene.terms import Region as Region
 from evfem.simulation import result as result
 from evfem.simulation.checkpoint import Checkpoint as Checkpoint
+from evfem.simulation.loop import Loop as Loop
+from evfem.simulation.loop import loop as loop
 from evfem.simulation.result import Frame as Frame
 from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate
@@ -94,11 +96,11 @@ from evfem.surface.textures import SelfAffine as SelfAffine
 from evfem.surface.ways import FrictionMap as FrictionMap
 from evfem.sweeps.check import check as check
 from evfem.sweeps.file import Sweep as Sweep
-from evfem.sweeps.run import SweepResult as SweepResult
 from evfem.sweeps.run import sweep as sweep
 from evfem.sweeps.samples import Normal as Normal
 from evfem.sweeps.samples import Samples as Samples
 from evfem.sweeps.samples import Uniform as Uniform
+from evfem.sweeps.table import SweepResult as SweepResult
 from evfem.tensor import ddot as ddot
 from evfem.tensor import det as det
 from evfem.tensor import dot as dot

@@ -333,7 +333,8 @@ def _sample(given: argparse.Namespace) -> Any:
 def _sweep(given: argparse.Namespace) -> int:
     from evfem.sweeps.file import load
     from evfem.sweeps.folder import TABLE
-    from evfem.sweeps.run import sweep, told
+    from evfem.sweeps.run import sweep
+    from evfem.sweeps.table import told
 
     try:
         plan = load(given.sweep)

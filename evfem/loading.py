@@ -9,10 +9,10 @@ from typing import Any
 from evfem.common.storage import format_of
 from evfem.errors import InputError
 
-Found = Any  # Result, FitResult, VoltageProfile, Sampled, Scene, Sweep, Mesh or Texture
+Found = Any  # Result, FitResult, VoltageProfile, Sampled, Scene, Sweep, SweepResult, Mesh or Texture
 ALLOWED = (
-    "the folder of a run, a result (.npz), a fit (.json), a signal (.csv, .wav), a scene or a sweep (.toml), "
-    "a mesh (.vtu, .msh), a texture (.json)"
+    "the folder of a run or a sweep, a result (.npz), a fit (.json), a signal (.csv, .wav), a scene or a "
+    "sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
 )
 #: format of the fast models that 0.2 saved
 FAST_MODEL = "evfem-reduced-1"
@@ -32,6 +32,8 @@ def load(path: str | Path) -> Found:
         From the folder of `evfem run`, or a file of `Result.save` under any name.
     FitResult, Texture
         From .json; a texture with its .csv, or from their folder.
+    SweepResult
+        From the folder of a sweep, its `sweep.json`, or a csv file with its table.
     VoltageProfile, Sampled
         From .csv or .wav; `Sampled` from a .csv over time.
     Scene, Sweep
@@ -69,6 +71,10 @@ def _run(path: Path) -> Found:
 
     if (path / texture.NAME).is_file():
         return texture.read(path)
+    from evfem.sweeps import folder, table
+
+    if (path / folder.PROVENANCE).is_file():
+        return table.read(path)
     from evfem.runfolder import result_in
 
     return result_in(path)
@@ -94,8 +100,9 @@ def _archive(path: Path) -> Found:
 
 def _signal(path: Path) -> Found:
     from evfem.electrostatics.signalfile import read_voltage
+    from evfem.sweeps import table
 
-    return read_voltage(path)
+    return table.read(path) if table.is_table(path) else read_voltage(path)
 
 
 def _tables(path: Path) -> Found:
@@ -108,8 +115,11 @@ def _tables(path: Path) -> Found:
 
 def _fit(path: Path) -> Found:
     from evfem.calibration.result import load
+    from evfem.sweeps import folder, table
     from evfem.textures import texture
 
+    if path.name == folder.PROVENANCE:
+        return table.read(path)
     return texture.read(path) if texture.is_texture(path) else load(path)
 
 

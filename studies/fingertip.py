@@ -31,6 +31,7 @@ import numpy as np
 import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.finger.solid import Ellipsoid, Grid
+from evfem.planning.core import Closing
 from evfem.simulation.model import make_attraction, placed
 from evfem.surface.skin import Skin, make_skin
 
@@ -169,7 +170,7 @@ def force_on(finger: Any, mesh: Any, skin: Skin, law: Any, voltage: float, gap: 
     scene = ev.Scene(finger, ev.Display(friction=0.0), law, voltage, [ev.Hover(gap=gap)])
     points = mesh.points[skin.nodes]
     surface, _ = placed(scene.ground, points)
-    attraction = make_attraction(scene, mesh, skin, surface)
+    attraction = make_attraction(Closing(scene, mesh), skin, surface)
     forces = attraction.forces(points + np.array([0.0, gap, 0.0]), voltage, None)
     return float(-1e3 * forces[:, 1].sum())
 

@@ -65,11 +65,11 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "scipy"},
-        "provenance history result spectrum model doubtful works barrier ledger checkpoint failure run",
+        "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
-        "samples file folder run check",
+        "samples file folder table run check",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (

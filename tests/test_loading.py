@@ -52,7 +52,7 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
     Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
     save_arrays("pad.npz", {"format": np.array("evfem-reduced-1")})  # as FastModel.save of 0.2 did
     cases = {
-        "notes.txt": "notes.txt, of another kind; allowed: the folder of a run, a result",
+        "notes.txt": "notes.txt, of another kind; allowed: the folder of a run or a sweep, a result",
         "none.npz": "none.npz, which does not exist",
         "empty.npz": "empty.npz, cut off or of another kind",
         "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",

@@ -38,14 +38,14 @@ NEIGHBOURS = 4.0
 STEEP = 0.02
 #: in 3D, the fraction up to which the negative stiffness of an open node is taken off the tangent: any body
 #: holds that [attraction]
-HELD = 2.0
+SUBTRACTED = 2.0
 #: and the fraction above which it makes the node a candidate [attraction]
-TAKEN = 10.0
+STEEP_IN_SPACE = 10.0
 #: in 3D, at least this fraction of the pad's nodes are candidates [press]
-FIRST = 0.05
+FIRST_CANDIDATES = 0.05
 #: where they become so many times more within a linear step, it is done again with them, at most so often
 #: [press]
-GROWN, GROWING = 3.0, 4
+CANDIDATE_GROWTH, CANDIDATE_ROUNDS = 3.0, 4
 #: changes of tributary lengths that stiffen no node by more than this fraction are left to the iterations [C]
 SMALLEST_STIFFENING = 0.01
 #: an attraction whose feedback on its own node is below this fraction is left to the next iteration [C]

@@ -11,9 +11,11 @@ import shutil
 import sys
 import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TextIO
+
+from evfem.errors import InputError, StopRun, quoted
 
 LOG = logging.getLogger("evfem")
 
@@ -140,3 +142,28 @@ def status(label: str) -> Iterator[None]:
     line = tqdm(desc=label, bar_format="{desc}{postfix}", leave=False, ncols=columns)
     with line, listening(_Newest(line), logging.DEBUG):
         yield
+
+
+def check_observers(observers: Sequence[object]) -> None:
+    """Raise InputError for an object that would be told of nothing."""
+    for i, observer in enumerate(observers):
+        if not any(hasattr(observer, event) for event in ("started", "step", "finished")):
+            allowed = "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint) "
+            allowed += "or finished(result)"
+            raise InputError(f"observers[{i}]", quoted(observer), allowed)
+
+
+def tell_observers(observers: Sequence[object], event: str, *arguments: Any) -> list[str]:
+    """Tell every observer; the reasons of those who want the run to end."""
+    reasons = []
+    for observer in observers:
+        method: Callable[..., None] | None = getattr(observer, event, None)
+        if method is None:
+            continue
+        try:
+            method(*arguments)
+        except StopRun as stop:
+            if event != "step":
+                raise
+            reasons.append(str(stop) or type(observer).__name__)
+    return reasons

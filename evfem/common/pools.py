@@ -19,7 +19,7 @@ from multiprocessing import Pipe, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from evfem.common.checks import count
 from evfem.errors import InputError, quoted
@@ -85,6 +85,11 @@ class Worker:
         self._process.join()
         self.line.close()
         return self._process.exitcode
+
+
+def loaded_blas() -> ThreadpoolController:
+    """Every BLAS loaded by now; to find them takes milliseconds, its `limit` microseconds."""
+    return ThreadpoolController()
 
 
 def blas_limits(threads: int | None = 1) -> threadpool_limits:

@@ -149,7 +149,7 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
     if len(body) > MOST_ROWS:
         raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
     return {
-        name: _words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
+        name: words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
     }
 
 
@@ -237,14 +237,20 @@ def read_headed(
     return Headed([name for name, _ in parts], [unit for _, unit in parts], list(np.array(values).T), commas)
 
 
-def _text(path: Path, key: str, allowed: str) -> str:
+def read_bytes(path: Path, key: str, allowed: str, most: int, limit: str) -> bytes:
+    """A file of at most `most` bytes, which `limit` says; `InputError` for another or an unreadable one."""
     try:
         with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
+            data = file.read(most + 1)
     except OSError as error:
         raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
-    if len(data) > MOST_BYTES:
-        raise InputError(key, f"{path.name} with more rows", f"at most {MOST_BYTES // 10**6} MB")
+    if len(data) > most:
+        raise InputError(key, f"{path.name}, which is too long", limit)
+    return data
+
+
+def _text(path: Path, key: str, allowed: str) -> str:
+    data = read_bytes(path, key, allowed, MOST_BYTES, f"at most {MOST_BYTES // 10**6} MB")
     codings = ("utf-16",) if data.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "latin-1")
     for coding in codings:
         try:
@@ -304,7 +310,8 @@ def _is_unit(cell: str) -> bool:
     )
 
 
-def _words_or_numbers(words: Iterable[str]) -> Any:
+def words_or_numbers(words: Iterable[str]) -> Any:
+    """A column of a table: an array of numbers, or a list of words."""
     words = list(words)
     try:
         return np.array([float(word) for word in words])

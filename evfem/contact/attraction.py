@@ -15,7 +15,7 @@ Without an air layer only touching nodes carry force. Forces act on the finger; 
 In three dimensions A_j is the node's projected area (`evfem.surface.skin`), and forces are in N.
 
 Rough faces keep a separation s(p) where they touch (`evfem.electrostatics.roughness`): the law then
-sees g + s, with p the node's own contact pressure, its pressing force over A_j. A node that is
+has the gap g + s, with p the node's own contact pressure, its pressing force over A_j. A node that is
 pressed by d lam_n more is pulled by :math:`p'(s)\,s'(p)\,d\lambda_n` more (`gain_on_pressing`).
 """
 
@@ -76,8 +76,8 @@ class Attraction:
         """Charges (M, P) of an uncharged pad, (2, 0) where charges do not move."""
         return np.zeros((2, 0)) if self.charging is None else self.charging.none
 
-    def _seen(self, gap: Any, voltage: float, position: Floats) -> Any:
-        """The voltage that the law sees at gaps (P,) of nodes at (P, dim): that of the charges, too."""
+    def _voltages(self, gap: Any, voltage: float, position: Floats) -> Any:
+        """Effective voltage at gaps (P,) of nodes at (P, dim), with that of the charges."""
         if self.charging is None:
             return voltage
         return self.charging.effective(gap, voltage, self.pad.tributary(position))
@@ -127,7 +127,7 @@ class Attraction:
         gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1])
         gaps = gaps + self._separation(positions, pressing)
         at = zip(gaps, voltages.tolist(), positions, strict=True)
-        pairs = [(gap, self._seen(gap, u, position)) for gap, u, position in at]
+        pairs = [(gap, self._voltages(gap, u, position)) for gap, u, position in at]
         on = 1.0 if self.air_layer else touching.astype(float)
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
         weight = on * pressure * self.pad.tributary(positions)
@@ -142,7 +142,7 @@ class Attraction:
         return forces
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
-        """What a core withholds of closed nodes' attraction, and leaves, (P,) in MPa; or None."""
+        """Parts of closed nodes' attraction (P,) in MPa that a core takes away, and leaves; or None."""
         if not isinstance(self.law, Cored) or voltage == 0.0:
             return None
         found = np.broadcast_arrays(*self.law.withheld(voltage, self.layers), np.zeros(self.pad.nodes.size))
@@ -157,7 +157,7 @@ class Attraction:
     def way_forces(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """`forces_along` of the columns alone, which know what closing gaps add between the ends."""
+        """`forces_along` of the columns alone, which resolve how the attraction grows as gaps close."""
         return self.forces_along(positions, voltages, touching, pressing)
 
     def _sideways(self, position: Floats, potential: Floats) -> Floats:
@@ -169,7 +169,7 @@ class Attraction:
         return found.astype(float, copy=False).reshape(position.shape)
 
     def _separation(self, position: Floats, pressing: Floats | None) -> Any:
-        """What rough faces keep between them at the nodes at (..., P, dim), in mm."""
+        """Separation of rough faces at nodes at (..., P, dim), in mm."""
         if self.roughness is None:
             return 0.0
         return self.roughness.separation(self._contact_pressure(position, pressing))
@@ -195,7 +195,7 @@ class Attraction:
     def negative_stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm
+        """Decrease of the attraction of a node with its vertical gap, -dp/dg A (P,) in N/mm
         per mm; 0 where it touches, where contact holds the gap, and where losses make it grow with
         the gap: that stabilises, and the iterations do without it.
         """
@@ -211,7 +211,7 @@ class Attraction:
         if self.charging is None:
             return traction_derivative(self.law, apart, voltage, self.layers)
         law = self.law
-        seen = lambda g: law.traction(g, self._seen(g, voltage, position), self.layers)  # noqa: E731
+        seen = lambda g: law.traction(g, self._voltages(g, voltage, position), self.layers)  # noqa: E731
         return derivative(seen, apart, GAP_STEP)
 
     def stiffness(
@@ -222,8 +222,8 @@ class Attraction:
         frame, ways = surface_state(self.surface, position), np.arange(0, dim, 2)
         on = 1.0 if self.air_layer else touching.astype(float)
         apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
-        seen = self._seen(apart, voltage, position)
-        p = on * self.law.traction(apart, seen, self.layers)
+        voltages = self._voltages(apart, voltage, position)
+        p = on * self.law.traction(apart, voltages, self.layers)
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)
@@ -246,7 +246,7 @@ class Attraction:
                 (moved, dim * of + 1, -p[of] * value),
                 (moved[:, None], at, shared),
             ]
-            potential = on * self.law.potential(apart, seen, self.layers)
+            potential = on * self.law.potential(apart, voltages, self.layers)
             row, column, turned = self.pad.tributary_curvature(position, potential)
             blocks.append((row, column, -turned))
         whole = [np.broadcast_arrays(*block) for block in blocks]

@@ -3,8 +3,8 @@
 Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.relaxation`) on its
 tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them. In a step first
 the pad moves with its charges and voltage, r A of each node staying what it is while A changes; then charge
-flows for the seconds of the step while the voltage goes straight to its new value. So the end's charges are a
-function of gap and voltage, and contact and Newton stay as they are.
+flows for the seconds of the step while the voltage changes linearly to its new value. The charges at the end
+are a function of gap and voltage; contact and Newton's method need no further unknowns.
 
 The balance of a step, each term from its own integral::
 
@@ -28,7 +28,7 @@ from evfem.tensor import STEP
 #: pieces of a step, each so many times as long as the one before, from one relaxation of the fastest
 #: charge on; Gauss points of each
 LONGER, POINTS = 3.0, 8
-#: places at which the voltage that the law sees is remembered
+#: positions at which the effective voltage is remembered
 REMEMBERED = 4
 
 
@@ -79,7 +79,7 @@ class Charging:
         return self.stack.after(gap, self.carried(length), before, voltage, self.seconds)
 
     def effective(self, gap: Any, voltage: float, length: Floats) -> Any:
-        """Voltage (P,) that the force law sees at the step's end; gaps (P,) may be complex (derivatives)."""
+        """Effective voltage (P,) of the force law at the step's end; gaps (P,) may be complex."""
         if self.seconds == 0.0:
             return self.stack.effective(gap, voltage, self.carried(length))
         value, slope = self._at(np.real(gap), voltage, length)

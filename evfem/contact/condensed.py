@@ -1,12 +1,10 @@
-r"""The linearised body as its contact candidates see it: a dense compliance, and the contact
-problem posed on it.
+r"""The linearised body condensed onto its contact candidates, and the contact problem on that compliance.
 
 The compliance :math:`C = S_{cc}^{-1}` (`evfem.solver`) is kept with the factorisation.
-On a curved profile the contact force turns
-with the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
-:math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the
-nodes near contact, so it is put into their small block alone (`evfem.contact.follower`); on a relief
-over x and z it turns with both (`evfem.surface.pad.SurfaceState.turned`).
+On a curved profile the contact force turns with the node, a follower force:
+:math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes
+in every iteration but touches only the nodes near contact, so it is put into their small block alone
+(`evfem.contact.follower`). On a relief over x and z it turns with both (`evfem.surface.pad.SurfaceState`).
 
 Algorithm (`LinearContactStep.solve`)::
 
@@ -15,8 +13,8 @@ Algorithm (`LinearContactStep.solve`)::
     repeat
         solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included
         displacements <- free + C (forces on `near`)
-        hit <- other candidates that have penetrated; stop if there are none
-        near <- near and hit
+        penetrated <- other candidates that have penetrated; stop if there are none
+        near <- near and penetrated
 """
 
 from __future__ import annotations
@@ -54,8 +52,7 @@ LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What is known of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in
-    N).
+    """Data of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in N).
 
     The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
     N/mm, statuses (c,), friction coefficients (c,), their slopes (c, d) in 1/mm. `interface_compliance` (c,
@@ -240,10 +237,10 @@ class LinearContactStep:
             moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
             gap = normal_gap + self._along_normal(moved)
             gap[near] = 0.0  # the dense problem has settled theirs
-            hit = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
-            if not hit.size:
+            penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
+            if not penetrated.size:
                 break
-            near = np.union1d(near, hit)
+            near = np.union1d(near, penetrated)
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
         # the shear of closed nodes also follows its place within the step, by the slope of their friction

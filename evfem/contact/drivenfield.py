@@ -6,7 +6,7 @@ the drive and the mean pulls :math:`F_n` on the nodes at 1 V (`evfem.field.meana
 .. math:: f_j = U^2 \sum_n w_n F_{n, j}, \qquad \sum_n w_n = 1,
 
 with the share w_n of a harmonic in the squared effective voltage. The attraction stays proportional
-to the squared voltage, so that controls and encodings know nothing of it; the tangent is that of
+to the squared voltage, so controls and encodings are the same; the tangent is that of
 the column law with the same losses. The forces have no energy: on the way between two states the
 work is that of the column law, and that of the fringes is counted trapezoidally. The bounds are
 those of an energy; of the layers without losses they decide for `auto`.

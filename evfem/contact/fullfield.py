@@ -60,8 +60,8 @@ APART, MOVED = 8, 1e-9
 
 
 def in_sight(places: Floats) -> Ints:
-    """Which of the places (L, 2) of an outline, from left to right, the display sees: at them stand
-    columns (K,). Of two neighbours along a slope above `STEEP` the higher one is behind an overhang, or
+    """Numbers (K,) of the points (L, 2) of an outline, from left to right, that are visible from the display
+    and have columns. Of two neighbours along a slope above `STEEP` the higher one is behind an overhang, or
     deep in a groove.
 
     >>> in_sight(np.array([[0.0, 0.0], [1.0, 0.0], [0.9, 0.5], [2.0, 0.0]])).tolist()
@@ -188,7 +188,7 @@ class FieldAttraction(Attraction):
 
     def weights(self, position: Floats) -> Floats:
         """Lengths (P,): half the distance to the next columns, on the flanks the columns' own."""
-        lines = self.seen(position)
+        lines = self.visible(position)
         half = 0.5 * np.diff(lines @ position[:, 0])
         own = lines.T @ (np.append(half, 0.0) + np.append(0.0, half))
         return np.asarray(own + self.flanks.pad.tributary(position))
@@ -269,7 +269,7 @@ class FieldAttraction(Attraction):
             key += pressing.tobytes()
         found = self.solved.get(key)
         if found is None:
-            self.solved[key] = found = self._above(position, self.seen(position), pressing)
+            self.solved[key] = found = self._above(position, self.visible(position), pressing)
             while len(self.solved) > KEPT:
                 self.solved.popitem(last=False)
         return found
@@ -286,7 +286,7 @@ class FieldAttraction(Attraction):
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
         """Derivative of `forces` by positions, sparse (2 P, 2 P); touching nodes move along the surface."""
-        lines, frame = self.seen(position), surface_state(self.surface, position)
+        lines, frame = self.visible(position), surface_state(self.surface, position)
         nodes = in_line(self._plane, self.edges)
         closed, near = frame.gap <= TOUCHING, self._nearby(*self.outline(position, lines, pressing))
         start = self._above(position, lines, pressing, near)[1]
@@ -348,8 +348,8 @@ class FieldAttraction(Attraction):
             return Columns((insulator, gap, skin), (INSULATOR, AIR, SKIN))
         return Columns((insulator, gap), (INSULATOR, AIR))
 
-    def seen(self, position: Floats) -> Any:
-        """The lines (sparse, L x P) at which columns stand, those that the display sees."""
+    def visible(self, position: Floats) -> Any:
+        """The lines (sparse, L x P) at which columns stand: those visible from the display."""
         kept = in_sight(self._lines @ position)
         return self._lines if kept.size == self._lines.shape[0] else self._lines[kept]
 
@@ -376,7 +376,7 @@ class FieldAttraction(Attraction):
         """Raise Unresolved if the capacitance at `position` (P, 2) is not between its bounds."""
         if self._electrodes is not None or self.floating:
             return  # the bounds are those of a grounded pad over one electrode
-        bounds = self.bounds(*self.outline(position, self.seen(position)))
+        bounds = self.bounds(*self.outline(position, self.visible(position)))
         value = self.solve(position).value
         if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):
             raise Unresolved(

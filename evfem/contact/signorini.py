@@ -69,9 +69,9 @@ class Roughness:
 
 @dataclass(frozen=True)
 class AttractionStiffness:
-    """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
-    per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
-    `gain_on_closing` (k,) at g = 0. `roughness` says how it depends on the contact force there.
+    """Linearised attraction of every node: it decreases by `negative_stiffness` (k,) per unit of gap from
+    its value at `reference_gap` (k,) while open, and is larger by `gain_on_closing` (k,) at g = 0.
+    `roughness` is its dependence on the contact force there.
     """
 
     negative_stiffness: Floats
@@ -243,8 +243,8 @@ class ContactSolution:
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """What the laws make of forces, gaps and slips: p and z of every node, (k,) and (k, d), its status (k,),
-    and by how much its forces miss the laws (k,), relative to the largest force.
+    """Projections of forces, gaps and slips onto the laws: p and z of every node, (k,) and (k, d), its status
+    (k,), and the residual of the laws (k,), relative to the largest force.
     """
 
     p: Floats

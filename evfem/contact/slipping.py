@@ -1,8 +1,8 @@
-r"""Nodes that go to and fro under a law of friction, in the iterations of one step.
+r"""Nodes whose status or speed oscillates under a law of friction in the iterations of one step.
 
-The contact problem takes a law by its tangent at the iterate. If the law rises steeply from rest and
-levels off, or has a kink, a node may come back to where it has been: Newton's iterations cycle. The
-values of the law found so far take the place of its tangents then (`Returned`).
+The contact problem has the tangent of a law at the iterate. If the law rises steeply from rest and levels
+off, or has a kink, Newton's iterations may cycle: a node returns to an earlier speed. The root is then
+bracketed with the values of the law found so far (`OscillatingNodes`).
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from evfem.surface.friction import Linearised, Slipping
 HALVINGS = 60
 
 
-class Returned:
-    """Nodes that have slipped and stick again, or whose speed goes to and fro: `nodes` (P,) bool.
+class OscillatingNodes:
+    """Nodes that have slipped and stick again, or whose speed oscillates: `nodes` (P,) bool.
 
-    The tangent of a law that rises steeply from rest and levels off overestimates static friction: the node
-    would slip and stick by turns, and at a kink either side may lead to the other. It is placed at the speed
-    at which the law gives its present force, with the tangent there; sticking under more than static
-    friction, with the chord from rest. If no speed so far gives that force, a slipping node takes the
-    steepest of chord, tangent and the slope of the last iteration, near the end the tangent; a sticking one
-    the last slope.
+    The tangent of a law that rises steeply from rest and levels off, extrapolated to rest, overestimates
+    static friction: the node would slip and stick in turn; at a kink each side may lead to the other. Such a
+    node is placed at the speed at which the law gives its present force, with the tangent there, or, if it
+    sticks under more than static friction, with the chord from rest. If no speed so far gives that force, a
+    slipping node has the steepest of chord, tangent and last slope, near the end the tangent; a sticking
+    node has the last slope.
     """
 
     def __init__(self, size: int) -> None:
@@ -42,30 +42,30 @@ class Returned:
     def linearised(
         self, law: FrictionLaw, moving: Slipping, c: Ints, status: Ints, force: Floats
     ) -> Linearised:
-        """The law as the nodes c (k,) shall see it at an iterate with statuses and shear forces (k,)."""
+        """The law linearised for nodes c (k,) at an iterate with statuses and shear forces (k,)."""
         self.watch(c, status, moving.speed)
         self._fastest[c] = np.maximum(self._fastest[c], moving.speed)
-        seen = moving.linearised(law)
-        seen = replace(seen, by_speed=self.slopes(c, moving.speed, seen.by_speed, moving.chord(law)))
+        here = moving.linearised(law)
+        here = replace(here, by_speed=self.slopes(c, moving.speed, here.by_speed, moving.chord(law)))
         back = self.nodes[c] & (status != OPEN)
         if not back.any():
-            return seen
+            return here
         speed = speed_under(law, moving, force, np.where(back, self._fastest[c], 0.0))
         there = replace(moving, speed=speed)
         tangent, bound = there.linearised(law), there.bound(law)
         sticks, slips = (speed > 0.0) & (status == STICK), (speed > 0.0) & (status >= FORWARD)
-        # what the tangent says of the present speed
-        share = 1.0 + tangent.by_speed * (moving.speed - speed) / np.where(slips, bound, 1.0)
-        slips &= (share > 0.0) & (tangent.by_speed > 0.0)
+        # the bound extrapolated by the tangent to the present speed, relative to the bound there
+        ratio = 1.0 + tangent.by_speed * (moving.speed - speed) / np.where(slips, bound, 1.0)
+        slips &= (ratio > 0.0) & (tangent.by_speed > 0.0)
         return Linearised(
-            np.where(slips, share * tangent.slope, seen.slope),
-            np.where(slips, share * tangent.offset, seen.offset),
-            np.select([slips, sticks], [tangent.by_speed, there.chord(law)], seen.by_speed),
-            np.where(slips, share * tangent.by_mu, seen.by_mu),
+            np.where(slips, ratio * tangent.slope, here.slope),
+            np.where(slips, ratio * tangent.offset, here.offset),
+            np.select([slips, sticks], [tangent.by_speed, there.chord(law)], here.by_speed),
+            np.where(slips, ratio * tangent.by_mu, here.by_mu),
         )
 
     def watch(self, c: Ints, status: Ints, speed: Floats) -> None:
-        """Look at the statuses (k,) and speeds (k,) of the nodes c (k,) at an iterate."""
+        """Records statuses (k,) and speeds (k,) of the nodes c (k,) at an iterate."""
         self.nodes[c] |= self._slipped[c] & (status == STICK)
         self._slipped[c] |= status >= FORWARD
         change = np.where(status >= FORWARD, speed - self._speed[c], 0.0)
@@ -74,7 +74,7 @@ class Returned:
         self._change[c] = np.nan_to_num(change)
 
     def slopes(self, c: Ints, slip: Floats, tangent: Floats, chord: Floats) -> Floats:
-        """With which slopes (k,) friction of nodes c (k,) grows, at slips (k,); 0 where they stick."""
+        """Slopes (k,) of friction by the slip of nodes c (k,), at slips (k,); 0 where they stick."""
         near = np.abs(slip - self._slip[c]) < NEAR * np.abs(slip)
         steepest = np.maximum(np.maximum(chord, tangent), self._slope[c])
         slope = np.where(self.nodes[c] & ~near, steepest, tangent)
@@ -84,12 +84,12 @@ class Returned:
         return np.where(slips, slope, np.where(self.nodes[c], self._slope[c], 0.0))
 
 
-def speed_under(law: FrictionLaw, seen: Slipping, force: Floats, fastest: Floats) -> Floats:
+def speed_under(law: FrictionLaw, nodes: Slipping, force: Floats, fastest: Floats) -> Floats:
     """Speeds (k,) in mm/s, up to `fastest` (k,), of friction `force` (k,) in N/mm, by bisection; else 0."""
     low, high = np.zeros_like(force), np.array(fastest)
-    within = (replace(seen, speed=low).bound(law) < force) & (replace(seen, speed=high).bound(law) >= force)
+    within = (replace(nodes, speed=low).bound(law) < force) & (replace(nodes, speed=high).bound(law) >= force)
     for _ in range(HALVINGS if within.any() else 0):
         middle = 0.5 * (low + high)
-        below = replace(seen, speed=middle).bound(law) < force
+        below = replace(nodes, speed=middle).bound(law) < force
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     return np.where(within, high, 0.0)

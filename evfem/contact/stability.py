@@ -98,9 +98,9 @@ def _compliance(step: LinearContactStep) -> Floats:
 
 
 def _yielding(known: Candidates) -> Floats:
-    """How the interface yields (c, 2), along normal and tangent. What turns with the profile, or falls along
-    the way, follows the place of a slipping node, and its friction does not stretch the interface the more,
-    the farther it goes; friction that falls with the speed of the slip does.
+    """Compliance of the interface (c, 2), along normal and tangent. Along the tangent a slipping node has one
+    only if its friction falls with the speed of the slip: what turns with the profile or falls along the
+    path depends on the node's position alone.
     """
     give = np.where((known.status == OPEN)[:, None], 0.0, known.interface_compliance)
     falls = np.zeros(known.status.size) if known.slip_stiffness is None else known.slip_stiffness
@@ -109,7 +109,7 @@ def _yielding(known: Candidates) -> Floats:
 
 
 def _bone(step: LinearContactStep) -> ExtraUnknowns:
-    """What the bone's travel under a prescribed force does, and the balance that settles it."""
+    """The bone's travel under a prescribed force as an extra unknown, with its equation."""
     rows, axes = step.body.rows(np.arange(step.candidates.status.size)), step.candidates.surface.axes
     if not step.unknowns:
         none = np.zeros((0, rows.size))

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-import numpy as np
-
+from evfem.common.tables import words_or_numbers
 from evfem.errors import InputError, quoted
 
 #: what `load` accepts
@@ -58,7 +57,7 @@ def load(name: str) -> Table:
     lines = (resources.files(__package__) / f"{name}.csv").read_text(encoding="utf-8").splitlines()
     notes = [line[1:].strip() for line in lines if line.startswith("#")]
     rows = list(csv.reader(line for line in lines if not line.startswith("#")))
-    columns = {key: _column([row[i] for row in rows[1:]]) for i, key in enumerate(rows[0])}
+    columns = {key: words_or_numbers([row[i] for row in rows[1:]]) for i, key in enumerate(rows[0])}
     units = _tagged(notes, "units").split(",")
     given = dict(zip(rows[0], units, strict=True)) if len(units) == len(rows[0]) else {}
     return Table(name, notes[0], _tagged(notes, "source"), columns, given)
@@ -66,10 +65,3 @@ def load(name: str) -> Table:
 
 def _tagged(notes: list[str], tag: str) -> str:
     return next((note.split(":", 1)[1].strip() for note in notes if note.startswith(f"{tag}:")), "")
-
-
-def _column(words: list[str]) -> Any:
-    try:
-        return np.array([float(word) for word in words])
-    except ValueError:
-        return words

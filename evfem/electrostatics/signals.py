@@ -2,8 +2,8 @@ r"""Voltage as a function of position, its effective value, and what a carrier a
 
 The laws need the effective voltage across skin and insulator. Units: V, mm (of bone position), s.
 
-What a voltage may be asked to bring about (`evfem.newton.control.Met`) stands here too: the electrode's
-charge and the smallest gap of a pad, with their derivatives.
+The electrode's charge and the smallest gap of a pad, with their derivatives, can be prescribed in place
+of the voltage (`evfem.newton.control.ConstrainedVoltage`).
 """
 
 from __future__ import annotations
@@ -234,8 +234,10 @@ CLOSED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """What attraction sees: positions (P, dim), surface, voltage (V), contact forces (P,), who touched."""
+class PadState:
+    """Pad nodes under the attraction: positions (P, dim), surface, voltage (V), contact forces (P,), and
+    which `touching` (P,) when the step began.
+    """
 
     attraction: Any
     position: Floats
@@ -245,7 +247,7 @@ class Seen:
     touching: Any
 
     @classmethod
-    def of(cls, attraction: Any, interface: Any, state: Any, touching: Any) -> Seen:
+    def of(cls, attraction: Any, interface: Any, state: Any, touching: Any) -> PadState:
         """From a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
         at = interface.resting(state), interface.surface_at(state)
         return cls(attraction, *at, state.voltage, state.contact_force[:, 0], touching)
@@ -270,22 +272,22 @@ class Reading:
     by_position: Floats
 
 
-def electrode_charge(seen: Seen) -> Reading:
+def electrode_charge(pad: PadState) -> Reading:
     """Charge over eps_0 (V, in space V mm): its derivative by a touching node's gap is left out."""
-    charging, surface = seen.attraction.charging, seen.surface
-    at = seen.attraction.charged(seen.position, seen.voltage, seen.pressing)
+    charging, surface = pad.attraction.charging, pad.surface
+    at = pad.attraction.charged(pad.position, pad.voltage, pad.pressing)
     by_gap, by_length = charging.charge_slopes(at)
     by_gap = np.where(surface.gap > CLOSED, by_gap, 0.0)
-    by_position = np.zeros_like(seen.position)
+    by_position = np.zeros_like(pad.position)
     by_position[:, ::2], by_position[:, 1] = -by_gap[:, None] * surface.slope, by_gap
-    of, moved, value = seen.attraction.pad.tributary_gradient(seen.position)
+    of, moved, value = pad.attraction.pad.tributary_gradient(pad.position)
     by_position += np.bincount(moved, by_length[of] * value, by_position.size).reshape(by_position.shape)
     return Reading(charging.electrode_charge(at), KILOVOLT * charging.capacity(at), by_position)
 
 
-def smallest_gap(seen: Seen) -> Reading:
+def smallest_gap(pad: PadState) -> Reading:
     """The smallest vertical gap of the pad (mm)."""
-    least = int(np.argmin(seen.surface.gap))
-    by_position = np.zeros_like(seen.position)
-    by_position[least, ::2], by_position[least, 1] = -seen.surface.slope[least], 1.0
-    return Reading(float(seen.surface.gap[least]), 0.0, by_position)
+    least = int(np.argmin(pad.surface.gap))
+    by_position = np.zeros_like(pad.position)
+    by_position[least, ::2], by_position[least, 1] = -pad.surface.slope[least], 1.0
+    return Reading(float(pad.surface.gap[least]), 0.0, by_position)

@@ -75,8 +75,24 @@ Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 # its kind also has `crest`, its peak over its effective voltage, and `harmonics()`, those without a bias.
 
 
+class _Periodic(Checked):
+    """A signal that repeats with `frequency`."""
+
+    frequency: float
+
+    @property
+    def cycle(self) -> float:
+        """Its frequency (Hz)."""
+        return self.frequency
+
+    @property
+    def highest_frequency(self) -> float:
+        """Its frequency (Hz); flips have no time scale of their own."""
+        return self.frequency
+
+
 @dataclass(frozen=True)
-class Sine(Checked):
+class Sine(_Periodic):
     """`bias` + `amplitude` sin(2 pi `frequency` t + `phase`).
 
     >>> Sine(frequency=50.0, amplitude=100.0, bias=20.0)(0.005)
@@ -100,19 +116,9 @@ class Sine(Checked):
         return shares(np.array([0.0, 1.0]), np.array([self.bias**2, 0.5 * self.amplitude**2]))
 
     @property
-    def cycle(self) -> float:
-        """Its frequency (Hz)."""
-        return self.frequency
-
-    @property
     def largest(self) -> float:
         """Largest magnitude (V)."""
         return abs(self.bias) + self.amplitude
-
-    @property
-    def highest_frequency(self) -> float:
-        """Its frequency (Hz)."""
-        return self.frequency
 
     def __call__(self, time: Values) -> Values:
         """Voltage (V) at `time` (s, any shape)."""
@@ -121,7 +127,7 @@ class Sine(Checked):
 
 
 @dataclass(frozen=True)
-class Square(Checked):
+class Square(_Periodic):
     """+`amplitude` in the first half of each period and -`amplitude` in the second.
 
     >>> Square(frequency=50.0, amplitude=100.0)([0.0, 0.009, 0.01, 0.02]).tolist()
@@ -139,19 +145,9 @@ class Square(Checked):
         return self.amplitude, *self.harmonics()
 
     @property
-    def cycle(self) -> float:
-        """Its frequency (Hz)."""
-        return self.frequency
-
-    @property
     def largest(self) -> float:
         """Largest magnitude (V)."""
         return self.amplitude
-
-    @property
-    def highest_frequency(self) -> float:
-        """Its frequency (Hz); the flips themselves have no time scale."""
-        return self.frequency
 
     def __call__(self, time: Values) -> Values:
         """Voltage (V) at `time` (s, any shape); a flip within rounding of a time has happened."""

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.tables import read_bytes
 from evfem.errors import InputError
 
 FORM = "evfem-voltage-1"
@@ -51,13 +52,7 @@ def read(
     """
     from scipy.io import wavfile
 
-    try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
-    if len(data) > MOST_BYTES:
-        raise InputError(key, f"{path.name}, which is too long", f"at most {MOST_SAMPLES} samples")
+    data = read_bytes(path, key, allowed, MOST_BYTES, f"at most {MOST_SAMPLES} samples")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # chunks that scipy does not know

@@ -143,7 +143,7 @@ def remember(ridged: bool) -> Remembered:
     near = order[max(touching[0] - MARGIN, 0) : touching[-1] + MARGIN + 1]
     nodes = pad.nodes[near]
     moved = np.array([run.state.u[nodes] - run.state.bone for run in runs])
-    force = np.array([run.model.equilibrium.contact_forces(run.state)[near] for run in runs])
+    force = np.array([run.model.equilibrium.interface.contact_forces(run.state)[near] for run in runs])
     compliance = np.stack([_compliance(run, nodes) for run in runs])
     return Remembered(mesh.points[nodes], _y_first(moved), _y_first(force), compliance)
 

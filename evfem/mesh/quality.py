@@ -7,8 +7,6 @@ scaled Jacobian, at the end.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
@@ -45,14 +43,13 @@ def check(mesh: Mesh, source: str = "mesh") -> Mesh:
         _shapes(mesh, refuse)
         solids.connection(mesh, refuse)
         solids.surface(mesh, refuse)
-        _names(mesh, refuse)
-        return solids.with_sets(mesh, refuse)
-    mesh = _oriented(mesh, refuse)
-    _shapes(mesh, refuse)
-    _connection(mesh, refuse)
-    _outline(mesh, refuse)
+    else:
+        mesh = _oriented(mesh, refuse)
+        _shapes(mesh, refuse)
+        _connection(mesh, refuse)
+        _outline(mesh, refuse)
     _names(mesh, refuse)
-    return _with_sets(mesh, refuse)
+    return solids.with_sets(mesh, refuse)
 
 
 def _arrays(mesh: Mesh, refuse: Refuse) -> None:
@@ -225,17 +222,6 @@ def _names(mesh: Mesh, refuse: Refuse) -> None:
         if not len(mesh.node_sets.get(name, ())):
             fault = f"no node in {name}" if name in mesh.node_sets else f"no boundary {name} (it has {have})"
             refuse(fault, "sets of nodes `pad` and `bone`, or [finger.boundaries] with their names")
-
-
-def _with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
-    if len(mesh.node_sets["bone"]) < 2:
-        refuse("a bone of a single node", "a bone of at least two nodes, so that the finger cannot turn")
-    pad = np.unique(mesh.edges_of("pad")).astype(np.int64)
-    if not len(pad):
-        refuse("a pad without an edge of the outline", "a pad of whole edges: all their nodes in `pad`")
-    if np.isin(pad, mesh.node_sets["bone"]).all():
-        refuse("a pad that lies on the bone", "a pad with nodes that can move")
-    return replace(mesh, node_sets={**mesh.node_sets, "pad": pad})
 
 
 #: Corner, mid-edge and middle nodes of a quad in -1..1, and of a triangle in 0..1, in VTK order.

@@ -133,15 +133,15 @@ def _on_triangle(points: Floats, triangle: Floats, near: Floats) -> Floats:
 
 
 def with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
-    """The mesh with its set `pad` reduced to whole outer faces."""
-    bone = mesh.points[mesh.node_sets["bone"]]
-    if len(bone) < 3:
-        refuse(
-            f"a bone of {len(bone)} nodes", "a bone of at least three nodes, so that the finger cannot turn"
-        )
-    pad = np.unique(mesh.faces_of("pad")).astype(np.int64)
+    """The mesh with its set `pad` reduced to whole edges of the outline, or outer faces."""
+    plane, bone = mesh.dim == 2, len(mesh.node_sets["bone"])
+    least, words = (2, "two") if plane else (3, "three")
+    if bone < least:
+        refuse(f"a bone of {bone} nodes", f"a bone of at least {words} nodes, so that the finger cannot turn")
+    pad = np.unique(mesh.edges_of("pad") if plane else mesh.faces_of("pad")).astype(np.int64)
     if not len(pad):
-        refuse("a pad without a face of the surface", "a pad of whole faces: all their nodes in `pad`")
+        part, parts = ("an edge of the outline", "edges") if plane else ("a face of the surface", "faces")
+        refuse(f"a pad without {part}", f"a pad of whole {parts}: all their nodes in `pad`")
     if np.isin(pad, mesh.node_sets["bone"]).all():
         refuse("a pad that lies on the bone", "a pad with nodes that can move")
     return replace(mesh, node_sets={**mesh.node_sets, "pad": pad})

@@ -1,8 +1,7 @@
-r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction force.
+r"""Controls of a step: the bone's height or the force on it, the voltage or the friction force.
 
-A control says which part of the step is known; where a force is prescribed instead, it gives the
-extra unknown with the equation that settles it (`evfem.contact.condensed.ExtraUnknown`), its share
-of the residual, and its bounds:
+A control prescribes one quantity. Where that is a force, it gives the extra unknown and its equation
+(`evfem.contact.condensed.ExtraUnknown`), the residual of that equation, and bounds:
 
 ==================  ===========================  ============================  ====================
 control             known                        unknown                       equation
@@ -33,8 +32,8 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
-from evfem.electrostatics.signals import Reading, Seen, electrode_charge, smallest_gap
-from evfem.newton.hand import Grip
+from evfem.electrostatics.signals import PadState, Reading, electrode_charge, smallest_gap
+from evfem.newton.hand import HandControl
 from evfem.newton.state import State, StepFailed
 
 #: a voltage (V) that is none
@@ -46,7 +45,7 @@ AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
 
 class HeightControl:
-    """How the bone's height is settled: prescribed, here, or by an equation. `free`: it is an unknown."""
+    """Control of the bone's height: prescribed, here, or an unknown (`free`) with an equation."""
 
     free = False
 
@@ -115,10 +114,10 @@ class Unsupported(Indentation):
 
 @dataclass(frozen=True)
 class VoltageProblem:
-    """What a voltage control may ask for: the present squared voltage (kV^2), a solved contact problem, state
+    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state
     for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
     `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
-    the residual and by forces with such a state; what is `seen`.
+    the residual and by forces with such a state; the present state of the `pad`.
     """
 
     squared: float
@@ -126,11 +125,11 @@ class VoltageProblem:
     unit: Callable[[], tuple[Floats, Floats]]
     pushed: Any = None
     measured: Any = None
-    seen: Any = None
+    pad: Any = None
 
 
 @dataclass(frozen=True)
-class DrivenStep:
+class VoltageStep:
     """A solved step, the change of the voltage's unknown (kV^2 or kV), the state for the backward solve."""
 
     solution: StepSolution
@@ -139,7 +138,7 @@ class DrivenStep:
 
 
 class VoltageControl:
-    """How the voltage is settled: here `voltage` (V), prescribed or the largest; `free` if unknown."""
+    """Control of the voltage: `voltage` (V), prescribed or the largest; `free`: it is an unknown."""
 
     follows: Any = False
     free: Any = False
@@ -156,11 +155,11 @@ class VoltageControl:
         """Force on the bone (N/mm) that the control's equation lacks at these reactions (dim,)."""
         return 0.0
 
-    def lacking(self, seen: Seen) -> float:
-        """Share that an equation lacks which is none of forces."""
+    def lacking(self, pad: PadState) -> float:
+        """Relative residual of an equation that is no balance of forces."""
         return 0.0
 
-    def held(self, seen: Seen) -> float:
+    def held(self, pad: PadState) -> float:
         """The voltage (V) if the pad stays where it is."""
         return self.voltage
 
@@ -169,11 +168,11 @@ class VoltageControl:
         squared = (voltage / KILOVOLT) ** 2 + change
         return float(np.copysign(KILOVOLT * np.sqrt(max(squared, 0.0)), voltage))
 
-    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
         """Contact, together with the voltage where it is an unknown."""
-        return DrivenStep(drive.solve(step))
+        return VoltageStep(problem.solve(step))
 
-    def unknowns(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+    def unknowns(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, ...]:
         """The voltage where it follows what the pad does, or nothing."""
         return ()
 
@@ -198,85 +197,85 @@ class GivenVoltage(VoltageControl):
         return self.voltage
 
 
-class Met(VoltageControl):
-    """The voltage makes a number of the state what is wished: one more unknown, with the equation that this
-    number, linear in voltage and displacements, is the wish. That is regular where a given voltage has no
-    equilibrium: the attraction under a given charge does not grow as the gap closes.
+class ConstrainedVoltage(VoltageControl):
+    """The voltage is an unknown, and a quantity of the state has a prescribed value: one more equation,
+    linear in voltage and displacements. It is regular where a prescribed voltage has no equilibrium: the
+    attraction under a given charge does not grow as the gap closes.
     """
 
     free = True
 
-    def read(self, seen: Seen) -> tuple[Reading, float]:
-        """The number as it is, and the wish."""
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        """The quantity and its prescribed value."""
         raise NotImplementedError
 
-    def unit(self, seen: Seen) -> Floats:
+    def unit(self, pad: PadState) -> Floats:
         """Forces (P, dim) on the pad nodes per unit of the voltage's unknown."""
         raise NotImplementedError
 
-    def unknown(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, Floats]:
-        """The unknown, and what its unit does to the backward solve."""
-        reading, wish = self.read(drive.seen)
-        saved, push = drive.pushed(self.unit(drive.seen))
-        row, still, own = drive.measured(reading.by_position, saved)
+    def unknown(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, Floats]:
+        """The unknown, and the part of the backward solve that a unit of it adds."""
+        reading, prescribed = self.read(problem.pad)
+        saved, push = problem.pushed(self.unit(problem.pad))
+        row, still, own = problem.measured(reading.by_position, saved)
         travels = [row[unknown.axis - step.body.dim] for unknown in step.unknowns]
-        share = np.array([*travels, reading.by_voltage + own])
-        return ExtraUnknown(push, 0, 0.0, Condition(row, share, wish - reading.value - still)), saved
+        gains = np.array([*travels, reading.by_voltage + own])
+        return ExtraUnknown(push, 0, 0.0, Condition(row, gains, prescribed - reading.value - still)), saved
 
-    def unknowns(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, ...]:
-        return (self.unknown(step, drive)[0],)
+    def unknowns(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+        return (self.unknown(step, problem)[0],)
 
-    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
-        unknown, saved = self.unknown(step, drive)
-        found = drive.solve(replace(step, unknowns=(*step.unknowns, unknown)))
-        return DrivenStep(found, float(found.extra[-1]), saved)
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
+        unknown, saved = self.unknown(step, problem)
+        found = problem.solve(replace(step, unknowns=(*step.unknowns, unknown)))
+        return VoltageStep(found, float(found.extra[-1]), saved)
 
 
 @dataclass(frozen=True)
-class KeptCharge(Met):
+class KeptCharge(ConstrainedVoltage):
     """The electrode has `charge` over eps_0 (V, in space V mm), None: as before. Unknown: voltage in kV."""
 
     charge: float | None = None
 
-    def read(self, seen: Seen) -> tuple[Reading, float]:
-        charging = seen.attraction.charging
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        charging = pad.attraction.charging
         kept = charging.electrode_charge(charging.old) if self.charge is None else self.charge
-        return electrode_charge(seen), kept
+        return electrode_charge(pad), kept
 
-    def unit(self, seen: Seen) -> Floats:
-        return seen.slope
+    def unit(self, pad: PadState) -> Floats:
+        return pad.slope
 
-    def lacking(self, seen: Seen) -> float:
-        wanted = self.held(seen)
-        return abs(wanted - seen.voltage) / max(abs(wanted), abs(seen.voltage), TINY)
+    def lacking(self, pad: PadState) -> float:
+        wanted = self.held(pad)
+        return abs(wanted - pad.voltage) / max(abs(wanted), abs(pad.voltage), TINY)
 
-    def held(self, seen: Seen) -> float:
-        reading, kept = self.read(seen)
-        return self.after(seen.voltage, (kept - reading.value) / reading.by_voltage)
+    def held(self, pad: PadState) -> float:
+        reading, kept = self.read(pad)
+        return self.after(pad.voltage, (kept - reading.value) / reading.by_voltage)
 
     def after(self, voltage: float, change: float) -> float:
         return voltage + KILOVOLT * change
 
 
 @dataclass(frozen=True)
-class GivenGap(Met):
+class GivenGap(ConstrainedVoltage):
     """The smallest gap of the deformed pad is `gap` (mm). The unknown is the squared voltage (kV^2)."""
 
     gap: float
 
-    def read(self, seen: Seen) -> tuple[Reading, float]:
-        return smallest_gap(seen), self.gap
+    def read(self, pad: PadState) -> tuple[Reading, float]:
+        return smallest_gap(pad), self.gap
 
-    def unit(self, seen: Seen) -> Floats:
-        return seen.forces(KILOVOLT)
+    def unit(self, pad: PadState) -> Floats:
+        return pad.forces(KILOVOLT)
 
-    def lacking(self, seen: Seen) -> float:
-        return abs(smallest_gap(seen).value / self.gap - 1.0)
+    def lacking(self, pad: PadState) -> float:
+        return abs(smallest_gap(pad).value / self.gap - 1.0)
 
-    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
-        found = super().solve(step, drive)
-        if drive.squared == 0.0 and found.change < 0.0:
-            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(drive.seen).value), [])
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
+        found = super().solve(step, problem)
+        if problem.squared == 0.0 and found.change < 0.0:
+            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(problem.pad).value), [])
         return found
 
 
@@ -285,8 +284,7 @@ class FollowFriction(VoltageControl):
     """The voltage, from 0 to `voltage` (V), makes the bone's force along a `way` in the plane of the display,
     x or x and z of a unit vector, `force` (N/mm).
 
-    Friction hardly depends on the voltage of a pad that sticks: there the wish has no sensible
-    answer, and the voltage stays as it was.
+    Friction of a pad that sticks hardly depends on the voltage, which then stays as it was.
     """
 
     force: float
@@ -309,23 +307,23 @@ class FollowFriction(VoltageControl):
     def _lacks(self, reaction: Floats) -> float:
         return float(self.force - reaction[::2] @ np.array(self.way))
 
-    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
+    def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
         if not self.free:
-            return DrivenStep(drive.solve(step))
-        unit, push = drive.unit()
+            return VoltageStep(problem.solve(step))
+        unit, push = problem.unit()
         along = np.zeros(step.body.dim)
         along[::2] = self.way
         unknown = ExtraUnknown(push, 0, self.force, along=along)
-        found = drive.solve(replace(step, unknowns=(*step.unknowns, unknown)))
+        found = problem.solve(replace(step, unknowns=(*step.unknowns, unknown)))
         most, change = (self.voltage / KILOVOLT) ** 2, float(found.extra[-1])
-        if not 0.0 <= drive.squared + change <= most:
-            self._mode = AT_ZERO if drive.squared + change < 0.0 else AT_LIMIT
-            change = (0.0 if self._mode == AT_ZERO else most) - drive.squared
-            found = drive.solve(replace(step, residual=step.residual + change * push))
-        return DrivenStep(found, change, unit)
+        if not 0.0 <= problem.squared + change <= most:
+            self._mode = AT_ZERO if problem.squared + change < 0.0 else AT_LIMIT
+            change = (0.0 if self._mode == AT_ZERO else most) - problem.squared
+            found = problem.solve(replace(step, residual=step.residual + change * push))
+        return VoltageStep(found, change, unit)
 
     def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
-        """At a bound the force may miss the wish as the bound forbids, else the voltage is unknown again."""
+        """At a bound the force may miss `force` in its direction; else the voltage is unknown again."""
         if self.free:
             return True
         forward = float(np.sign(travel @ np.array(self.way))) or 1.0
@@ -348,17 +346,17 @@ def sticks(state: State) -> bool:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: x of the bone (mm), what settles its height and the voltage, its seconds,
+    """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds,
     in three dimensions z of the bone (mm), and the `hand` between drive and bone: x and z are then those of
     the drive, and the bone's unknowns.
     """
 
     x: float
     height: HeightControl
-    drive: VoltageControl
+    voltage: VoltageControl
     duration: float = 0.0
     z: float | None = None
-    hand: Grip | None = None
+    hand: HandControl | None = None
 
     @classmethod
     def held(cls, bone: Floats, voltage: float) -> Target:
@@ -383,12 +381,12 @@ class Target:
         """x[, z] of the drive (d,)."""
         return np.array([self.x] if self.z is None else [self.x, self.z])
 
-    def way(self, present: Floats) -> Floats:
+    def increment(self, present: Floats) -> Floats:
         """Expected displacement of the bone from its `present` translation (dim,)."""
-        way = self.bone(present) - present
+        increment = self.bone(present) - present
         if self.hand is not None:
-            way[::2] = self.hand.way
-        return way
+            increment[::2] = self.hand.increment
+        return increment
 
     def begun(self, old: State) -> Target:
         """The target of a step that starts from `old`."""

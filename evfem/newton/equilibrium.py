@@ -28,12 +28,11 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.contact.stability import StabilityRatio
-from evfem.electrostatics.signals import Seen
+from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
-from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
+from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
@@ -51,7 +50,7 @@ class Equilibrium:
         self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record
         self.tolerance, self.strategy = limits.tolerance, limits.strategy
-        self._seen: tuple[State, Balance] | None = None
+        self._iterate: tuple[State, Balance] | None = None
 
     def rest(self, bone: Floats, voltage: float) -> State:
         """The undeformed body, translated by `bone` (dim,)."""
@@ -74,24 +73,16 @@ class Equilibrium:
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
 
-    def positions(self, u: Floats) -> Floats:
-        """Current positions of the pad nodes (P, 2)."""
-        return self.interface.positions(u)
-
-    def contact_forces(self, state: State) -> Floats:
-        """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
-        return self.interface.contact_forces(state)
-
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
+        return PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""
-        seen = Seen.of(self.attraction, self.interface, state, old.touching)
-        return GivenVoltage(target.drive.held(seen))
+        pad = PadState.of(self.attraction, self.interface, state, old.touching)
+        return GivenVoltage(target.voltage.held(pad))
 
     def step(
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
@@ -107,7 +98,7 @@ class Equilibrium:
         return self._given_way(old, held, frozen, found) if found.touching.any() else found
 
     def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
-        """Where a finger without a force stands that is touched at `target`, from the iterate `touched`.
+        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`.
 
         Without mass every height above is an equilibrium too: its lowest node then just does not touch.
         """
@@ -125,53 +116,41 @@ class Equilibrium:
         try:
             found = self._try(old, target, frozen, start)
         except StepFailed:
-            if target.drive.fallback(old, None) is None:
+            if target.voltage.fallback(old, None) is None:
                 raise
-        other = target.drive.fallback(old, found)
+        other = target.voltage.fallback(old, found)
         if found is not None and other is None:
             return found
         assert other is not None
-        held = self._try(old, replace(target, drive=other), frozen, start)
+        held = self._try(old, replace(target, voltage=other), frozen, start)
         if not sticks(held):
-            raise StepFailed("the wished friction force was not found", self.record.residuals)
+            raise StepFailed("the prescribed friction force was not found", self.record.residuals)
         return held
-
-    def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
-        """Stability ratio of the equilibrium `state`."""
-        return self.body.stability_ratio(state, target)
-
-    def reusable(self) -> Reusable:
-        """Data of the solver that the next step reuses."""
-        return self.body.reusable()
-
-    def resume(self, state: State, carried: Reusable) -> None:
-        """Put the solver where it was after the step that led to `state`."""
-        self.body.resume(state, carried)
 
     def _try(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
         try:
             return self._find(old, target, frozen, start or old)
         except (ContactNotSolved, StepFailed) as error:
-            self.body.forget()
+            self.body.discard()
             reason = error.reason if isinstance(error, StepFailed) else f"contact: {error}"
             kind = Folded if isinstance(error, Folded) else StepFailed
             failed = kind(reason, self.record.residuals)
             failed.unstable = isinstance(error, Unstable)
-            failed.findings = "" if self._seen is None else self.body.findings(*self._seen)
+            failed.findings = "" if self._iterate is None else self.body.findings(*self._iterate)
             raise failed from error
 
     def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
         """The iterations at the head of this file."""
         target = target.begun(old)
         self.interface.begin(old, target.duration)
-        target.drive.begin(old)
+        target.voltage.begin(old)
         state = self.body.begin(old, target, frozen is not None, start)
         residuals: list[float] = []
         self.record.residuals, changed = residuals, 0
         for iteration in range(self.strategy.iterations):
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
-            self._seen = state, balance
+            self._iterate = state, balance
             reached = target.reached(state.bone)
             residuals.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):
@@ -179,12 +158,12 @@ class Equilibrium:
             if reached and balance.residual <= self.tolerance:
                 if self._accepts(old, state, target):
                     return self._accepted(old, state, target)
-                if iteration > changed:  # nodes were let go or admitted: what follows is another problem
+                if iteration > changed:  # other nodes are held or candidates: another problem begins
                     changed = iteration + 1
             if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
-            self.interface.pins.watch(self.interface.places(state), state.touching)
+            self.interface.jumps.watch(self.interface.places(state), state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 
@@ -203,12 +182,12 @@ class Equilibrium:
             return False
         travel = target.place - old.bone[::2]
         slack = self.tolerance * max(np.abs(state.reaction).max(), SMALLEST_FORCE)
-        return target.drive.accepts(travel, state.reaction, slack)
+        return target.voltage.accepts(travel, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:
         """Whether contact and friction hold here; a node that penetrates becomes a candidate."""
         penetration = self.interface.shallowest_penetration(state)
         if penetration is not None:
-            self.body.admit(state, penetration)
+            self.body.add_candidates(state, penetration)
             return False
         return self.interface.obeyed(old, state)

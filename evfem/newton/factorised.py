@@ -23,8 +23,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
-    GROWING,
-    GROWN,
+    CANDIDATE_GROWTH,
+    CANDIDATE_ROUNDS,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
     REACH,
@@ -37,7 +37,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
-from evfem.electrostatics.signals import Seen
+from evfem.electrostatics.signals import PadState
 from evfem.newton.anderson import Anderson
 from evfem.newton.control import Target, VoltageProblem
 from evfem.newton.interface import Interface
@@ -100,8 +100,8 @@ class FactorisedBody:
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
-        """Where iterations begin: the last increment once more, or moved with the bone if nothing touches."""
-        state = replace(state, voltage=target.drive.guess(state.voltage))
+        """Start of the iterations: the last increment once more, or the bone's if nothing touches."""
+        state = replace(state, voltage=target.voltage.guess(state.voltage))
         if state.touching.any():
             return self._extrapolated(state, target)
         bone = target.bone(state.bone)
@@ -110,12 +110,12 @@ class FactorisedBody:
     def _extrapolated(self, state: State, target: Target) -> State:
         """As far along the last increment of the displacements as the bone's next one is along its last."""
         node = self.body.space.mesh.node_sets["bone"][0]
-        last, way = state.last_increment[node], target.way(state.bone)
-        axis = int(np.argmax(np.abs(way)))
+        last, ahead = state.last_increment[node], target.increment(state.bone)
+        axis = int(np.argmax(np.abs(ahead)))
         # where the bone turns off, its last increment along the new way is rounding of either sign
-        if way[axis] * last[axis] <= TURNED * way[axis] ** 2:
+        if ahead[axis] * last[axis] <= TURNED * ahead[axis] ** 2:
             return state
-        fraction = min(float(way[axis] / last[axis]), self.limits.strategy.reach)
+        fraction = min(float(ahead[axis] / last[axis]), self.limits.strategy.reach)
         u = state.u + fraction * state.last_increment
         if not self.body.tissue.smallest_J(u) > SMALLEST_J:
             return state
@@ -149,11 +149,11 @@ class FactorisedBody:
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
         dim = state.bone.size
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
-        missing = [target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction)]
+        missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
         if target.hand is not None:
             missing.append(target.hand.unbalanced(state.bone[::2], reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
-        return max(float(free / largest), target.drive.lacking(self._seen(state)))
+        return max(float(free / largest), target.voltage.lacking(self._pad_state(state)))
 
     def _rounding(self, state: State) -> float:
         """Forces (N/mm) below which the balance is rounding: of displacements, stresses and attraction."""
@@ -194,7 +194,7 @@ class FactorisedBody:
             return after
         bone = after.bone.copy()
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
-        voltage = mixed.voltage if target.drive.free else after.voltage
+        voltage = mixed.voltage if target.voltage.free else after.voltage
         if target.hand is not None:
             bone[::2] = mixed.bone[::2]
         return replace(mixed, bone=bone, voltage=voltage)
@@ -208,13 +208,13 @@ class FactorisedBody:
         """The next iterate; nodes that sank in become candidates, many of them start the way again."""
         if not self.interface.follows:
             return after
-        for _ in range(GROWING):
+        for _ in range(CANDIDATE_ROUNDS):
             known = self.linearisation.candidates.size
             gap = self.interface.shallowest_penetration(after)
             if gap is None:
                 break
-            self.admit(after, gap)
-            if self.linearisation.candidates.size < GROWN * known:
+            self.add_candidates(after, gap)
+            if self.linearisation.candidates.size < CANDIDATE_GROWTH * known:
                 break
             self.linearisation.factorise(state)
             self._anderson.reset()
@@ -224,9 +224,9 @@ class FactorisedBody:
     def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
         factor = self.linearisation.factor
-        saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
+        saved, residual = factor.forward(-balance.of_tangent(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
-        driven = target.drive.solve(step, self._problem(saved, state))
+        driven = target.voltage.solve(step, self._problem(saved, state))
         found, bone = self.travel.limited(step, driven.solution, state, target)
         if driven.change:
             saved = saved + driven.change * driven.unit
@@ -268,12 +268,12 @@ class FactorisedBody:
         self._scaled_down = found.reduced
         return found
 
-    def _seen(self, state: State) -> Seen:
-        return Seen.of(self.attraction, self.interface, state, self.linearisation.touching)
+    def _pad_state(self, state: State) -> PadState:
+        return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
 
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
-        """What a voltage control has; `saved` is the residual's state for the backward solve."""
-        factor, seen, nodes = self.linearisation.factor, self._seen(state), self.pad.nodes
+        """Data for a voltage control; `saved` is the residual's state for the backward solve."""
+        factor, pad, nodes = self.linearisation.factor, self._pad_state(state), self.pad.nodes
 
         def pushed(forces: Floats) -> tuple[Floats, Floats]:
             nodal = np.zeros_like(state.u)
@@ -286,8 +286,8 @@ class FactorisedBody:
             still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
             return row, still, own
 
-        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(seen.forces(KILOVOLT))
-        return VoltageProblem(squared, self._solve, unit, pushed, measured, seen)
+        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.forces(KILOVOLT))
+        return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""
@@ -297,7 +297,7 @@ class FactorisedBody:
         whole = fraction == 1.0 and not target.height.free and target.hand is None
         voltage = state.voltage
         if update.driven:
-            voltage = target.drive.after(voltage, fraction * update.driven)
+            voltage = target.voltage.after(voltage, fraction * update.driven)
         return replace(
             state,
             u=state.u + fraction * update.u,
@@ -328,17 +328,17 @@ class FactorisedBody:
         none, found = np.zeros(self.body.reduce(state.u).size), []
         for place in (state, ahead):
             step = self._contact_step(state, place, target, still)
-            also = target.drive.unknowns(step, self._problem(none, place))
+            also = target.voltage.unknowns(step, self._problem(none, place))
             found.append(stability_ratio(replace(step, unknowns=(*step.unknowns, *also))))
         return max(found, key=lambda one: one.ratio)
 
     # -- a step ends
 
     def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
-        """How crests push the finger out of the equilibrium `state` faster than it is held, by the
-        tangent at hand and by the one there: iterations may come to such a one from afar. Not asked of
-        tissue in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue
-        that gives way by itself, a negative compliance, is not seen.
+        """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by
+        the tangent at hand and by the one there, else None: iterations may converge to such a state from
+        afar. Not tested for tissue in time, in three dimensions, and for the attraction, whose instability
+        the iterations show; a tangent of the tissue that is not positive definite is not detected.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
@@ -369,13 +369,13 @@ class FactorisedBody:
         state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
         return replace(state, pressure=NO_PRESSURE)
 
-    def admit(self, state: State, gap: float) -> None:
+    def add_candidates(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""
         self.linearisation.choose_candidates(state, max(0.0, gap))
 
-    def forget(self) -> None:
+    def discard(self) -> None:
         """Drop the factorisation, so that the next step starts from a fresh one."""
-        self.linearisation.forget()
+        self.linearisation.discard()
 
     def findings(self, state: State, balance: Balance) -> str:
         """The largest out-of-balance forces, the state of contact and the smallest volume ratio."""

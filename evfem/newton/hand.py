@@ -9,7 +9,7 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
 
 by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
 and the bone comes to rest. In three dimensions the same holds along z, with the same spring, damper and
-mass. The bone's height stays what the motion says.
+mass. The motion prescribes the bone's height.
 
 Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
 100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
@@ -104,7 +104,7 @@ def at_rest(dim: int) -> Floats:
 
 
 @dataclass(frozen=True)
-class Grip:
+class HandControl:
     """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), and
     its velocity (mm/s), (d,) each.
     """
@@ -114,9 +114,9 @@ class Grip:
     duration: float = 0.0
     before: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
 
-    def begun(self, old: State, drive: Floats, duration: float) -> Grip:
+    def begun(self, old: State, drive: Floats, duration: float) -> HandControl:
         """In the step from `old` that takes the drive to x[, z] = `drive` (d,)."""
-        return Grip(self.hand, drive, duration, (old.hand[0], old.bone[::2], old.hand[1]))
+        return HandControl(self.hand, drive, duration, (old.hand[0], old.bone[::2], old.hand[1]))
 
     @property
     def stiffness(self) -> float:
@@ -127,8 +127,8 @@ class Grip:
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
 
     @property
-    def way(self) -> Any:
-        """Displacement of the bone if nothing changes (d,) in mm."""
+    def increment(self) -> Any:
+        """Displacement of the bone if nothing changes, (d,) in mm."""
         return self.before[2] * self.duration
 
     def velocity(self, x: Any) -> Any:
@@ -144,7 +144,7 @@ class Grip:
         return force
 
     def force(self, x: Any) -> Any:
-        """What of it comes to the bone (d,) in N/mm, the mass taken off."""
+        """Force on the bone (d,) in N/mm: that of the drive minus the inertia of the mass."""
         force = self.driving(x)
         if self.duration > 0.0:
             force -= self.hand.mass * (self.velocity(x) - self.before[2]) / self.duration

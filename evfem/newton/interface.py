@@ -1,11 +1,10 @@
-r"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys
-their laws.
+r"""The interface of pad and surface: gaps, slips and friction of the pad nodes, and the laws of contact.
 
 Contact forces of a state are along the surface's normal and tangents at the node's place
 (`evfem.surface.pad.SurfaceState`). Slip is counted along the tangents, in the plane :math:`r\,\Delta x` with
 the profile's stretch r, from the last accepted place, or from the jump of friction that holds the node
-(`Pins`). A slipping node's shear force is
-against its slip. With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
+(`FrictionJumps`). A slipping node's shear force opposes its slip. With penalties the interface has a
+compliance of its own, g + lam_n / (p_n A) = 0
 and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 """
 
@@ -28,7 +27,7 @@ from evfem.common.constants import (
 )
 from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
-from evfem.contact.slipping import Returned
+from evfem.contact.slipping import OscillatingNodes
 from evfem.newton.state import State
 from evfem.protocols import FrictionLaw
 from evfem.surface.friction import Slipping, with_core
@@ -37,14 +36,14 @@ from evfem.surface.skin import Skin
 from evfem.surface.ways import Steps
 
 
-class Pins:
-    """Nodes that a jump of friction holds back during one step; `place` (P, d) is nan for free nodes.
+class FrictionJumps:
+    """Nodes that a jump of the friction coefficient holds during a step; `place` (P, d) is nan for free ones.
 
     A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
-    to the higher limit. By its own place the coefficient has no consistent value: iterations put it before
-    the jump, behind it, before it again. It is pinned a hair inside the rougher side, where its way has
-    crossed the jump, sticking with the higher coefficient, and released below the lower limit. A node that
-    began the step on the rougher side is not held.
+    to the higher limit. At the jump the coefficient has no single value, and iterates alternate between its
+    two sides. Such a node is fixed where its way crosses the jump, `PIN_OFFSET` inside the rougher side,
+    where it sticks with the higher coefficient, and is released below the lower limit. A node that began the
+    step on the rougher side is not held.
     """
 
     def __init__(self, steps: Sequence[Steps], begin: Floats) -> None:
@@ -53,7 +52,7 @@ class Pins:
         self.begin(begin)
 
     def begin(self, place: Floats) -> None:
-        """Forget everything: a new step starts with the nodes at these places (P, d)."""
+        """Starts a step with the nodes at these places (P, d) in mm, none held."""
         self.place = np.full(place.shape, np.nan)
         self.lower = np.zeros(len(place))
         self._begin = place
@@ -68,25 +67,25 @@ class Pins:
 
     @property
     def held(self) -> Any:
-        """Pinned nodes, (P,) bool."""
+        """Nodes at a jump, (P,) bool."""
         return np.isfinite(self.place[:, 0])
 
     def at(self, place: Floats) -> Floats:
-        """Where the nodes count as being (P, d): pinned ones where they are pinned, others at `place`."""
+        """Where the nodes count as being (P, d): held ones at their jump, others at `place`."""
         return np.where(np.isfinite(self.place), self.place, place)
 
     def watch(self, place: Floats, touching: Any) -> None:
-        """Look at the next iterate: count changes of side, and pin what keeps changing."""
+        """Counts changes of side at the next iterate; holds a node after `CHANGES` of them."""
         for number, steps in enumerate(self.steps):
             side = self._sides(steps, place)
             moved = touching & (side != self._side[number]) & ~self._released
             self._changes[number] += moved
             new = np.flatnonzero(moved & (self._changes[number] >= CHANGES) & ~self.held)
-            self._pin(steps, new, np.maximum(side, self._side[number])[new] - 1, place)
+            self._hold(steps, new, np.maximum(side, self._side[number])[new] - 1, place)
             self._side[number] = side
 
-    def _pin(self, steps: Steps, new: Ints, which: Ints, place: Floats) -> None:
-        """Pin those of the nodes `new` (k,) that come to the jumps `which` (k,) from their smoother side."""
+    def _hold(self, steps: Steps, new: Ints, which: Ints, place: Floats) -> None:
+        """Holds nodes `new` (k,) that come to the jumps `which` (k,) from their smoother side."""
         begin, axis = self._begin[new], steps.axis
         way = place[new] - begin
         whole = np.where(way[:, axis] == 0.0, 1.0, way[:, axis])
@@ -101,11 +100,11 @@ class Pins:
         self.lower[new] = np.minimum(before, behind)[from_smoother]
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
-        """Let go of nodes whose shear force is below the lower `limit` (P,); says whether there were any."""
+        """Releases nodes whose shear force is below the lower `limit` (P,); returns if there were any."""
         return self.let_go(self.held & (np.abs(shear) < limit - weak))
 
     def let_go(self, loose: Any) -> bool:
-        """Let go of these nodes (P,) bool for the rest of the step; says whether there were any."""
+        """Releases these nodes (P,) bool for the rest of the step; returns whether there were any."""
         self.place[loose] = np.nan
         self._released |= loose
         return bool(loose.any())
@@ -123,11 +122,11 @@ class Interface:
     """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh.
 
     Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where each
-    has three unknowns in a dense compliance, the candidates follow the contact: those of the last step that
-    are far by now are let go.
+    has three unknowns in a dense compliance, the candidates follow the contact: those that are far by now
+    are dropped.
     """
 
-    _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
+    _surfaces: tuple[tuple[Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -136,17 +135,17 @@ class Interface:
         self.follows = self.dim == 3
         self.length = pad.spacing(self.points)
         self._down = pad.facing(self.points)
-        self.pins = Pins(surface.friction_steps(SHORT_RAMP * self.length), self.points[:, ::2])
+        self.jumps = FrictionJumps(surface.friction_steps(SHORT_RAMP * self.length), self.points[:, ::2])
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
-        self._returned = Returned(pad.nodes.size)
+        self._oscillating = OscillatingNodes(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
-        self.pins.begin(self.places(old))
-        self._returned = Returned(self.pad.nodes.size)
+        self.jumps.begin(self.places(old))
+        self._oscillating = OscillatingNodes(self.pad.nodes.size)
         self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
@@ -159,11 +158,11 @@ class Interface:
 
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states, which many ask for."""
-        for u, found in self._seen:
+        for u, found in self._surfaces:
             if u is state.u:
                 return found
         found = surface_state(self.surface, self.positions(state.u))
-        self._seen = ((state.u, found), *self._seen[:1])
+        self._surfaces = ((state.u, found), *self._surfaces[:1])
         return found
 
     def resting(self, state: State) -> Floats:
@@ -180,17 +179,17 @@ class Interface:
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes (P, dim - 1) in mm, along the surface's tangents."""
-        way = self.places(state) - self.pins.at(self.places(old))
+        way = self.places(state) - self.jumps.at(self.places(old))
         return np.asarray(np.einsum("paj,pj->pa", self.surface_at(state).travel, way))
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
-        """What the contact problem has to know of candidates c; of all nodes their attraction's change."""
+        """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
         place, surface = self.places(state), self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
-        friction = self.friction(old, c, self.pins.at(place)[c])
+        friction = self.friction(old, c, self.jumps.at(place)[c])
         known = Candidates(
             surface=surface,
             slip=slip,
@@ -208,14 +207,14 @@ class Interface:
         """The candidates c under a law of friction other than Coulomb's.
 
         Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
-        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem knows the part of F
-        that does not grow with dx; seen with that, slip and yielding are (1 + K C) times as large.
+        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem has the part of F
+        that does not grow with dx; with it, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])
         slip = np.where(known.status >= FORWARD, way, 0.0)
         moving = self._slipping(old, state, c, known.friction, slip)
-        found = self._returned.linearised(law, moving, c, known.status, shear)
+        found = self._oscillating.linearised(law, moving, c, known.status, shear)
         if self.dim == 3:  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
             found = replace(found, by_speed=np.maximum(found.by_speed, 0.0))
         by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
@@ -236,44 +235,44 @@ class Interface:
         )
 
     def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
-        """These pad nodes (k,) as a law of friction sees them, with coefficients (k,) and slips (k,)."""
+        """Data of a law of friction at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
-        length = self.shares(state)[nodes]
-        seen = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
+        length = self.tributary(state)[nodes]
+        nodal = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
         found = self.restored(state.voltage)
-        return seen if found is None else replace(seen, withheld=found[0][nodes], left=found[1][nodes])
+        return nodal if found is None else replace(nodal, withheld=found[0][nodes], left=found[1][nodes])
 
     def withheld(self, state: State) -> Floats:
-        """What a core of the attraction withholds of pull and pressing force of closed nodes (P,), N/mm."""
+        """Part of attraction and pressing force of closed nodes (P,) that a core takes away, N/mm."""
         found = self.restored(state.voltage)
         if found is None:
             return np.zeros(len(self.points))
-        share = self.shares(state)
+        share = self.tributary(state)
         pressure = np.maximum(state.contact_force[:, 0], 0.0) / share
         return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
 
-    def lengths(self, position: Floats) -> Floats:
-        """What the pad's nodes at positions (P, dim) stand for (P,): mm, in space mm2; never quite 0."""
+    def tributary_of(self, position: Floats) -> Floats:
+        """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
         least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
         return np.maximum(self.pad.tributary(position), least)
 
-    def shares(self, state: State) -> Floats:
-        """The same of a state."""
-        return self.lengths(self.positions(state.u))
+    def tributary(self, state: State) -> Floats:
+        """Tributary lengths or areas (P,) in a state."""
+        return self.tributary_of(self.positions(state.u))
 
-    def shares_at(self, part: tuple[State, State], place: Floats) -> Floats:
-        """The same at places (P, d), on a part between two states; in space its mean over the part."""
+    def tributary_at(self, part: tuple[State, State], place: Floats) -> Floats:
+        """Tributary lengths or areas (P,) at places (P, d) between two states; in space the mean of both."""
         if self.dim == 2:
-            return self.lengths(place)
+            return self.tributary_of(place)
         old, new = part
-        return 0.5 * (self.shares(old) + self.shares(new))
+        return 0.5 * (self.tributary(old) + self.tributary(new))
 
     def age(self, old: State) -> Floats:
         """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
         return np.where(old.touching, old.age + self.duration, 0.0)
 
     def aged(self, old: State, state: State) -> State:
-        """The accepted state with the ages of its nodes, if a law of friction may ask for them."""
+        """The accepted state, with contact times if a law of friction is given."""
         if self.law is None:
             return state
         return replace(state, age=self.age(old))
@@ -287,8 +286,8 @@ class Interface:
         mu = self.friction(old, nodes, place)
         if self.law is None:
             return np.asarray(mu * normal)
-        seen = self._slipping(old, new, nodes, mu, slip)
-        return replace(seen, normal=normal, length=self.shares_at(part, place)).bound(self.law)
+        nodal = self._slipping(old, new, nodes, mu, slip)
+        return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
@@ -297,7 +296,7 @@ class Interface:
     def friction(self, old: State, nodes: Ints, place: Floats) -> Floats:
         """Friction coefficient of these pad nodes (k,) at the places (k, d) in mm; `old` is the
         last accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask
-        for it here; `Pins` alone takes the coefficients on both sides of a jump from the surface.
+        for it here; `FrictionJumps` alone takes the coefficients on both sides of a jump from the surface.
         """
         return np.broadcast_to(np.asarray(self.surface.friction_at(place), dtype=float), len(place))
 
@@ -314,11 +313,11 @@ class Interface:
     def _strayed(self, old: State, state: State, place: Floats) -> Any:
         """Pinned nodes (P,) that slipped to another coefficient, or whose interface no longer holds them."""
         nodes = np.arange(len(place))
-        pinned = self.friction(old, nodes, self.pins.at(place))
+        pinned = self.friction(old, nodes, self.jumps.at(place))
         here, slips = self.friction(old, nodes, place), state.status >= FORWARD
-        yielded = sizes(place - self.pins.at(place)) > self.tolerance * self.length
+        yielded = sizes(place - self.jumps.at(place)) > self.tolerance * self.length
         beyond = sizes(state.contact_force[:, 1:]) > self._resting_limit(old, state, here) + self._weak(state)
-        return self.pins.held & (pinned != here) & (slips | (yielded & beyond))
+        return self.jumps.held & (pinned != here) & (slips | (yielded & beyond))
 
     def _weak(self, state: State) -> float:
         """Forces (N/mm) below which a law of contact or friction holds."""
@@ -330,17 +329,17 @@ class Interface:
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self._weak(state)
-        lower = self._resting_limit(old, state, self.pins.lower)
-        if self.pins.release(lower, sizes(state.contact_force[:, 1:]), weak):
+        lower = self._resting_limit(old, state, self.jumps.lower)
+        if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
-        if self.pins.let_go(self._strayed(old, state, place)):
+        if self.jumps.let_go(self._strayed(old, state, place)):
             return False
         normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         compliance = self.compliance(old)[active]
         slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
         status, nodes = state.status[active], np.flatnonzero(active)
         way, size = sizes(slip), sizes(shear)
-        limit = (mu := self.friction(old, nodes, self.pins.at(place)[active])) * normal
+        limit = (mu := self.friction(old, nodes, self.jumps.at(place)[active])) * normal
         if self.law is not None:
             moving = np.where(status == STICK, 0.0, way)
             limit = self._slipping(old, state, nodes, mu, moving).bound(self.law)
@@ -367,7 +366,7 @@ class PenaltyInterface(Interface):
 
     def compliance(self, old: State) -> Floats:
         """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
-        return 1.0 / np.outer(self.shares(old), self.penalties)
+        return 1.0 / np.outer(self.tributary(old), self.penalties)
 
 
 def slipped(interface: Interface, old: State, new: State) -> Floats:

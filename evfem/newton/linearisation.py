@@ -23,8 +23,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     FAR,
-    FIRST,
-    HELD,
+    FIRST_CANDIDATES,
     LEFT_OVER,
     LONGER,
     SHORTER,
@@ -34,7 +33,8 @@ from evfem.common.constants import (
     STABLE,
     STALLED,
     STEEP,
-    TAKEN,
+    STEEP_IN_SPACE,
+    SUBTRACTED,
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
@@ -46,11 +46,11 @@ from evfem.surface.pad import surface_state
 from evfem.tissue.body import Body
 
 
-def in_vain(residuals: list[float], same: bool) -> bool:
-    """Whether iterations gain nothing: the last two with the `same` nodes in contact, or the last four with
-    the bone where it should be.
+def no_progress(residuals: list[float], same: bool) -> bool:
+    """Whether iterations stagnate: over the last two with the `same` nodes in contact, or over the last four
+    with the bone in its place.
 
-    >>> in_vain([1e-2, 2e-2, 5e-2], True), in_vain([1e-2, 2e-2, 5e-2], False)
+    >>> no_progress([1e-2, 2e-2, 5e-2], True), no_progress([1e-2, 2e-2, 5e-2], False)
     (True, False)
     """
     if same and len(residuals) > 2 and min(residuals[-2:]) > residuals[-3]:
@@ -58,15 +58,15 @@ def in_vain(residuals: list[float], same: bool) -> bool:
     return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
 
 
-def steadied(gain: Floats) -> Floats:
-    """Gains of the attraction per contact force (P,) as the tangent takes them.
+def limited_gain(gain: Floats) -> Floats:
+    """Gains of the attraction per contact force (P,), limited for the tangent.
 
-    What a contact force of 1 leaves is 1 - gain. Where that is nothing the node's equilibrium folds, and
-    beyond, the force grows by itself until the rough faces are close: iterations are to leave such a
-    place, and to come to one below 1 by its own tangent. So beyond `STABLE` the tangent takes
-    abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
+    The net force of a contact force of 1 is 1 - gain. At a gain of 1 the node's equilibrium has a fold;
+    above, the force grows by itself until the rough faces are close. Iterations shall leave such a point,
+    and converge to one below 1 with its own tangent: above `STABLE` the tangent has abs(1 - gain), limited
+    to the range from `LEFT_OVER` to 1 - `STABLE`.
 
-    >>> steadied(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
+    >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
     [0.5, 0.95, 0.99, 0.95, 0.9]
     """
     return np.where(gain > STABLE, 1.0 - np.clip(np.abs(1.0 - gain), LEFT_OVER, 1.0 - STABLE), gain)
@@ -125,7 +125,7 @@ class Linearisation:
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
-            self._follow(state, gap, weakening > TAKEN * self.softest * self.pad.tributary(position))
+            self._follow(state, gap, weakening > STEEP_IN_SPACE * self.softest * self.pad.tributary(position))
             return
         steep, near = self.steep * self.pad.tributary(position), (gap <= reach) | (state.status != OPEN)
         needed = self.pad.free & (near | (weakening > steep))
@@ -141,11 +141,11 @@ class Linearisation:
         self.factor = None
 
     def _follow(self, state: State, gap: Floats, steep: Any) -> None:
-        """Let the candidates follow the contact, and half as many others; what left is let go once a step."""
+        """Candidates are nodes in contact and half as many others; those far away are dropped once a step."""
         needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
         if self.candidates.size and needed[self.candidates].sum() == needed.sum():
             return
-        count = max(SPARE * needed.sum(), FIRST * self.pad.free.sum())
+        count = max(SPARE * needed.sum(), FIRST_CANDIDATES * self.pad.free.sum())
         enough = np.sort(gap)[min(int(count), int(self.pad.free.sum()) - 1)]
         chosen = np.flatnonzero(self.pad.free & (gap <= enough) | needed)
         self.candidates = chosen if self._lets_go else np.union1d(self.candidates, chosen)
@@ -153,14 +153,14 @@ class Linearisation:
 
     # -- factorisation
 
-    def forget(self) -> None:
-        """Drop the factorisation, so that the next iteration starts from a fresh one."""
+    def discard(self) -> None:
+        """Drops the factorisation: the next iteration makes a new one."""
         self.factor = None
 
     def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
-        """Factorise if there is no factorisation, it stalls, or a new one saves; says whether it did."""
+        """Factorises if there is none, iterations stall, or a new one saves time; returns whether it did."""
         same, self._status = np.array_equal(self._status, state.status), state.status
-        if self._has_fringes(state) and in_vain(history, same):
+        if self._has_fringes(state) and no_progress(history, same):
             self._outdated |= not self.fringes
             self.fringes = True
         if not self.refused and not self._too_old(history):
@@ -205,7 +205,7 @@ class Linearisation:
 
     def _weaken(self, upper: Floats, state: State) -> None:
         """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
-        most = HELD * self.softest * self.pad.tributary(self.interface.positions(state.u))
+        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.positions(state.u))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
         weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
@@ -222,7 +222,7 @@ class Linearisation:
         return None if self.factor is None or self.fringes else self._made_at
 
     def restore(self, state: State, at: TangentPoint) -> None:
-        """Make the factorisation again that a run which goes on from `state` had made at `at`."""
+        """Repeats the factorisation made at `at` by the run that is resumed from `state`."""
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
             self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner)
@@ -261,9 +261,9 @@ class Linearisation:
         return np.asarray(self.attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
-        """How the attraction of every pad node depends on its contact force, where rough faces come
-        closer under it, along normal and tangent: on a slope what pulls down moves the node sideways
-        too. None without them.
+        """Derivatives of the attraction of every pad node by its contact force, where rough faces come
+        closer under it, along normal and tangent: on a slope a vertical force has a tangential component.
+        None for smooth faces.
         """
         attraction = self.attraction
         if (
@@ -286,9 +286,9 @@ class Linearisation:
             along = np.zeros_like(state.contact_force)
             along[:, 0] = surface.stretch
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)[:, None] * along
-        # whole, it could pull a node on a slope in again by more than the steadied gain leaves to hold it
+        # the full tangential gain could close a node on a slope by more than the limited normal gain holds
         gain[:, 1:] = np.where(gain[:, :1] > STABLE, 0.0, gain[:, 1:])
-        gain[:, 0] = steadied(gain[:, 0])
+        gain[:, 0] = limited_gain(gain[:, 0])
         return Roughness(gain, lost[:, None] * along, pressing)
 
     def _coupling(self, state: State) -> Floats | None:

@@ -44,7 +44,7 @@ class Pressure:
             raise InputError("checkpoint", "no usable factor_pressure", f"numbers of the shape {expected}")
 
     def begin(self, u: Floats) -> Floats:
-        """Where the iterations of a step begin that comes from an equilibrium at u (N, 2)."""
+        """The first iterate of a step from an equilibrium at u (N, 2)."""
         return self.tissue.pressure(u) if self.active else NO_PRESSURE
 
     def misfit(self, state: State) -> Floats:

@@ -25,10 +25,9 @@ NO_CHARGES: Floats = np.zeros((2, 0))
 
 
 class StepFailed(ArithmeticError):
-    """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong,
-    `findings` how the last iterate looked; `unstable`: the linearised body gives way the more, the
-    more it is loaded. Of a step that was given up, `last` is the state it was tried from and its
-    target, and `released` whether the body was released there.
+    """An equilibrium was not found: its `residuals`, the `reason`, `findings` of the last iterate;
+    `unstable`: the tangent was not positive definite. Of a step that was given up, `last` is its first
+    state and its target, `released` whether the body was released there.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
@@ -82,10 +81,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,) when the
-    step began, whether the attraction was frozen, the time step's displacements at its beginning (N, dim) and
-    its seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, and
-    what branches kept when the step began.
+    """Point of a tangent: displacements u (N, dim), voltage, pad nodes that touched (P,) when the step began,
+    whether the attraction was frozen, the displacements at the beginning of the time step (N, dim) and its
+    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, and the branches' inner
+    variables when the step began.
     """
 
     u: Floats
@@ -159,8 +158,8 @@ class Balance:
         """The residual of the unknowns that are iterated."""
         return self.residual if self.mixed is None else self.mixed.residual
 
-    def seen(self, here: bool) -> Floats:
-        """The forces (n,) that a tangent has to remove which was made `here`, or elsewhere."""
+    def of_tangent(self, here: bool) -> Floats:
+        """The forces (n,) that a tangent made at this iterate (`here`), or elsewhere, has to remove."""
         return self.forces if here or self.mixed is None else self.mixed.forces
 
 

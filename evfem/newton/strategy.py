@@ -1,6 +1,6 @@
-"""How hard steps are tried: the numbers of adaptive parts and of their iterations.
+"""Limits of the step control: lengths of parts and numbers of their iterations.
 
-A step goes from one accepted state to the next. It is tried whole first; a part that fails is halved,
+A step leads from one accepted state to the next. It is tried whole first; a part that fails is halved,
 and after easy ones parts grow again. If short parts fail too, the finger is released and comes to rest
 at another equilibrium (`evfem.solver.relaxation`); if it does not, still shorter parts are tried. What
 happens on the way needs physics instead: `dynamics` "viscous" or "inertial" with a speed.

@@ -1,4 +1,4 @@
-"""How far the bone travels: as the contact problem says, but not beyond a linear step."""
+"""Travel of the bone in one iteration: that of the contact problem, limited to a linear step."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Travel:
         return travel * step.lacking(found, 0.0) < 0.0
 
     def _longest_flight(self, state: State) -> float:
-        """How far (mm) a body that touches nothing moves in one iteration: twice the gap, or a little."""
+        """Longest travel (mm) in one iteration of a body that touches nothing: twice its gap, or a little."""
         gap = float(self.interface.surface_at(state).gap.min())
         least = SHORTEST_FLIGHT * self.longest
         return float(np.clip(2.0 * gap, least, self.longest))

@@ -92,7 +92,7 @@ def _check_material(key: str, law: Any, dim: int) -> None:
         form = split(law, dim)
         try:
             at = np.eye(dim)[..., None, None]
-            rest = evaluated(key, "its stress", lambda F: _whole_stress(form, F), at)
+            rest = evaluated(key, "its stress", lambda F: _split_stress(form, F), at)
         except InputError:
             if isinstance(law, Form):  # what a form must not use is said where it is integrated
                 return
@@ -138,12 +138,6 @@ def _split_stress(law: SplitLaw, F: Array) -> Array:
         return S + q * np.eye(len(F))[..., None, None]
     S, q = law.split_stress(F, np.log(det(F)))
     return S + q * transpose(inv(F))
-
-
-def _whole_stress(law: SplitLaw, F: Array) -> Array:
-    """S + q I of a law in the split form at rest."""
-    S, q = law.split_stress(F, np.zeros(F.shape[2:]))
-    return S + q * F
 
 
 def _check_complex(key: str, what: str, function: Callable[[Array], Any], F: Array) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
 from evfem.planning.core import Closing, unseen
@@ -26,6 +26,7 @@ from evfem.planning.plausibility import implausible, locking, touching_traction,
 from evfem.planning.resolution import oscillating, too_fast, unresolved
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
+from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
@@ -155,6 +156,9 @@ def probed(scene: Scene) -> str | None:
 
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
+    if not scene.motion:
+        names = ", ".join(cls.__name__ for cls in MOTIONS.values())
+        raise InputError("motion", ABSENT, f"at least one of {names}")
     check_parts(scene, mesh.dim)
     check_space(scene, mesh)
     for name in ("pad", "bone"):

@@ -21,7 +21,7 @@ from evfem.plotting.finger import deformed, side_by_side
 from evfem.plotting.footprint import footprint
 from evfem.plotting.meshes import regions
 from evfem.plotting.movie import animate
-from evfem.plotting.sweeps import sweep, sweep_map
+from evfem.plotting.sweeps import sweep, sweep_histogram, sweep_map, sweep_scatter
 
 __all__ = [
     "FIELDS",
@@ -43,5 +43,7 @@ __all__ = [
     "signal",
     "spectrum",
     "sweep",
+    "sweep_histogram",
     "sweep_map",
+    "sweep_scatter",
 ]

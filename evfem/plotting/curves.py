@@ -81,8 +81,8 @@ TWO = 2.0  # standard deviations: the band that residuals of the given sd rarely
 def abscissa(result: Result) -> str:
     """What a picture is drawn over: what all motions change, the time if the finger waits, or the step."""
     kinds = set(result.motion)
-    wished = {"press": "indentation", "voltage": "voltage"}
-    name = wished.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"
+    changed = {"press": "indentation", "voltage": "voltage"}
+    name = changed.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"
     if name == "position" and result.in_space and not np.ptp(result.position):
         name = "position_z"
     if _changes(result[name]):

@@ -179,8 +179,8 @@ class Scale:
 def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float | None = None) -> Scale:
     """The scale of a field for the values that are shown, from their smallest to their largest.
 
-    A wished end takes the place of one of these. A field with a sign has as much of its colours on either
-    side of its middle, unless both ends are wished. Raises InputError unless vmin is below vmax.
+    A given end takes the place of one of these. A field with a sign has as much of its colours on either
+    side of its middle, unless both ends are given. Raises InputError unless vmin is below vmax.
 
     >>> scale_of("von_mises", np.array([0.1, 0.4]), vmin=0.0)
     Scale(cmap='viridis', low=0.0, high=0.4, extend='neither')
@@ -198,10 +198,10 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
         low, high = (least if vmin is None else vmin), (most if vmax is None else vmax)
     else:
         reach = max(most - middle, middle - least) or 1.0
-        wished = vmin if vmax is None else vmax
-        reach = reach if wished is None else abs(wished - middle)
+        given = vmin if vmax is None else vmax
+        reach = reach if given is None else abs(given - middle)
         low, high = (middle - reach if vmin is None else vmin), (middle + reach if vmax is None else vmax)
-    if not low < high:  # one value throughout, or all beyond a wished end
+    if not low < high:  # one value throughout, or all beyond a given end
         low, high = (high - 1.0, high) if vmin is None and vmax is not None else (low, low + 1.0)
     slack = 1e-9 * (high - low)
     ends = (least < low - slack, most > high + slack)

@@ -81,6 +81,12 @@ def new_panels(rows: int, height: float) -> Panels:
     return Panels(axes[:, 0])
 
 
+def new_columns(columns: int, height: float = 3.2) -> Panels:
+    """Panels side by side that share their ordinate."""
+    axes = new_figure(height, max(WIDTH, 2.6 * columns)).subplots(1, columns, sharey=True, squeeze=False)
+    return Panels(axes[0])
+
+
 def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:
     """What stands behind each name, and the look of its curve: label, colour and style."""
     for (name, what), colour, style in zip(named.items(), cycle(CURVES), cycle(STYLES), strict=False):

@@ -11,6 +11,7 @@ from typing import Any
 from evfem.errors import InputError, quoted
 from evfem.simulation.history import COLUMNS, SPATIAL, UNITS
 from evfem.simulation.result import Result
+from evfem.sweeps.table import unit_of
 
 Units = Mapping[str, str]
 Results = Result | Mapping[str, Result]
@@ -39,10 +40,6 @@ FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy",
 #: quantity of a probe -> its unit if it is not MPa
 QUANTITY_UNITS = dict.fromkeys(("deformation_gradient", "green_strain", "principal_stretches", "J"), "")
 QUANTITY_UNITS |= {"displacement": "mm", "strain_energy_density": "N/mm2"}
-#: last word of a key of a scene file -> its unit
-KEY_UNITS = dict.fromkeys(("gap", "indentation", "thickness", "height", "width", "distance", "y"), "mm")
-KEY_UNITS |= {"force": "N/mm", "voltage": "V", "amplitude": "V", "bias": "V", "E": "MPa", "mu": "MPa"}
-KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "Hz"}
 
 
 def with_unit(text: str, unit: str) -> str:
@@ -122,6 +119,18 @@ def quantity_label(name: str) -> str:
     return with_unit(text, QUANTITY_UNITS.get(quantity, "MPa"))
 
 
+def _computed(key: str) -> bool:
+    """Whether a column of a sweep is an output: one of a motion's keys is called as a column is."""
+    name = key.split(".")[0]
+    return name in (*COLUMNS, *SPATIAL) and name != "motion"
+
+
+def key_unit(key: str, units: Units = UNITS) -> str:
+    """Unit of a column of a sweep, which says its `units`."""
+    usual = UNITS.get(key.split(".")[0], "") if _computed(key) else unit_of(key)
+    return units.get(key) or usual
+
+
 def key_label(key: str, units: Units = UNITS) -> str:
     """A dotted key of a scene file, or an output of a sweep, with its unit; `units` are those that
     the sweep says.
@@ -133,13 +142,12 @@ def key_label(key: str, units: Units = UNITS) -> str:
     >>> key_label("contact_width.max", {"contact_width.max": "mm2"})
     'contact area, max (mm²)'
     """
-    parts = key.split(".")
-    if parts[0] in (*COLUMNS, *SPATIAL) and parts[0] != "motion":
-        unit = units.get(key) or UNITS.get(parts[0], "")
+    parts, unit = key.split("."), key_unit(key, units)
+    if _computed(key):
         return with_unit(", ".join([column_text(parts[0], unit), *parts[1:]]), unit)
     short = len(parts) > 1 and len(parts[-1]) <= 2
     text = " ".join(parts[-2:] if short else parts[-1:]).replace("_", " ")
-    return with_unit(text, units.get(key) or KEY_UNITS.get(parts[-1].rsplit("_", 1)[-1], ""))
+    return with_unit(text, unit)
 
 
 def values_of(result: Result, name: str) -> Any:

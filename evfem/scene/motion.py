@@ -18,8 +18,8 @@ DECADES = 3.0
 UNKNOWN_VOLTAGE = 10_000.0
 
 # What a field may be, in words and as a check; scene files take their keys from the fields too.
-_FORCE = number("a force in N/mm, not negative", Within(0.0), "N/mm")
-_INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0), "mm")
+FORCE = number("a force in N/mm, not negative", Within(0.0), "N/mm")
+INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0), "mm")
 _DISTANCE = number(
     "a distance in mm, not 0, at most 1000 either way", Within(-1000.0, 1000.0, not_zero=True), "mm"
 )
@@ -109,6 +109,11 @@ class Motion(Named):
         """What it does."""
         raise NotImplementedError
 
+    @property
+    def timed(self) -> bool:
+        """Whether any time passes."""
+        return self.course.takes_time
+
     def part(self, step: int) -> tuple[float, float, float]:
         """Shares of it, 0 to 1, that are done before and after a step (from 1 on), and how many of such
         steps it would have.
@@ -136,8 +141,8 @@ class Press(Motion, kind="press"):
     evfem.errors.InputError: force: given neither force nor indentation; allowed: exactly one of the two
     """
 
-    force: Annotated[float | None, _FORCE, "load on the bone at the end; this or indentation"] = None
-    indentation: Annotated[float | None, _INDENTATION, "travel of the bone beyond first touch at the end"] = (
+    force: Annotated[float | None, FORCE, "load on the bone at the end; this or indentation"] = None
+    indentation: Annotated[float | None, INDENTATION, "travel of the bone beyond first touch at the end"] = (
         None
     )
     steps: Steps = 10

@@ -217,8 +217,6 @@ def _check_parts(scene: Scene) -> None:
         raise InputError("name", quoted(scene.name), "a name that can be part of a file name")
     if not all(isinstance(term, Term) for term in scene.forms):
         raise InputError("forms", quoted(scene.forms), "terms as made by Scene.with_term")
-    if not scene.motion:
-        raise InputError("motion", ABSENT, f"at least one of {_names(MOTIONS)}")
     for i, motion in enumerate(scene.motion):
         if not isinstance(motion, Motion):
             raise InputError(f"motion[{i}]", quoted(motion), f"one of {_names(MOTIONS)}")
@@ -314,7 +312,7 @@ def _check_time(scene: Scene) -> None:
     timed = isinstance(scene.electrics.voltage, TimeSignal) or (
         scene.drive is not None and scene.drive.resolved
     )
-    if timed and not any(course.takes_time for course in scene.courses):
+    if timed and scene.motion and not any(motion.timed for motion in scene.motion):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
 

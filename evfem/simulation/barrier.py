@@ -29,7 +29,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.newton.control import Target
-from evfem.simulation.works import Part
+from evfem.simulation.works import SubstepWork
 from evfem.surface.pad import surface_state
 
 #: where the potential is taken on the way, and, denser at its ends, the attraction
@@ -39,7 +39,7 @@ FINE = np.linspace(0.0, 1.0, 33) ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 33))
 LEAST = 1e-6
 
 
-def rise(part: Part, target: Target) -> float:
+def rise(part: SubstepWork, target: Target) -> float:
     """The highest climb of the potential on the straight way of a part, as a share of the stored energy."""
     body, old, new = part.model.body, part.old, part.new
     way = new.u - old.u
@@ -55,8 +55,8 @@ def rise(part: Part, target: Target) -> float:
     return float(climbed.max()) / max(stored[0], stored[-1], LEAST)
 
 
-def _carried(part: Part, target: Target) -> Floats:
-    """How far the bone, if not loaded, carries the pad's nodes (P, dim); 0 where they keep touching."""
+def _carried(part: SubstepWork, target: Target) -> Floats:
+    """Displacements (P, dim) of pad nodes with a bone that is not loaded; 0 where they keep touching."""
     travel = part.new.bone - part.old.bone
     if target.height.free:
         travel[1] = 0.0
@@ -65,7 +65,7 @@ def _carried(part: Part, target: Target) -> Floats:
     return np.where((part.old.touching & part.new.touching)[:, None], 0.0, travel)
 
 
-def _pulled(part: Part, carried: Floats) -> Floats:
+def _pulled(part: SubstepWork, carried: Floats) -> Floats:
     """Work of the attraction up to `PLACES` under the end's voltage or charges, after `carried`."""
     attraction, old, new = part.model.attraction, part.old, part.new
     if attraction is None or not attraction.acts(new.voltage):
@@ -80,7 +80,7 @@ def _pulled(part: Part, carried: Floats) -> Floats:
     return np.interp(PLACES, FINE, work) + fringes * PLACES
 
 
-def _rubbed(part: Part) -> float:
+def _rubbed(part: SubstepWork) -> float:
     """Dissipation of the slips under the contact forces of the end."""
     length = part.slip_length
     if not length.any():
@@ -89,19 +89,19 @@ def _rubbed(part: Part) -> float:
     return float(np.sum(interface.resistance((part.old, part.new), part.places[1], normal, length) * length))
 
 
-def _lifted(part: Part) -> Floats:
-    """What nodes that touch at both ends have to climb beside the chord between their places."""
+def _lifted(part: SubstepWork) -> Floats:
+    """Work against contact forces of nodes that touch at both ends, off the chord of their places."""
     model, old, new = part.model, part.old, part.new
     touching = old.touching & new.touching
     if model.surface.is_flat or not touching.any():
         return np.zeros_like(PLACES)
-    begin, end = (model.equilibrium.positions(state.u)[touching] for state in (old, new))
+    begin, end = (model.equilibrium.interface.positions(state.u)[touching] for state in (old, new))
     normal = new.contact_force[touching, 0]
     lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in PLACES]
     return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES
 
 
-def _in_time(part: Part) -> Floats:
+def _in_time(part: SubstepWork) -> Floats:
     """Drag, viscosity and inertia as potentials of an implicit step; drag counts from the release."""
     body, old, new = part.model.body, part.old, part.new
     way, dynamics = new.u - old.u, part.model.body.dynamics
@@ -115,8 +115,8 @@ def _in_time(part: Part) -> Floats:
     return held - held[0]
 
 
-def _hand(part: Part) -> Floats:
-    """What a hand's spring adds to the constant force of the end."""
+def _hand(part: SubstepWork) -> Floats:
+    """Energy of a hand's spring beyond the constant force of the end."""
     hand = part.model.scene.hand
     if hand is None:
         return np.zeros_like(PLACES)

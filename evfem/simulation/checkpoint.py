@@ -44,7 +44,7 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
-    """What a solver takes with it to the next step; of the same shapes with and without a factorisation."""
+    """Data of the solver for the next step; of the same shapes with and without a factorisation."""
     at, status = carried.tangent_point, state.status
     begun = np.zeros_like(state.u)
     nowhere = TangentPoint(

@@ -1,4 +1,4 @@
-"""What is reported of a run: a row per requested step, works and energies (`works`), fields."""
+"""Reports of a run: a row per requested step, works and energies (`works`), fields."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from evfem.newton.state import State
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, Part, tells_source, unloaded
+from evfem.simulation.works import Books, SubstepWork, tells_source, unloaded
 from evfem.surface.pad import Pad, reach, surface_state
 
 
@@ -27,8 +27,8 @@ class Ledger:
     end: Books | None = None
 
     def accept(self, old: State, new: State) -> bool:
-        """Add the works of one converged part; says whether stability was lost in it."""
-        part = Part(self.model, old if self.end else unloaded(old), new)
+        """Adds the works of one converged part; returns whether stability was lost in it."""
+        part = SubstepWork(self.model, old if self.end else unloaded(old), new)
         begin = self.end or Books.nothing(old.u.shape)
         self.end = part.end()
         works = part.works(begin, self.end)
@@ -48,8 +48,8 @@ class Ledger:
         """The forces, widths and energies of a state; costs are added by the caller."""
         model, end = self.model, self.end
         assert end is not None
-        position = model.equilibrium.positions(state.u)
-        contact = model.equilibrium.contact_forces(state).sum(axis=0)
+        position = model.equilibrium.interface.positions(state.u)
+        contact = model.equilibrium.interface.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
         real, extent = _extent(model, state, position, contact)
@@ -100,7 +100,7 @@ class Ledger:
 
 
 def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
-    """How much of the pad touches, mm or mm2, and the columns that say so, in space those along z too."""
+    """Columns of the widths or areas of contact, mm or mm2, in space those along z too."""
     pressure = state.contact_force[:, 0] / shares(model, position)
     gap = surface_state(model.surface, position).normal_gap
     at = reach(gap, pressure, model.pad.spacing_at(position), model.shear_modulus)
@@ -131,8 +131,8 @@ def _positive(share: Floats) -> Floats:
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
-    size, nodes = model.body.space.size, model.pad.nodes
-    position, withheld = model.equilibrium.positions(state.u), model.equilibrium.interface.withheld(state)
+    size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
+    position, withheld = interface.positions(state.u), interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
     pulled = share if model.attraction is None else _positive(model.attraction.weights(position))

@@ -5,7 +5,7 @@ step out.
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ from evfem.common.pools import blas_limits
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
-from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
+from evfem.errors import NotConverged, Unresolved
 from evfem.newton.control import (
     FollowFriction,
     Force,
@@ -33,7 +33,7 @@ from evfem.newton.control import (
     Unsupported,
     VoltageControl,
 )
-from evfem.newton.hand import Grip, at_rest
+from evfem.newton.hand import HandControl, at_rest
 from evfem.newton.state import State, StepFailed
 from evfem.planning.pathdependence import allowed_error
 from evfem.protocols import Observer, TimeSignal
@@ -50,12 +50,11 @@ from evfem.simulation.checkpoint import (
     state_of,
     usable,
 )
-from evfem.simulation.doubtful import deepest, doubtful, outside, through
-from evfem.simulation.failure import advice, unheld
+from evfem.simulation.doubtful import advice, deepest, doubtful, outside, through, unheld
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
-from evfem.simulation.works import Part
+from evfem.simulation.works import SubstepWork
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
 
@@ -63,6 +62,7 @@ if TYPE_CHECKING:
     from evfem.scene.probes import Probes
 
 #: what is known where a motion starts
+Start = dict[str, float]
 START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
 #: the first part of a run under a voltage that can close nodes one by one: it is raised in such parts
 FIRST_PART = 0.125
@@ -128,7 +128,7 @@ def simulate(
 
 
 def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resume: Saved | None) -> Result:
-    _check_observers(observers)
+    notices.check_observers(observers)
     total = scene.total_steps
     # shown at once, for making the model takes seconds; no trace of it where the scene is refused
     bar = notices.bar(total, "step", len(resume.rows) if resume else 0, progress)
@@ -136,13 +136,13 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
     reasons: list[str] = []
     try:
         run = Run(scene, resume)
-        _tell(observers, "started", run.model.mesh, scene, total)
+        notices.tell_observers(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
         # the dense compliance of a skin in three dimensions has thousands of rows, which pay for threads
         with blas_limits(scene.solver.threads if run.model.mesh.dim == 3 else None):
             for request in run.requests():
                 frame = run.advance(request)
-                reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
+                reasons = notices.tell_observers(observers, "step", run.rows[-1], frame, run.checkpoint)
                 bar.update(1)
                 LOG.debug("step %d of %d", len(run.rows), total)
                 if reasons:
@@ -153,7 +153,7 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
     result = run.result()
     if reasons:
         result.provenance["stopped"] = "; ".join(reasons)
-    _tell(observers, "finished", result)
+    notices.tell_observers(observers, "finished", result)
     return result
 
 
@@ -169,7 +169,7 @@ class Run:
             scene.coupling,
             body=self.model.body,
             allowed=allowed_error(scene),
-            rise=lambda old, new, target: rise(Part(self.model, old, new), target),
+            rise=lambda old, new, target: rise(SubstepWork(self.model, old, new), target),
         )
         if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
@@ -209,7 +209,7 @@ class Run:
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
     def _kept(self, time: float, begin: float) -> KeptCharge | None:
-        """What prescribes the electrode's charge at `time` (s) in a step from `begin`, if anything does."""
+        """Control of the electrode's charge at `time` (s) in a step from `begin`, or None."""
         voltage = self.scene.electrics.voltage
         if isinstance(voltage, ChargeControl):
             return KeptCharge(NANO * voltage.charge_at(time) / eps_0)
@@ -229,24 +229,29 @@ class Run:
             step += motion.steps
             if step <= done:
                 continue
-            start = self._start_of(first)
+            start = self.start_of(first)
             let_go = last.gap is not None and course.gap is None
             if let_go and done <= first and (said := unheld(self.model, self.state, self.rows)):
                 notices.warn(f"motion {index}: {said}")
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
                 begun, reached, steps = motion.part(k)
-                seconds, now = course.seconds(steps, start["indentation"]), self.time
-                begin = self._target(course, start, begun, now)
-                end = self._target(course, start, reached, now + seconds)
-                if first + k == 1 and not self._follows(seconds):
-                    # the voltage acts in full; only a first step in parts raises it on the way
-                    begin = replace(begin, drive=GivenVoltage(0.0))
-                if (kept := self._kept(now + seconds, now)) is not None:
-                    begin, end = (replace(one, drive=kept) for one in (begin, end))
-                path = self._path(begin, end, now, seconds)
+                seconds = course.seconds(steps, start["indentation"])
+                path = self.path(course, start, (begun, reached), seconds)
                 yield Request(first + k, index, motion.kind, path, seconds)
 
-    def _start_of(self, rows_before: int) -> dict[str, float]:
+    def path(self, course: Course, start: Start, shares: tuple[float, float], seconds: float) -> Path:
+        """The path of the next step, between two `shares` (0 to 1) of a motion that began at `start`."""
+        now = self.time
+        begin = self._target(course, start, shares[0], now)
+        end = self._target(course, start, shares[1], now + seconds)
+        if not self.rows and not self._follows(seconds):
+            # the voltage acts in full; only a first step in parts raises it on the way
+            begin = replace(begin, voltage=GivenVoltage(0.0))
+        if (kept := self._kept(now + seconds, now)) is not None:
+            begin, end = (replace(one, voltage=kept) for one in (begin, end))
+        return self._path(begin, end, now, seconds)
+
+    def start_of(self, rows_before: int) -> Start:
         """Where a motion starts: bone, indentation, force, voltage, and whether the finger is loose."""
         start = dict.fromkeys(START, 0.0)
         if rows_before == 0:
@@ -267,7 +272,7 @@ class Run:
                 x, z = x + motion.course.travel[0], z + motion.course.travel[1]
         return {"position": x, "position_z": z}
 
-    def _target(self, course: Course, start: dict[str, float], fraction: float, time: float) -> Target:
+    def _target(self, course: Course, start: Start, fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
 
         def towards(name: str, end: float | None) -> float:
@@ -293,9 +298,9 @@ class Run:
         if isinstance(self.voltage, FollowForce) and course.distance:
             way = course.direction if bone.size == 3 else (1.0,)
             drive = self._following(self.voltage, way, (position, position_z))
-        return Target(position, height, drive, z=along, hand=self._grip)
+        return Target(position, height, drive, z=along, hand=self._hand)
 
-    def _loose(self, course: Course, start: dict[str, float], voltage: float, time: float) -> bool:
+    def _loose(self, course: Course, start: Start, voltage: float, time: float) -> bool:
         """Whether a held force is that of any height: the finger is loose, not attracted at `time` (s)."""
         if isinstance(self.voltage, FollowForce) or course.gap is not None:
             return False
@@ -304,8 +309,8 @@ class Run:
         return bool(start["loose"]) and voltage == 0.0
 
     @property
-    def _grip(self) -> Grip | None:
-        return None if self.scene.hand is None else Grip(self.scene.hand)
+    def _hand(self) -> HandControl | None:
+        return None if self.scene.hand is None else HandControl(self.scene.hand)
 
     @staticmethod
     def _following(
@@ -316,7 +321,7 @@ class Run:
         return FollowFriction(float(wish(along)), wish.largest_voltage, way)
 
     def _path(self, start: Target, end: Target, begin: float, seconds: float) -> Path:
-        """Straight from one target, at time `begin`, to the next, with profile, signal or wished force."""
+        """Linearly from one target, at time `begin`, to the next, with profile, signal or given force."""
 
         def target(done: float, fraction: float) -> Target:
             duration = (fraction - done) * seconds
@@ -331,16 +336,16 @@ class Run:
 
         def drive(x: float, z: float | None, fraction: float) -> VoltageControl:
             wanted = self.scene.electrics.voltage
-            if isinstance(end.drive, KeptCharge):
-                return self._kept(begin + fraction * seconds, begin) or end.drive
-            if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
-                return self._following(wanted, end.drive.way, (x, z))
-            if isinstance(end.drive, GivenGap):
-                gap = start.drive.gap if isinstance(start.drive, GivenGap) else end.drive.gap
-                return GivenGap(gap + fraction * (end.drive.gap - gap))
+            if isinstance(end.voltage, KeptCharge):
+                return self._kept(begin + fraction * seconds, begin) or end.voltage
+            if isinstance(wanted, FollowForce) and isinstance(end.voltage, FollowFriction):
+                return self._following(wanted, end.voltage.way, (x, z))
+            if isinstance(end.voltage, GivenGap):
+                gap = start.voltage.gap if isinstance(start.voltage, GivenGap) else end.voltage.gap
+                return GivenGap(gap + fraction * (end.voltage.gap - gap))
             if self._follows(seconds):
                 return GivenVoltage(self.voltage_at(x, begin + fraction * seconds))
-            first, last = start.drive.voltage, end.drive.voltage
+            first, last = start.voltage.voltage, end.voltage.voltage
             return GivenVoltage(first + fraction * (last - first))
 
         return target
@@ -393,7 +398,7 @@ class Run:
             "barriers": self.stepper.barriers,
             "held": self.stepper.held,
             "unsettled": self.stepper.unsettled,
-            "candidates": int(self.model.equilibrium.reusable().candidates.size),
+            "candidates": int(self.model.equilibrium.body.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",
         }
@@ -412,7 +417,7 @@ class Run:
         """Arrays from which the run can go on after its last converged step."""
         return {
             **state_arrays(self.state),
-            **reusable_arrays(self.state, self.model.equilibrium.reusable()),
+            **reusable_arrays(self.state, self.model.equilibrium.body.reusable()),
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
@@ -423,33 +428,8 @@ class Run:
     def _restore(self, saved: Saved) -> None:
         arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
         self.state = state_of(arrays)
-        self.model.equilibrium.resume(self.state, reusable_of(arrays))
+        self.model.equilibrium.body.resume(self.state, reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)
         self.probed = list(arrays.get(PROBES, ()))
-
-
-def _check_observers(observers: Sequence[Observer]) -> None:
-    """Raise InputError for an object that would be told of nothing."""
-    for i, observer in enumerate(observers):
-        if not any(hasattr(observer, event) for event in ("started", "step", "finished")):
-            allowed = "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint) "
-            allowed += "or finished(result)"
-            raise InputError(f"observers[{i}]", quoted(observer), allowed)
-
-
-def _tell(observers: Sequence[Observer], event: str, *arguments: Any) -> list[str]:
-    """Tell every observer; the reasons of those who want the run to end."""
-    reasons = []
-    for observer in observers:
-        method: Callable[..., None] | None = getattr(observer, event, None)
-        if method is None:
-            continue
-        try:
-            method(*arguments)
-        except StopRun as stop:
-            if event != "step":
-                raise
-            reasons.append(str(stop) or type(observer).__name__)
-    return reasons

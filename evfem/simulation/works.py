@@ -114,7 +114,7 @@ def _along(ends: tuple[float, ...]) -> tuple[Floats, Floats]:
 #: thin insulator's nodes are thinner than their ways by orders
 WAY, SHARE = _along((0.0, 1.0))
 FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, *np.linspace(1 / 8, 7 / 8, 7), 15 / 16, 63 / 64, 1.0))
-#: the places see an integrand whose highest Legendre coefficients are below this share of the largest
+#: an integrand is resolved if its highest Legendre coefficients are below this fraction of the largest
 SEEN = 1e-3
 #: its two ends
 ENDS = np.array([0.0, 1.0])
@@ -142,7 +142,7 @@ class Books:
 
 
 def tells_source(model: Model) -> bool:
-    """Whether the source's work is told: under a voltage resolved in time and Strong and Troxel's law."""
+    """Whether the source's work is computed: for a voltage resolved in time and Strong and Troxel's law."""
     attraction = model.attraction
     if attraction is None or attraction.charging is None:
         return False
@@ -156,7 +156,7 @@ def unloaded(state: State) -> State:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class SubstepWork:
     """One accepted part of a run of `model`, from `old` to `new`."""
 
     model: Model
@@ -202,7 +202,7 @@ class Part:
         return dict(zip(SUMS, added, strict=True))
 
     def _turned(self) -> float:
-        """What the bone gives beyond the trapezoid where nodes begin to slip: their shear force changes while
+        """Work of the bone beyond the trapezoid where nodes begin to slip: their shear force changes while
         they stick, and stays while they slip.
         """
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
@@ -267,7 +267,7 @@ class Part:
             charging.begin(begin, seconds)
 
     def _flow(self) -> Flow:
-        """What the source gave, and what leaked; the first voltage is raised before anything moves."""
+        """Work of the source and leakage; the first voltage is raised before anything moves."""
         attraction, new = self.model.attraction, self.new
         assert attraction is not None
         assert attraction.charging is not None
@@ -371,7 +371,7 @@ class Part:
     def _contact(self) -> float:
         """Trapezoidal work of the contact forces, N mm per mm of depth."""
         equilibrium = self.model.equilibrium
-        before, after = (equilibrium.contact_forces(state) for state in (self.old, self.new))
+        before, after = (equilibrium.interface.contact_forces(state) for state in (self.old, self.new))
         return _mean_work(before, after, (self.new.u - self.old.u)[self.model.pad.nodes])
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:

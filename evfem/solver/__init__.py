@@ -91,9 +91,9 @@ safeguard                              scenes  without it
 friction's growth in the compliance    8       iterations x12.6, factorisations x51
 turning contact forces (`follower`)    23      iterations x2.2, factorisations x4.6
 attraction scaled to what is held      8       iterations x1.9, factorisations x3.8
-gain between rough faces limited       49      4 scenes do not end (`linearisation.steadied`)
+gain between rough faces limited       49      4 scenes do not end (`linearisation.limited_gain`)
 bracketed friction (contact.slipping)   12      iterations x1.2, factorisations x1.5
-pins at jumps of friction              1       1 scene does not end (`interface.Pins`)
+pins at jumps of friction              1       1 scene does not end (`interface.FrictionJumps`)
 release (`relaxation`)                 2       1 scene does not end
 longer parts after a release           4       iterations x2.2 (`stepping`)
 bone's travel limited (`travel`)       9       factorisations x1.3; of bodies in the air x1.3

@@ -21,22 +21,21 @@ from evfem.common.constants import PATH_CHANGE, PATH_SAFETY, SMALLEST_FORCE
 from evfem.newton.state import State
 
 
-def apart(once: State, twice: State) -> float:
-    """Relative difference between the ends of one substep and of two halves."""
+def relative_difference(once: State, twice: State) -> float:
+    """Relative difference between the ends of one substep and of its two halves."""
     forces = np.abs(once.reaction - twice.reaction).max()
     places = np.abs(once.bone - twice.bone).max()
     moved = np.abs(twice.bone).max()
-    share = forces / max(np.abs(twice.reaction).max(), SMALLEST_FORCE)
-    return float(max(share, places / moved if places > 0.0 else 0.0))
+    relative = forces / max(np.abs(twice.reaction).max(), SMALLEST_FORCE)
+    return float(max(relative, places / moved if places > 0.0 else 0.0))
 
 
-def longer(share: float) -> float:
-    """The factor by which the next part may be longer, or this one must be shorter, whose error is
-    this share of what is allowed.
+def length_factor(error: float) -> float:
+    """Length of the next part relative to one whose error is this fraction of the allowed one.
 
-    >>> longer(0.0), round(longer(1.0), 3), longer(1e6)
+    >>> length_factor(0.0), round(length_factor(1.0), 3), length_factor(1e6)
     (4.0, 0.9, 0.25)
     """
-    if share <= PATH_SAFETY**2 / PATH_CHANGE**2:
+    if error <= PATH_SAFETY**2 / PATH_CHANGE**2:
         return PATH_CHANGE
-    return max(PATH_SAFETY / float(np.sqrt(share)), 1.0 / PATH_CHANGE)
+    return max(PATH_SAFETY / float(np.sqrt(error)), 1.0 / PATH_CHANGE)

@@ -89,45 +89,45 @@ class Relaxation:
 
     def _follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
         end, held = target, self._held(state, target)
-        pace, begin = Pace(), state.u + self._imperfection
+        drag, begin = DragSchedule(), state.u + self._imperfection
         for _ in range(DRAG_STEPS):
-            new = self._dragged(state, held, begin, pace)
+            new = self._dragged(state, held, begin, drag)
             if new is None:
                 continue
             accept(state, new)
             if held.duration > 0.0:
                 held, end = (_at_once(new.bone, each) for each in (held, end))
             _refuse_flight(new, held)
-            pace.went(float(np.abs(new.u - state.u).max()))
+            drag.moved(float(np.abs(new.u - state.u).max()))
             state, begin = new, new.u
-            if pace.calm:
+            if drag.calm:
                 rest = self._rest(state, end)
                 if rest is not None:
                     accept(state, rest)
                     return rest
-                pace.not_at_rest()
-            pace.choose()
-            if pace.rate < DRAG_LEAST:
+                drag.not_at_rest()
+            drag.choose()
+            if drag.rate < DRAG_LEAST:
                 break
         raise StepFailed("the released finger does not come to rest", [])
 
     def _held(self, state: State, target: Target) -> Target:
         """The loads of the steps with drag: a snap takes no time, but where hand or charge have their own."""
-        if target.drive.follows:
-            target = replace(target, drive=GivenVoltage(state.voltage))
+        if target.voltage.follows:
+            target = replace(target, voltage=GivenVoltage(state.voltage))
         timed = self.charged or (target.hand is not None and target.hand.hand.timed)
         return target if timed else replace(target, duration=0.0)
 
-    def _dragged(self, state: State, target: Target, begin: Floats, pace: Pace) -> State | None:
+    def _dragged(self, state: State, target: Target, begin: Floats, drag: DragSchedule) -> State | None:
         """The equilibrium with drag that holds the body at `begin` (N, dim); None, and slower, if failed."""
-        self.body.release(begin, pace.rate)
+        self.body.release(begin, drag.rate)
         try:
             return self.solve(state, target)
         except Folded:
             raise
         except StepFailed:
-            pace.failed()
-            if pace.rate > DRAG_MOST:
+            drag.failed()
+            if drag.rate > DRAG_MOST:
                 raise
             return None
 
@@ -170,15 +170,15 @@ def pull(state: State, target: Target) -> float:
 
 
 @dataclass
-class Pace:
-    """How a release goes on: the `rate` of drag of the next step, the factor by which it rises if that
-    fails, the last step's `speed` (mm) and its `growth` over the step before. At rates below `quiet` the
-    body may be at rest without drag.
+class DragSchedule:
+    """Drag of a release: the `rate` of the next step, the factor `slower` by which it rises if that fails,
+    the last step's `speed` (mm) and its `growth` over the step before. At rates below `quiet` an equilibrium
+    without drag is sought.
 
-    >>> pace = Pace()
-    >>> pace.went(0.5), pace.choose(), pace.went(0.25), pace.rate, pace.growth
+    >>> drag = DragSchedule()
+    >>> drag.moved(0.5), drag.choose(), drag.moved(0.25), drag.rate, drag.growth
     (None, None, None, 0.5, 0.25)
-    >>> pace.failed(), pace.rate, pace.failed(), pace.rate
+    >>> drag.failed(), drag.rate, drag.failed(), drag.rate
     (None, 1.0, None, 4.0)
     """
 
@@ -192,9 +192,9 @@ class Pace:
         """A step failed: the next one is slower."""
         self.rate, self.slower = self.slower * self.rate, DRAG_CHANGE * self.slower
 
-    def went(self, way: float) -> None:
-        """A step went so far (mm)."""
-        before, self.speed, self.slower = self.speed, self.rate * way, DRAG_CHANGE
+    def moved(self, distance: float) -> None:
+        """A step moved the body by a distance (mm)."""
+        before, self.speed, self.slower = self.speed, self.rate * distance, DRAG_CHANGE
         self.growth = self.speed / max(before, TINY)
         if self.growth > 1.0:
             self.quiet = DRAG_REST

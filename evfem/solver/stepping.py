@@ -35,12 +35,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
-from evfem.newton.control import Met, Target
+from evfem.newton.control import ConstrainedVoltage, Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.newton.strategy import stuck
 from evfem.solver.hold import Hold
-from evfem.solver.path import apart, longer
+from evfem.solver.path import length_factor, relative_difference
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.tissue.body import Body
 
@@ -48,17 +48,17 @@ from evfem.tissue.body import Body
 BARRIER = "the equilibrium that was found lies behind a barrier, which the finger would not climb"
 #: a climb that is rounding, as a share of the stored energy
 CLIMB = 1e-3
-#: from the fraction of the way that is done (0 to 1) and the next one to the target there
+#: from the fraction of a step that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
 #: steps that were solved one after the other: their targets and ends
-Parts = list[tuple[Target, State]]
+Solved = list[tuple[Target, State]]
 
 
 class Accounts(Protocol):
-    """Receives every accepted part: the bookkeeping of works and energies."""
+    """Receives every accepted substep: the bookkeeping of works and energies."""
 
     def accept(self, old: State, new: State) -> object:
-        """A part was accepted, from `old` to `new`; says whether stability was lost in it."""
+        """A substep from `old` to `new` was accepted; returns whether stability was lost in it."""
 
     def mark(self) -> Any:
         """Present state of the accounts."""
@@ -68,8 +68,8 @@ class Accounts(Protocol):
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part of a step, from `begin` to `end` (0 to 1), and the target there."""
+class Substep:
+    """A fraction of a step, from `begin` to `end` (0 to 1), and the target there."""
 
     begin: float
     end: float
@@ -78,9 +78,8 @@ class Part:
 
 @dataclass
 class Release:
-    """Below which part of the present step the body is released, and the part that worked last; and
-    whether a part from the present state failed because the body gives way the more, the more it is
-    loaded: shorter ones may fail otherwise.
+    """`least`: substep length below which the body is released; `trusted`: length that worked last;
+    `unstable`: a substep from the present state failed because the tangent was not positive definite.
     """
 
     least: float
@@ -132,7 +131,7 @@ class Stepper:
             try:
                 parts, error = self._part(state, path, done, fraction)
             except StepFailed as failed:
-                part = Part(done, fraction, path(done, fraction))
+                part = Substep(done, fraction, path(done, fraction))
                 rest = self._shortened(state, part, accounts, failed)
                 if rest is not None:
                     state, done, substeps = rest, fraction, substeps + 1
@@ -152,7 +151,7 @@ class Stepper:
             done = fraction
         return state, substeps
 
-    def _shortened(self, state: State, part: Part, accounts: Accounts, failed: StepFailed) -> State | None:
+    def _shortened(self, state: State, part: Substep, accounts: Accounts, failed: StepFailed) -> State | None:
         """Halve the part that failed, or release the body at one that is short enough: its rest is
         returned, and the part that worked before is tried next. Raises `failed` at the smallest part
         of what was left of the step, or `LiftedOff`.
@@ -186,17 +185,17 @@ class Stepper:
         if self.allowed is None or error <= self.allowed or part <= least + 1e-12:
             self.path_error = max(self.path_error, error)
             return True
-        self.substep = max(longer(error / self.allowed) * part, least)
+        self.substep = max(length_factor(error / self.allowed) * part, least)
         return False
 
     def _set_length(self, error: float, part: float) -> None:
         """The next part's length; a part shortened to hit the end of a step does not shorten it."""
         assert self.allowed is not None
         cut = part < (1.0 - 1e-9) * self.substep
-        wanted = max(longer(error / self.allowed) * part, self.equilibrium.strategy.smallest_part)
+        wanted = max(length_factor(error / self.allowed) * part, self.equilibrium.strategy.smallest_part)
         self.substep = min(1.0, max(wanted, self.substep) if cut else wanted)
 
-    def _part(self, state: State, path: Path, done: float, fraction: float) -> tuple[Parts, float]:
+    def _part(self, state: State, path: Path, done: float, fraction: float) -> tuple[Solved, float]:
         """The equilibria of a part to accept, and the error of its path: two halves where that is limited."""
         whole = path(done, fraction)
         if self.allowed is None:
@@ -205,7 +204,7 @@ class Stepper:
         first, second = path(done, middle), path(middle, fraction)
         half = self.solve(state, first)
         end = self.solve(half, second)
-        return [(first, half), (second, end)], apart(self.solve(state, whole, start=end), end)
+        return [(first, half), (second, end)], relative_difference(self.solve(state, whole, start=end), end)
 
     def _restart(self, old: State, target: Target) -> None:
         """Start the clocks from `old` to `target` again: others were tried, works are booked by the last."""
@@ -290,7 +289,7 @@ class Stepper:
         attraction = self.equilibrium.attraction
         if self.rise is None or attraction is None or not attraction.acts(new.voltage):
             return False
-        return not (target.drive.free or target.drive.follows) and self.rise(old, new, target) > CLIMB
+        return not (target.voltage.free or target.voltage.follows) and self.rise(old, new, target) > CLIMB
 
     def _found(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium with the coupling asked for; where charges move, they follow."""
@@ -325,13 +324,13 @@ class Stepper:
 
     def _frozen(self, old: State, state: State, target: Target) -> tuple[Target, Floats]:
         """The target with the voltage that it takes in `state`, and the attraction (P, dim) there."""
-        if isinstance(target.drive, Met):
-            target = replace(target, drive=self.equilibrium.held(old, state, target))
-        return target, self.equilibrium.attraction_at(old, state, target.drive.voltage)
+        if isinstance(target.voltage, ConstrainedVoltage):
+            target = replace(target, voltage=self.equilibrium.held(old, state, target))
+        return target, self.equilibrium.attraction_at(old, state, target.voltage.voltage)
 
     def _charged(self, old: State, new: State, target: Target) -> State:
         """The new state with the voltage that its own place takes."""
-        met = isinstance(target.drive, Met)
+        met = isinstance(target.voltage, ConstrainedVoltage)
         return replace(new, voltage=self.equilibrium.held(old, new, target).voltage) if met else new
 
     @property

@@ -167,7 +167,7 @@ KINDS = NamedFriction.kinds
 
 
 def with_core(pressure: Floats, withheld: Values, left: Values) -> Floats:
-    """What a core withholds of the pressure (MPa) of nodes under so much, all from the share `FULL` on."""
+    """Pressure (MPa) that a core takes from nodes under `pressure`; all of it from the fraction `FULL` on."""
     return np.asarray(withheld * np.clip(pressure / (FULL * np.asarray(left)), 0.0, 1.0))
 
 
@@ -179,7 +179,7 @@ def _at_least(value: Values, least: float) -> Any:
 
 @dataclass(frozen=True)
 class Slipping:
-    """k nodes as a law sees them: contact forces (k,) in N/mm, tributary lengths (k,) in mm,
+    """Arguments of a law at k nodes: contact forces (k,) in N/mm, tributary lengths (k,) in mm,
     coefficients of the surface (k,), speeds (k,) in mm/s and ages (k,) in s. Of the pressure that a core
     of the attraction withholds (`Attraction.restored`), `withheld` and `left` (k,) in MPa.
     """

@@ -69,7 +69,7 @@ Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None",
 
 
 class RigidSurface(OneWay, Checked):
-    """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`, `insulator`."""
+    """Base of surfaces; subclasses are frozen dataclasses with the fields `friction`, `y`, `insulator`."""
 
     friction: float | Rows | FrictionMap
     y: float | None

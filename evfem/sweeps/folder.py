@@ -124,10 +124,12 @@ class SweepFolder:
                 return answer
         return None
 
-    def write_table(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
+    def write_table(
+        self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]
+    ) -> None:
         """The table of all points so far."""
         with self._manifest.writing(self.path / TABLE):
-            write_text(self.path / TABLE, sweep_csv(columns, rows))
+            write_text(self.path / TABLE, sweep_csv(columns, rows, units))
         if find_spec("pyarrow") is not None:
             file = self.path / PARQUET
             with self._manifest.writing(file), replacing(file) as temporary:
@@ -157,16 +159,18 @@ def _sound(answer: Answer) -> bool:
     )
 
 
-def sweep_csv(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> str:
-    """The table of a sweep as csv: lists and truth values as in JSON.
+def sweep_csv(columns: Sequence[str], rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> str:
+    """The table of a sweep as csv, with units behind the names: lists and truth values as in JSON.
 
-    >>> sweep_csv(["point", "status"], [{"point": 0, "status": "done"}])
-    'point,status\\n0,done\\n'
+    >>> sweep_csv(["point", "motion.0.gap"], [{"point": 0, "motion.0.gap": 0.5}], {"motion.0.gap": "mm"})
+    'point,motion.0.gap (mm)\\n0,0.5\\n'
     """
-    return csv_text([columns, *([_cell(row.get(name)) for name in columns] for row in rows)])
+    heads = [f"{name} ({units[name]})" if units.get(name) else name for name in columns]
+    return csv_text([heads, *([cell_of(row.get(name)) for name in columns] for row in rows)])
 
 
-def _cell(value: Any) -> Any:
+def cell_of(value: Any) -> Any:
+    """A value as it stands in the table."""
     return json.dumps(value) if isinstance(value, (list, bool)) else value
 
 
@@ -177,7 +181,7 @@ def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Mapping[st
     for name, column in values.items():
         kinds = {type(value) for value in column if value is not None}
         if not (kinds <= {int, float} or len(kinds) == 1) or list in kinds:  # numbers beside tables, say
-            values[name] = [None if value is None else str(_cell(value)) for value in column]
+            values[name] = [None if value is None else str(cell_of(value)) for value in column]
         elif float in kinds or not kinds:
             values[name] = [None if value is None else float(value) for value in column]
     parquet.write_table(table(values), path)

@@ -6,9 +6,8 @@ import math
 import sys
 import time as clock
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,102 +18,19 @@ from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.notices import LOG
 from evfem.common.pools import Died, Pool, open_pool
-from evfem.common.storage import alone_in, write_text
-from evfem.common.tables import frame
-from evfem.errors import InputError, NotConverged, quoted, readable, unknown
-from evfem.finger.fingerpad import MeshedFinger
-from evfem.finger.fingertip import Fingertip
+from evfem.common.storage import alone_in
+from evfem.errors import InputError, NotConverged
 from evfem.scene.file import loads
-from evfem.scene.scene import Scene
-from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS
 from evfem.simulation.provenance import origin
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
-from evfem.sweeps.folder import STATUS, Answer, SweepFolder, sweep_csv
-
-Units = Mapping[str, str]
-#: what a plane finger with a depth has of the columns in three dimensions
-AREAS = ("contact_area", "real_contact_area")
-OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name]["unit"] for name in AREAS}}
-
-
-def units_of(scene: Scene) -> Units:
-    """Unit of each column of which a sweep of such scenes can have outputs.
-
-    >>> from evfem.scene.scene import default_scene
-    >>> units_of(default_scene())["normal_force"]
-    'N/mm'
-    """
-    finger = scene.finger
-    if isinstance(finger, Fingertip) or (isinstance(finger, MeshedFinger) and finger.mesh().dim == 3):
-        return SPATIAL_UNITS
-    return UNITS if scene.depth is None else OVER_DEPTH
-
-
-def table_units(
-    outputs: Sequence[str], parameters: Sequence[str], found: Collection[Units]
-) -> dict[str, str]:
-    """Unit of each output, and of forces among the parameters, where `found` are the units of the
-    scenes, each kind once.
-
-    Raises InputError for an output that not every scene has, or whose unit is not that of all.
-
-    >>> table_units(["normal_force.last"], ["motion.0.force"], [OVER_DEPTH])
-    {'normal_force.last': 'N', 'motion.0.force': 'N/mm'}
-    >>> table_units(["contact_area.last"], [], [UNITS])
-    Traceback (most recent call last):
-    evfem.errors.InputError: outputs: given "contact_area.last" of a finger without it; allowed: \
-areas where every finger has a depth or is one in three dimensions
-    """
-    units = {}
-    for output in outputs:
-        kinds = {one.get(output.split(".")[0]) for one in found}
-        if None in kinds:
-            allowed = "areas where every finger has a depth or is one in three dimensions"
-            raise InputError("outputs", f"{quoted(output)} of a finger without it", allowed)
-        if len(kinds) > 1:
-            given = f"{output} in {' and '.join(sorted(map(str, kinds)))}"
-            raise InputError("finger.depth", given, "a depth for every finger in the plane, or for none")
-        units[output] = str(kinds.pop())
-    force = "N" if SPATIAL_UNITS in found else "N/mm"
-    return units | {key: force for key in parameters if key.endswith(".force")}
-
+from evfem.sweeps.folder import STATUS, Answer, SweepFolder
+from evfem.sweeps.table import SweepResult, Units, table_units, units_of
 
 #: the table is written anew after so many seconds
 EVERY = 5.0
 Job = tuple[str, str, tuple[str, ...]]  # scene as text, folder of its paths, outputs
-
-
-@dataclass(frozen=True, eq=False)
-class SweepResult:
-    """The table of a sweep: `rows` in the order of the points, keys `columns`, and provenance."""
-
-    columns: tuple[str, ...]
-    rows: list[dict[str, Any]]
-    provenance: dict[str, Any]
-    units: Mapping[str, str] = field(default_factory=dict)
-
-    def __getitem__(self, column: str) -> Any:
-        """A column (points,): numbers as an array, NaN where there is none, else a list."""
-        if column not in self.columns:
-            raise unknown("column", str(column), self.columns, readable(column))
-        values = [row[column] for row in self.rows]
-        if all(value is None or type(value) in (int, float) for value in values):
-            return np.array([math.nan if value is None else value for value in values])
-        return values
-
-    def table(self) -> Any:
-        """A row for each point: a `pandas.DataFrame`, without pandas a numpy record array."""
-        return frame({name: self[name] for name in self.columns})
-
-    def to_csv(self, path: str | Path) -> None:
-        """Write the table as `evfem sweep` does (`sweep.csv`), whole or not at all."""
-        write_text(path, sweep_csv(self.columns, self.rows))
-
-    def __repr__(self) -> str:
-        """Numbers of points by status."""
-        return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
 
 
 def sweep(
@@ -272,7 +188,7 @@ class _Run:
     def _write(self) -> None:
         assert self.folder is not None
         result = self.result()
-        self.folder.write_table(result.columns, result.rows)
+        self.folder.write_table(result.columns, result.rows, result.units)
         self.folder.write_provenance(result.provenance)
         self.written = clock.perf_counter()
 
@@ -408,14 +324,3 @@ class _Progress:
     def close(self) -> None:
         """No more to come."""
         self.bar.close()
-
-
-def told(points: Mapping[str, int]) -> str:
-    """What became of the points, in words.
-
-    >>> told({"requested": 3, "done": 2, "refused": 0, "not_converged": 1, "failed": 0})
-    '2 done, 1 not converged'
-    """
-    words = [f"{points[name]} {name.replace('_', ' ')}" for name in STATUS if points[name]]
-    missing = points["requested"] - sum(points[name] for name in STATUS)
-    return ", ".join([*words, *([f"{missing} not computed"] if missing else [])])

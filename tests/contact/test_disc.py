@@ -232,18 +232,6 @@ def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
     assert_allclose(found.attraction_drop[::3], [0.025, -0.3], atol=1e-12)
 
 
-def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_are_held():
-    """The plane's example: closed, node 0 holds its neighbour at 30 (0.1 - 0.09^2 / 0.1) = 0.57, but lets
-    go; two open nodes have 30 (0.1 + 0.09) = 5.7 and move, scaled to 0.9, ten times their way of 0.02.
-    """
-    compliance = np.kron([[0.1, 0.09], [0.09, 0.1]], np.diag([1.0, 0.0, 0.0])) + np.diag(2 * [0.0, 0.1, 0.1])
-    problem = ContactProblem(np.array(2 * [1.02, 0.0, 0.0]), compliance, np.zeros(2))
-    pull = AttractionStiffness(np.full(2, 30.0), np.ones(2), np.zeros(2))
-    found = solve_with_attraction(problem, pull, np.array([STICK, OPEN]), np.zeros(6))
-    assert found.reduced
-    assert_allclose(found.state[::3], 1.0 + 0.02 / (1.0 - 0.9), rtol=1e-12)
-
-
 def test_what_has_no_solution_is_said_not_to_be_solved():
     """A body that gives way the more, the more it is pressed."""
     with pytest.raises(ContactNotSolved, match="1 of 1 nodes keep changing"):

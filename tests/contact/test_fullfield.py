@@ -127,8 +127,8 @@ def test_what_is_behind_an_overhang_has_no_column():
     pad, points = arc(4, 3.0, 2.0, quadratic=False)
     _, full = attractions(pad, points, ev.Display(y=-0.1))
     points[5] = points[4] + [-0.1, 0.3]
-    assert full.seen(points).shape == (8, 9)
-    assert 5 not in full.seen(points).indices
+    assert full.visible(points).shape == (8, 9)
+    assert 5 not in full.visible(points).indices
     assert full.forces(points, 1.0, None)[5] == pytest.approx([0.0, 0.0])
 
 
@@ -147,7 +147,7 @@ def test_a_capacitance_outside_its_bounds_is_an_error(monkeypatch, beyond):
     pad, points = arc(4, 3.0, 2.0)
     points[:, 1] += 0.1
     _, full = attractions(pad, points, ev.Display(y=0.0))
-    bounds = full.bounds(*full.outline(points, full.seen(points)))
+    bounds = full.bounds(*full.outline(points, full.visible(points)))
     edge = bounds.lower if beyond < 0.0 else bounds.upper
     found = SimpleNamespace(value=edge * (1.0 + 0.01 * beyond))
     monkeypatch.setattr(type(full), "solve", lambda *_: found)
@@ -361,7 +361,7 @@ def test_bounds_know_how_uneven_the_display_is():
     surface = ev.Sinusoid(terms=[[0.05, 8.0, 0.3]], insulator=ev.Layer(0.02, 4.0), y=0.0)
     points[:, 1] = surface.height(points[:, 0]) + 0.01 + 0.1 * points[:, 0] ** 2
     _, full = attractions(pad, points, surface, 0.0)
-    bounds = full.bounds(*full.outline(points, full.seen(points)))
+    bounds = full.bounds(*full.outline(points, full.visible(points)))
     value = full.solve(points).value
     assert bounds.lower < value < bounds.upper
     flat = certificate(

@@ -11,7 +11,7 @@ import evfem as ev
 from evfem.common.constants import CHANGES, PIN_OFFSET
 from evfem.contact.attraction import Attraction
 from evfem.errors import InputError
-from evfem.newton.interface import Pins
+from evfem.newton.interface import FrictionJumps
 from evfem.surface.pad import surface_state
 from evfem.surface.surfaces import EQUATION_25
 
@@ -179,7 +179,7 @@ def test_a_node_that_comes_to_a_jump_askew_is_pinned_where_its_way_crosses_it():
     """From (-0.1, 0) towards (0.3, 0.8): it meets x = 0 at z = 0.2, a hair inside the rougher side."""
     steps = ev.Flat(friction=[[-9.0, 0.2], [0.0, 0.2], [0.0, 0.6]]).friction_steps(0.0)
     begin, beyond = np.array([[-0.1, 0.0]]), np.array([[0.3, 0.8]])
-    pins = Pins(steps, begin)
+    pins = FrictionJumps(steps, begin)
     for k in range(CHANGES):
         pins.watch(beyond if k % 2 == 0 else begin, np.array([True]))
     assert pins.held.all()

@@ -172,18 +172,3 @@ def test_a_scene_file_says_it_and_a_dumped_one_too(text, law):
     assert scene.roughness_gap == law
     assert loads(dump(scene)) == scene
     assert "rough faces" in next(term.reason for term in plan(scene).terms if term.name == "electricity")
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("roughness_gap = -0.1", "electrostatics.roughness_gap: given -0.1; allowed: a length in mm"),
-        ('roughness_gap = {law = "linear"}', "constant | power | exponential"),
-        ('roughness_gap = {law = "power", gap = 0.1}', "electrostatics.roughness_gap.pressure"),
-        ('roughness_gap = {law = "constant", gap = 5.0}', "electrostatics.roughness_gap.gap: given 5"),
-    ],
-)
-def test_mistakes_in_a_file_are_one_sentence(text, said):
-    with pytest.raises(InputError) as caught:
-        loads(TABLE.replace("ROUGH", text))
-    assert said in str(caught.value)

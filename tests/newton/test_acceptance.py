@@ -112,7 +112,7 @@ def test_a_voltage_that_is_kept_needs_a_pad_that_sticks():
         if state is good:
             assert equilibrium.step(old, target) is good
         else:
-            with pytest.raises(StepFailed, match="wished friction force"):
+            with pytest.raises(StepFailed, match="prescribed friction force"):
                 equilibrium.step(old, target)
 
 
@@ -170,7 +170,7 @@ def test_a_node_that_sticks_again_yields_and_slips_in_series():
     old = replace(old, age=nothing, contact_force=before)
     before[k, 1] = shear + interface.candidates(old, new, every, nothing, nothing).slip[k, 0] / give
     interface.law, interface.duration, steep = law, 2e-3, 0.7 / give
-    interface._returned.nodes[k], interface._returned._slope[k] = True, steep * interface.duration
+    interface._oscillating.nodes[k], interface._oscillating._slope[k] = True, steep * interface.duration
     found = interface.candidates(old, new, every, nothing, nothing)
     rest = float(law.bound(normal / length, MU, 0.0, 0.0)) * length
     growth, way = found.slip_stiffness[k], -np.sign(shear)

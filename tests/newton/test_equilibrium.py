@@ -78,7 +78,7 @@ def test_one_iteration_of_the_whole_step_leaves_a_quadratic_rest(options, move):
     state = equilibrium.step(state, Target.held(state.bone + 1e-2 * np.array(move) * [1.0, -1.0], voltage))
     rest = []
     for size in (2e-3, 5e-4):
-        equilibrium.body.linearisation.forget()
+        equilibrium.body.linearisation.discard()
         equilibrium.step(
             replace(state, last_increment=0.0 * state.last_increment),
             Target.held(state.bone + size * np.array(move) * [1.0, -1.0], voltage),
@@ -173,7 +173,7 @@ def test_frozen_attraction_is_used_as_given():
     frozen[:, 1] = -1e-4
     held = model.equilibrium.step(state, target, frozen)
     np.testing.assert_array_equal(held.attraction, frozen)
-    total = held.reaction + model.equilibrium.contact_forces(held).sum(axis=0) + frozen.sum(axis=0)
+    total = held.reaction + model.equilibrium.interface.contact_forces(held).sum(axis=0) + frozen.sum(axis=0)
     assert np.abs(total).max() < 1e-8 * np.abs(held.reaction).max()
 
 

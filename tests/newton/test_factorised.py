@@ -54,12 +54,12 @@ def test_a_prescribed_force_counts_like_the_forces_of_the_nodes(pressed, missing
 @pytest.mark.parametrize("missing", [0.01, -0.01])
 def test_a_wished_friction_force_counts_while_the_voltage_is_free(pressed, missing):
     reaction = pressed[1].reaction
-    drive = FollowFriction(float(reaction[0] + missing), 2000.0)
-    drive.begin(pressed[1])
-    assert residual(pressed, drive=drive) == pytest.approx(0.01 / np.abs(reaction).max(), rel=1e-5)
-    drive.begin(replace(pressed[1], voltage=0.0))  # at its lower bound
-    assert residual(pressed, drive=drive) < 1e-8
-    assert residual(pressed, drive=GivenVoltage(5.0)) < 1e-8
+    control = FollowFriction(float(reaction[0] + missing), 2000.0)
+    control.begin(pressed[1])
+    assert residual(pressed, voltage=control) == pytest.approx(0.01 / np.abs(reaction).max(), rel=1e-5)
+    control.begin(replace(pressed[1], voltage=0.0))  # at its lower bound
+    assert residual(pressed, voltage=control) < 1e-8
+    assert residual(pressed, voltage=GivenVoltage(5.0)) < 1e-8
 
 
 def test_forces_that_add_up_count_by_their_sum(pressed):

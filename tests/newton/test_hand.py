@@ -10,7 +10,7 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.errors import InputError
-from evfem.newton.hand import Grip
+from evfem.newton.hand import HandControl
 from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
 
@@ -189,7 +189,7 @@ def test_what_a_hand_lacks_beyond_its_rounding_is_nothing_at_the_nearest_place_a
     """
     rng, k, m, dt = np.random.default_rng(3), Fraction(K), Fraction(M), Fraction(1e-7)
     for x0, v0, R in rng.uniform([1.0, -90.0, -1.0], [2.0, 90.0, 1.0], (50, 3)).tolist():
-        grip = Grip(ev.Hand(K, 0.0, M), 1.5, 1e-7, (1.5, x0, v0))
+        grip = HandControl(ev.Hand(K, 0.0, M), 1.5, 1e-7, (1.5, x0, v0))
         rate = m / dt**2
         exact = (k * Fraction(1.5) + rate * (Fraction(x0) + Fraction(v0) * dt) - Fraction(R)) / (k + rate)
         x, reaction = float(exact), np.array([R, 0.0])

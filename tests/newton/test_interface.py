@@ -9,7 +9,7 @@ from tools.meshes import block
 
 from evfem.common.constants import CHANGES, PIN_OFFSET
 from evfem.contact.signorini import OPEN, STICK
-from evfem.newton.interface import Pins
+from evfem.newton.interface import FrictionJumps
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
@@ -35,13 +35,13 @@ jumps = pytest.mark.parametrize("table", JUMPS.values(), ids=JUMPS.keys())
 
 
 def crossing(table, times, smoother=True):
-    """Pins of three nodes: one crosses the jump so many times, one does so in the air, one stays
+    """FrictionJumps of three nodes: one crosses the jump so many times, one does so in the air, one stays
     away; the first two begin on the smoother side of it, or on the other one.
     """
     surface = Flat(friction=table)
     touching = np.array([True, False, True])
     begin, beyond = (0.2, 0.4) if (table[-1][1] == 0.6) == smoother else (0.4, 0.2)
-    pins = Pins(surface.friction_steps(0.0), np.array([[begin], [begin], [-1.0]]))
+    pins = FrictionJumps(surface.friction_steps(0.0), np.array([[begin], [begin], [-1.0]]))
     for k in range(times):
         x = beyond if k % 2 == 0 else begin
         pins.watch(np.array([[x], [x], [-1.0]]), touching)
@@ -83,7 +83,7 @@ def test_contact_takes_a_pinned_node_at_its_jump(table):
     x = interface.positions(old.u)[:, 0]
     node = int(np.argmin(np.abs(x - 0.3)))
     place = 0.3 + (PIN_OFFSET if table[-1][1] == 0.6 else -PIN_OFFSET)
-    interface.pins.place[node], interface.pins.lower[node] = place, 0.2
+    interface.jumps.place[node], interface.jumps.lower[node] = place, 0.2
     u = old.u.copy()
     u[interface.pad.nodes, 0] = 0.25
     c, nothing = np.arange(x.size), np.zeros(x.size)
@@ -101,7 +101,7 @@ def test_contact_takes_a_pinned_node_at_its_jump(table):
     for shear, obeyed in ((-2.5, True), (3.5, False), (0.5, False)):
         force[node] = [5.0, shear]
         assert interface.obeyed(old, replace(old, u=u, status=status, contact_force=force)) == obeyed
-    assert not interface.pins.held.any()
+    assert not interface.jumps.held.any()
 
 
 @jumps
@@ -116,7 +116,7 @@ def test_a_pinned_node_does_not_yield_to_where_nothing_holds_it(table, shear, ob
     position, rougher = interface.positions(old.u), 1.0 if table[-1][1] == 0.6 else -1.0
     node = int(np.argmin(np.abs(position[:, 0] - 0.3)))
     place, force = 0.3 + rougher * PIN_OFFSET, np.array([5.0, rougher * shear])
-    interface.pins.place[node], interface.pins.lower[node] = place, 0.2
+    interface.jumps.place[node], interface.jumps.lower[node] = place, 0.2
     give = interface.compliance(old)[node]
     u, every = old.u.copy(), np.zeros_like(old.contact_force)
     u[interface.pad.nodes[node]] += [place - give[1] * force[1], -0.1 - give[0] * force[0]] - position[node]
@@ -124,7 +124,7 @@ def test_a_pinned_node_does_not_yield_to_where_nothing_holds_it(table, shear, ob
     status = np.where(np.arange(len(position)) == node, STICK, OPEN)
     state = replace(old, u=u, status=status, contact_force=every)
     assert interface.obeyed(old, state) == obeyed
-    assert interface.pins.held[node] == obeyed
+    assert interface.jumps.held[node] == obeyed
 
 
 def test_short_ramps_of_friction_are_jumps_at_their_rougher_end():

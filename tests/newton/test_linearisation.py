@@ -14,7 +14,7 @@ from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.roughness import PowerRoughness
 from evfem.newton.condensation import Singular
-from evfem.newton.linearisation import in_vain, steadied
+from evfem.newton.linearisation import limited_gain, no_progress
 from evfem.newton.state import StepFailed
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
@@ -151,7 +151,7 @@ def test_a_factorisation_is_kept_while_few_iterations_are_left(history, anew):
     assert linear.refactorise_if_needed(state, history)  # there is none
     assert linear.refactorise_if_needed(state, history) == anew
     assert linear.record.factorisations == 1 + anew
-    linear.forget()
+    linear.discard()
     assert linear.reusable is None
     assert linear.refactorise_if_needed(state, history)
 
@@ -257,13 +257,13 @@ def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_a
 
 def test_beyond_a_fold_the_tangent_repels_and_before_it_is_exact():
     """The scalar problem f(p) = p - 2 sqrt(p) + b folds at p = 1, where the gain 1 / sqrt(p) is 1. An
-    iteration with the steadied gain comes fast to the upper root, from below the fold too, and leaves
+    iteration with the limited gain comes fast to the upper root, from below the fold too, and leaves
     the lower one.
     """
 
     def followed(p, b):
         for count in range(1, 200):
-            step = -(p - 2.0 * np.sqrt(p) + b) / (1.0 - steadied(np.array([p**-0.5]))[0])
+            step = -(p - 2.0 * np.sqrt(p) + b) / (1.0 - limited_gain(np.array([p**-0.5]))[0])
             p = max(p + step, 1e-3)
             if abs(step) < 1e-10:
                 return p, count
@@ -360,10 +360,10 @@ VAIN = [0.5, 0.02, 0.01, 0.03, 0.02, 0.03, 0.02, 0.03, 0.02]
 
 
 def test_iterations_in_vain_are_known_from_the_residuals():
-    assert in_vain(VAIN, False)
-    assert not in_vain(VAIN[:8], False)
-    assert not in_vain([*VAIN, 9e-3], False)
-    assert not in_vain([*VAIN, 2.0], False)  # the bone is still on its way
+    assert no_progress(VAIN, False)
+    assert not no_progress(VAIN[:8], False)
+    assert not no_progress([*VAIN, 9e-3], False)
+    assert not no_progress([*VAIN, 2.0], False)  # the bone is still on its way
 
 
 @pytest.fixture

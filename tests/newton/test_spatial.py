@@ -141,7 +141,7 @@ def test_candidates_grow_within_a_step_and_what_has_left_is_let_go_in_the_next()
     assert 0 < few.size < 0.2 * free
     deep = sunk(state, 0.15)
     linear.choose_candidates(deep, 0.0)
-    gap = surface_state(model.surface, model.equilibrium.positions(deep.u)).gap
+    gap = surface_state(model.surface, model.equilibrium.interface.positions(deep.u)).gap
     assert set(np.flatnonzero(gap <= 0.0)) <= set(linear.candidates)
     assert few.size < linear.candidates.size < free
     # a node of the rim touches too: within the step it joins, in the next one the others may go
@@ -166,7 +166,7 @@ def test_what_is_attracted_more_than_a_body_holds_is_a_candidate(stiff, many):
     linear = body.linearisation
     linear.begin(state, False)
     linear.choose_candidates(state, 0.0)
-    area = model.pad.tributary(model.equilibrium.positions(state.u))
+    area = model.pad.tributary(model.equilibrium.interface.positions(state.u))
     most = 10.0 * model.scene.finger.law.shear_modulus / 2.0 * area
     steep = np.flatnonzero(model.pad.free & (linear.negative_stiffness(state) > most))
     assert set(steep) <= set(linear.candidates)
@@ -199,7 +199,10 @@ def test_the_tangent_knows_how_the_attraction_of_open_nodes_weakens(voltage):
         upper.append(linear.factor.upper.copy())
     taken = np.zeros(body.body.pattern.size)
     taken[:] = (upper[0] - upper[1])[body.body.pattern.diagonal]
-    rate, area = linear.negative_stiffness(state), model.pad.tributary(model.equilibrium.positions(state.u))
+    rate, area = (
+        linear.negative_stiffness(state),
+        model.pad.tributary(model.equilibrium.interface.positions(state.u)),
+    )
     most = 2.0 * model.scene.finger.law.shear_modulus / 2.0 * area
     expected = np.where(model.pad.free, np.minimum(rate, most), 0.0)
     expected[linear.candidates] = 0.0
@@ -257,7 +260,7 @@ def test_a_state_obeys_every_law_or_not(case, law):
     old = replace(old, age=np.full(old.status.size, 0.2), status=np.full_like(old.status, OPEN))
     limit = 0.5 * 10.0
     if LAWS[law] is not None:
-        area = interface.shares(new)[node]
+        area = interface.tributary(new)[node]
         speed = 0.005 / 0.5 if moved == MOVED else 0.0
         limit = float(LAWS[law].bound(10.0 / area, 0.5, speed, 0.0) * area)
     force, u = new.contact_force.copy(), new.u.copy()

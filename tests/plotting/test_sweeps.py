@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
-from evfem.plotting import sweep, sweep_map
-from evfem.sweeps.run import SweepResult
+from evfem.plotting import sweep, sweep_histogram, sweep_map, sweep_scatter
+from evfem.sweeps.table import SweepResult
 
 GAP, LAW, OUT = "motion.0.gap", "electrostatics.law", "electrostatic_force.last"
 GRID = [(gap, law, gap * 10 + (law == "b")) for gap in (0.5, 0.1, 0.3) for law in ("a", "b")]
@@ -109,3 +109,40 @@ def test_what_is_no_map_gets_a_sentence():
         sweep_map(table(GRID), GAP, GAP, OUT)
     with pytest.raises(InputError, match=r'given "motion.1.gap"; allowed: motion.0.gap. .point, '):
         sweep(table(GRID), "motion.1.gap", OUT)
+
+
+def test_lines_have_markers_of_their_own_and_axes_may_be_logarithmic():
+    ax = sweep(table(GRID), GAP, OUT, by=LAW, log="xy")
+    assert [line.get_marker() for line in ax.get_lines()] == ["o", "s"]
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert sweep(table(GRID), GAP, OUT, log="y").get_xscale() == "linear"
+    for rows, log, rule in (
+        (GRID, "z", '"", "x", "y" or "xy"'),
+        ([(0.0, "a", 1.0)], "x", "numbers above 0 along x"),
+        ([(1.0, "a", -1.0)], "xy", "numbers above 0 along y"),
+    ):
+        with pytest.raises(InputError, match=f"log: given .*; allowed: {rule}"):
+            sweep(table(rows), GAP, OUT, log=log)
+    with pytest.raises(InputError, match="numbers above 0 along x"):
+        sweep(table(GRID), LAW, OUT, log="x")
+
+
+def test_a_histogram_has_every_point_and_says_mean_and_spread():
+    ax = sweep_histogram(table([(x, "a", x) for x in np.linspace(0.0, 1.0, 101).tolist()]), OUT)
+    *bars, _ = ax.patches  # the last is the span
+    assert sum(bar.get_height() for bar in bars) == 101
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    # of 101 even points from 0 to 1: deviation sqrt(sum (k - 50)^2 / 100) / 100 = 0.2930
+    assert texts == ["mean 0.5 N/mm, deviation 0.293 N/mm", "90 % of the points: 0.05 to 0.95 N/mm"]
+    with pytest.raises(InputError, match="a column of numbers"):
+        sweep_histogram(table(GRID), LAW)
+
+
+def test_a_scatter_has_a_panel_for_each_number_that_is_varied():
+    rows = [(x, "a", x**3) for x in (0.3, 0.1, 0.2)]
+    (panel,) = sweep_scatter(table(rows), OUT, over=[GAP])
+    assert panel.get_title() == "rank correlation 1.00"
+    assert (panel.get_xlabel(), panel.get_ylabel()) == ("gap (mm)", "electrostatic force, last (N/mm)")
+    assert len(panel.get_lines()[0].get_xdata()) == 3
+    with pytest.raises(InputError, match="no column of numbers that is varied"):
+        sweep_scatter(table(rows[:1]), OUT)

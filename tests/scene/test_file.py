@@ -259,7 +259,7 @@ def test_what_a_file_cannot_hold_is_refused(folder):
 
 
 FLAT, LOAD = "kind = 'flat'", "force = 0.05"
-MESH, VOLTS = 'mesh = "pad.vtu"', "voltage = 1000.0"
+MESH, VOLTS, ROUGH = 'mesh = "pad.vtu"', "voltage = 1000.0", "electrostatics.roughness_gap"
 PRESSED = "[[motion]]\nkind = 'press'\nforce = 0.05"
 #: (example, what is replaced, by what, or by itself and more lines, the key in the sentence, words of the
 #: sentence); limits and words of every key are those of `test_schema`
@@ -298,6 +298,10 @@ WRONG = [
     (SHORT, FLAT, "\nfriction = true", "surface.friction", "given true"),
     (SHORT, FLAT, "\nfriction = [[0, 1, 2]]", "surface.friction", "[[x, mu], ...]"),
     (SHORT, FLAT, "\nfriction = [[1, 1], [0, 1]]", "surface.friction", "not decreasing"),
+    (SHORT, FLAT, "\nfriction_law = 0.3", "surface.friction_law", "given 0.3; allowed: a table"),
+    (SHORT, FLAT, "\nfriction_law = {kind = 'glue'}", "surface.friction_law.kind", "coulomb | load_index | "),
+    (SHORT, FLAT, "\nfriction_law = {kind = 'adhesive'}", "surface.friction_law.strength", "missing"),
+    (SHORT, FLAT, "\nfriction_law = {kind = 'ageing', fresh = 2.0}", "surface.friction_law.fresh", "a share"),
     (SHORT, FLAT, "kind = 'sinusoid'\nterms = [[1, 2]]", "surface.terms", "wavenumber"),
     (SHORT, FLAT, "kind = 'profile'", "surface.file", "missing; allowed:"),
     (SHORT, FLAT, "kind = 'profile'\nfile = 'none.csv'", "surface.file", "No such file"),
@@ -337,6 +341,16 @@ WRONG = [
     (DISPLAY, VOLTS, "voltage = 1\nvoltage_file = 'voltage.csv'", "electrostatics.voltage", "exactly"),
     (DISPLAY, VOLTS, "voltage_file = 'scan.csv'", "electrostatics.voltage_file", "position,voltage"),
     (DISPLAY, "insulator_thickness = 0.09", "", "electrostatics.insulator_thickness", "missing; allowed:"),
+    (
+        DISPLAY,
+        VOLTS,
+        "\nroughness_gap = -0.1",
+        "electrostatics.roughness_gap",
+        "given -0.1; allowed: a length",
+    ),
+    (DISPLAY, VOLTS, "\nroughness_gap = {law = 'linear'}", f"{ROUGH}.law", "constant | power | exponential"),
+    (DISPLAY, VOLTS, "\nroughness_gap = {law = 'power', gap = 0.1}", f"{ROUGH}.pressure", "missing"),
+    (DISPLAY, VOLTS, "\nroughness_gap = {law = 'constant', gap = 5.0}", f"{ROUGH}.gap", "given 5"),
     (OWN_MESH, MESH, 'mesh = "none.vtu"', "finger.mesh", "No such file"),
     (OWN_MESH, MESH, "mesh = 3", "finger.mesh", "given 3"),
     (OWN_MESH, MESH, "\nwidth = 16.0", "finger.width", "no geometry keys"),

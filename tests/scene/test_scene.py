@@ -63,7 +63,7 @@ PENALTY = Solver(contact="penalty", penalty_normal=10.0)
 WRONG_SCENES = [
     (lambda: Scene(None, Flat(), motion=[PRESS]), "finger"),
     (lambda: plain(surface=Kaczmarek()), "surface"),
-    (lambda: plain(motion=[]), "motion"),
+    (lambda: plain(motion=[3]), "motion[0]"),
     (lambda: plain(motion=[PRESS, "slide"]), "motion[1]"),
     (lambda: plain(voltage=100.0), "electrostatics.law"),
     (lambda: plain(voltage=PROFILE), "electrostatics.law"),

@@ -16,7 +16,7 @@ from evfem.newton.strategy import Strategy
 from evfem.planning.plan import plan
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
-from evfem.simulation.failure import advice
+from evfem.simulation.doubtful import advice
 from evfem.simulation.run import Run, simulate
 from evfem.surface.friction import RateFriction
 from evfem.surface.surfaces import Flat

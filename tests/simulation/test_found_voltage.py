@@ -11,11 +11,11 @@ import pytest
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.signals import Seen, electrode_charge, smallest_gap
+from evfem.electrostatics.signals import PadState, electrode_charge, smallest_gap
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.barrier import rise
 from evfem.simulation.run import Run
-from evfem.simulation.works import Part
+from evfem.simulation.works import SubstepWork
 from evfem.surface.pad import surface_state
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
@@ -180,7 +180,7 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
     """At a pad that is out of shape, some nodes touching, with charges that leak."""
     leak = ev.Drive(skin=ev.Dielectric(1e5, conductivity=1e-4), gap_conductivity=1e-8, resolved=True)
     run = Run(scene(dim, 100.0, [ev.Wait(1.0, steps=1)], leak), None)
-    attraction, rest = run.model.attraction, run.model.equilibrium.positions(run.state.u)
+    attraction, rest = run.model.attraction, run.model.equilibrium.interface.positions(run.state.u)
     random = np.random.default_rng(3)
     position = rest + random.uniform(0.0, 0.05, rest.shape)
     position[0, 1] = -0.01
@@ -189,7 +189,9 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
 
     def seen(place, voltage=120.0):
         below = surface_state(attraction.surface, place)
-        return Seen(attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool))
+        return PadState(
+            attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool)
+        )
 
     for measure in (electrode_charge, smallest_gap):
         reading, step = measure(seen(position)), 1e-6
@@ -264,7 +266,7 @@ def test_the_barrier_of_a_plate_is_that_of_its_potential():
     stable, top = np.argmin(potential[:30_000]), np.argmax(potential)
     assert closed.state.touching.any() > hovering.state.touching.any()
     stored = closed.model.body.energy(closed.state.u)
-    there = rise(Part(hovering.model, hovering.state, closed.state), target) * stored
-    back = rise(Part(hovering.model, closed.state, hovering.state), target) * stored
+    there = rise(SubstepWork(hovering.model, hovering.state, closed.state), target) * stored
+    back = rise(SubstepWork(hovering.model, closed.state, hovering.state), target) * stored
     assert there == pytest.approx(potential[top] - potential[stable], rel=0.05)
     assert back == pytest.approx(potential[top] - potential[-1], rel=0.05)

@@ -22,7 +22,7 @@ from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation import works
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.simulation.works import Part
+from evfem.simulation.works import SubstepWork
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import LinearElastic
 
@@ -178,7 +178,7 @@ def test_who_dissipates_by_friction(before, after, way, share):
         state.contact_force[node, 0] = 2.0 * (status != OPEN)
         states.append(state)
     expected = share * 0.5 * 2.0 * 0.1
-    assert Part(model, *states).friction() == pytest.approx(expected, rel=1e-12, abs=1e-15)
+    assert SubstepWork(model, *states).friction() == pytest.approx(expected, rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.parametrize("thickness", [0.09, 1e-3, 2e-4])
@@ -199,7 +199,7 @@ def test_the_attraction_of_a_plate_that_lands_or_lifts_works_what_its_potential_
     layers = Layers.of(ev.Layer(0.38, 1650.0), insulator)
     far, near = (StrongTroxel().potential(g, voltage, layers) for g in (gap, 0.0))
     expected = 4.0 * (far - near) * (1.0 if way == "down" else -1.0)
-    assert Part(model, *states).electrostatic() == pytest.approx(expected, rel=1e-4)
+    assert SubstepWork(model, *states).electrostatic() == pytest.approx(expected, rel=1e-4)
 
 
 class Counted:
@@ -223,7 +223,7 @@ def test_only_a_way_through_a_thin_layer_is_taken_at_more_than_eight_places(thic
     # the outline falls faster than the bone
     fallen = replace(rest, u=rest.u - [0.0, fall])
     law.asked = 0
-    Part(model, rest, fallen).electrostatic()
+    SubstepWork(model, rest, fallen).electrostatic()
     assert law.asked == places
 
 
@@ -239,8 +239,8 @@ def test_what_the_way_of_the_loads_loses_in_a_release_is_no_energy_set_free():
     for height, rate in ((-0.4, 0.5), (-0.05, 0.01)):
         body.release(old.u, rate)
         new = solver.step(old, Target(0.0, Indentation(height), GivenVoltage(0.0)))
-        before, after = Part(model, old, old).end(), Part(model, old, new).end()
-        works = Part(model, old, new).works(before, after)
+        before, after = SubstepWork(model, old, old).end(), SubstepWork(model, old, new).end()
+        works = SubstepWork(model, old, new).works(before, after)
         drag = body.drag_dissipation(new.u)
         assert drag > 0.0
         freed = works["snap_dissipation"] + works["integrator_dissipation"]
@@ -260,7 +260,7 @@ def test_in_space_a_way_counts_along_the_slip(monkeypatch):
     model = SimpleNamespace(equilibrium=SimpleNamespace(interface=interface))
     part = SimpleNamespace(model=model, old=None, new=None, slip_length=np.array([5.0, 2.0]))
     along = np.array([[1.0, 9.0, 2.0], [5.0, 9.0, 7.0]])
-    np.testing.assert_allclose(Part._with_slip(part, along), [2.2, -7.0], rtol=1e-12)
+    np.testing.assert_allclose(SubstepWork._with_slip(part, along), [2.2, -7.0], rtol=1e-12)
 
 
 def test_the_field_stretches_with_the_forces_on_the_way():
@@ -281,7 +281,7 @@ def test_the_field_stretches_with_the_forces_on_the_way():
         SimpleNamespace(place=long * np.ones((3, 2)), contact_force=load * np.ones((3, 2)))
         for long, load in ((1.0, 0.2), (1.5, 0.6))
     )
-    assert Part(model, old, new)._stretching() == pytest.approx(3 * 0.5, rel=1e-12)
+    assert SubstepWork(model, old, new)._stretching() == pytest.approx(3 * 0.5, rel=1e-12)
     np.testing.assert_allclose(seen, 0.2 + 0.4 * np.outer(works.WAY, nodes), rtol=1e-12)
 
 

@@ -79,7 +79,10 @@ def test_penalised_friction_obeys_the_return_map():
         old = going.state
         going.advance(request)
         new = going.state
-        before, after = equilibrium.positions(old.u)[:, 0], equilibrium.positions(new.u)[:, 0]
+        before, after = (
+            equilibrium.interface.positions(old.u)[:, 0],
+            equilibrium.interface.positions(new.u)[:, 0],
+        )
         length = going.model.pad.length(before)
         touching = new.status > 0
         shear, pressure, past = (

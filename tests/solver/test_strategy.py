@@ -236,7 +236,7 @@ class Unsettling(Steps):
 @pytest.mark.parametrize("fails", [True, False])
 def test_a_part_whose_staggered_rounds_do_not_settle_is_solved_all_at_once(fails):
     rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
-    target = SimpleNamespace(drive=SimpleNamespace(voltage=100.0))
+    target = SimpleNamespace(voltage=SimpleNamespace(voltage=100.0))
     solver = Unsettling(fails)
     stepper = Stepper(solver, "staggered")
     assert stepper.solve(rest, target).together
@@ -249,7 +249,7 @@ def test_a_part_whose_staggered_rounds_do_not_settle_is_solved_all_at_once(fails
 
 def test_a_released_body_goes_its_way_without_rounds():
     rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
-    target = SimpleNamespace(drive=SimpleNamespace(voltage=100.0))
+    target = SimpleNamespace(voltage=SimpleNamespace(voltage=100.0))
     solver = Unsettling(False)
     stepper = Stepper(solver, "staggered", body=SimpleNamespace(drag_rate=0.5))
     assert stepper.solve(rest, target).together

@@ -13,7 +13,7 @@ from evfem.studies.measured import participant_forces
 pytestmark = pytest.mark.solver
 
 NOTEBOOKS = Path(__file__).parents[2] / "studies" / "notebooks"
-NAMES = ("compare_participants", "design_a_voltage_signal", "explore_a_scene")
+NAMES = ("compare_participants", "design_a_voltage_signal", "explore_a_scene", "lecture")
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,18 @@ def test_the_designed_signal_does_what_was_wished(ran):
     assert found["rounding"] <= 0.5 * 2500.0 / 32767 * (1 + 1e-9)
     assert sorted(path.name for path in folder.iterdir()) == ["signal.csv", "signal.hjif", "signal.wav"]
     assert json.loads((folder / "signal.hjif").read_text())["perceptions"]
+
+
+def test_the_lecture_ends_in_full_slip_under_the_voltage(ran):
+    """Coulomb: friction is 0.3 times load and attraction; all figures have the same scales."""
+    found, folder = ran("lecture")
+    last = found["result"].rows[-1]
+    wanted = 0.3 * (0.05 + last["electrostatic_force"])
+    assert last["tangential_force"] == pytest.approx(wanted, rel=1e-6)
+    assert found["coefficient"] > 0.32
+    limits = {tuple((*ax.get_xlim(), *ax.get_ylim()) for ax in one.axes) for one in found["figures"]}
+    assert len(limits) == 1
+    assert not list(folder.iterdir())
 
 
 def test_the_compared_participants_are_those_of_fig_5(ran):

@@ -4,7 +4,7 @@ fast ways.
 
 import numpy as np
 import pytest
-from tools.grids import CELLS, rectangle, tangent_of
+from tools.grids import CELLS, bend, rectangle, tangent_of, wavy
 
 import evfem as ev
 from evfem.errors import InputError
@@ -13,17 +13,6 @@ from evfem.tissue.userforms import make_term, tried
 
 MU, LMBDA = 0.7, 1.9
 every_element = pytest.mark.parametrize("element", list(CELLS))
-
-
-def bend(x, y):
-    """A warp that curves every edge."""
-    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
-
-
-def wavy(points, size=0.08):
-    """A smooth displacement field."""
-    x, y = points.T
-    return size * np.column_stack([np.sin(2 * x + y) + y * y, np.cos(3 * x - y) + x * y])
 
 
 # -- fast ways and forms ---------------------------------------------------------------------------------

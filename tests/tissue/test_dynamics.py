@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tools.grids import CELLS, rectangle, solve, tangent_of
+from tools.grids import CELLS, bend, columns_of, rectangle, solve, tangent_of, wavy
 
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
@@ -15,17 +15,6 @@ from evfem.tissue.weakform import Tissue
 
 every_element = pytest.mark.parametrize("element", list(CELLS))
 STEP = 2e-3
-
-
-def bend(x, y):
-    """A warp that curves every edge."""
-    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
-
-
-def wavy(points, size=0.08, phase=0.0):
-    """A smooth displacement field."""
-    x, y = points.T
-    return size * np.column_stack([np.sin(2 * x + y + phase) + y * y, np.cos(3 * x - y) + x * y])
 
 
 def dynamics_on(space, viscous=True, inertial=False, compiled=True):
@@ -84,12 +73,7 @@ def test_tangent_is_the_derivative_of_the_forces(element, kind):
     u = wavy(X, phase=0.3)
     tissue = Tissue(space, {"lower": NeoHookean(E=1.0, nu=0.3)})
     K = (tangent_of(space, u, tissue, term) - tangent_of(space, u, tissue)).toarray()
-    columns = np.empty_like(K)
-    for i in range(u.size):
-        step = np.zeros(u.size)
-        step[i] = 1e-5
-        step = step.reshape(u.shape)
-        columns[:, i] = (term.forces(u + step) - term.forces(u - step)).ravel() / 2e-5
+    columns = columns_of(term.forces, u)
     np.testing.assert_allclose(K, columns, atol=1e-7 * np.abs(K).max())
     np.testing.assert_allclose(K, K.T, atol=1e-11 * np.abs(K).max())
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tools.grids import assembled, rectangle, tangent_of
+from tools.grids import assembled, bend, columns_of, rectangle, tangent_of, wavy
 from tools.laws import EnergyOnly, StressOnly
 
 import evfem as ev
@@ -33,17 +33,6 @@ def crooked(u, v, w):
         + w.x[0] * ev.trace(H) * ev.dot(u, v)
         + np.exp(H[1, 1]) * v[0]
     )
-
-
-def bend(x, y):
-    """A warp that curves every edge."""
-    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
-
-
-def wavy(points, size=0.08):
-    """A smooth displacement field."""
-    x, y = points.T
-    return size * np.column_stack([np.sin(2 * x + y) + y * y, np.cos(3 * x - y) + x * y])
 
 
 # -- forces ----------------------------------------------------------------------------------------------
@@ -89,12 +78,7 @@ def test_tangent_is_the_derivative_of_the_forces(element, on, boundary):
     symmetric = tangent_of(space, u, term).toarray()
     K = assembled(space, Integral.cell_tangents(term, u), term.points.cells).toarray()
     np.testing.assert_allclose(symmetric, 0.5 * (K + K.T), atol=1e-15)
-    columns = np.empty_like(K)
-    for i in range(u.size):
-        step = np.zeros(u.size)
-        step[i] = 1e-5
-        step = step.reshape(u.shape)
-        columns[:, i] = (term.forces(u + step) - term.forces(u - step)).ravel() / 2e-5
+    columns = columns_of(term.forces, u)
     np.testing.assert_allclose(K, columns, atol=1e-8 * np.abs(K).max())
     assert np.abs(K - K.T).max() > 1e-2 * np.abs(K).max()
 

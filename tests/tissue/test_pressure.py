@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
-from tools.grids import CELLS, mixed_tangent_of, quarter_ring, rectangle, tangent_of
+from tools.grids import CELLS, mixed_tangent_of, quarter_ring, rectangle, tangent_of, wavy
 from tools.laws import EnergyOnly, StressOnly
 
 from evfem.reference import tube_pressure
@@ -40,12 +40,6 @@ LAWS = {
 }
 every_element = pytest.mark.parametrize("element", list(CELLS))
 every_law = pytest.mark.parametrize("law", list(LAWS))
-
-
-def wavy(points, size=0.08):
-    """A smooth displacement field, far from affine."""
-    x, y = points.T
-    return size * np.column_stack([np.sin(2 * x + y) + y * y, np.cos(3 * x - y) + x * y])
 
 
 @cache

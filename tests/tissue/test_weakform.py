@@ -7,54 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import skfem
-from tools.grids import CELLS, SHAPES, fine_points, grid_of, rectangle, tangent_of
-from tools.laws import StressOnly
+from tools.grids import CELLS, SHAPES, bend, columns_of, fine_points, grid_of, rectangle, tangent_of, wavy
+from tools.laws import LAWS, LMBDA, MU
 
 from evfem.errors import InputError
 from evfem.tensor import det
-from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
+from evfem.tissue.laws import NeoHookean, Yeoh
 from evfem.tissue.space import ELEMENTS, make_space
 from evfem.tissue.splitlaw import embed
 from evfem.tissue.weakform import Tissue, check_laws
 
-MU, LMBDA = 0.7, 1.9
-YOUNG = MU * (3 * LMBDA + 2 * MU) / (LMBDA + MU)
-POISSON = LMBDA / (2 * (LMBDA + MU))
-
-
-class EnergyOnly:
-    """A user's law, energy only: neo-Hookean with lambda/8 (J^2 - 1/J^2)^2 / 2 instead of (ln
-    J)^2.
-    """
-
-    def psi(self, F):
-        J = det(F)
-        volume = LMBDA / 16.0 * (J**2 - J**-2) ** 2
-        return 0.5 * MU * (np.sum(F * F, axis=(0, 1)) - 3.0 - 2.0 * np.log(J)) + volume
-
-
-LAWS = {
-    "neo_hookean": NeoHookean(E=YOUNG, nu=POISSON),
-    "yeoh": Yeoh(c1=0.35, c2=0.1, c3=0.02, nu=0.4),
-    "ogden": Ogden(mu=[0.9, -0.2], alpha=[2.5, -1.5], bulk=2.0),
-    "linear_elastic": LinearElastic(E=YOUNG, nu=POISSON),
-    "psi_only": EnergyOnly(),
-    "P_only": StressOnly(MU, LMBDA),
-}
 every_element = pytest.mark.parametrize("element", list(CELLS))
 every_law = pytest.mark.parametrize("law", list(LAWS))
 STRETCH = np.array([[0.12, 0.2], [-0.07, -0.05]])
-
-
-def bend(x, y):
-    """A warp that curves every edge."""
-    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
-
-
-def wavy(points, size=0.08):
-    """A smooth displacement field, far from affine."""
-    x, y = points.T
-    return size * np.column_stack([np.sin(2 * x + y) + y * y, np.cos(3 * x - y) + x * y])
 
 
 def full_stress(law, F):
@@ -121,12 +86,7 @@ def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(elem
     ends = [tissue.energy(u + s * h * direction) for s in (1, -1, 2, -2)]
     slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
     assert slope == pytest.approx(np.sum(f * direction), rel=2e-8)
-    columns = np.empty_like(K)
-    for i in range(u.size):
-        step = np.zeros(u.size)
-        step[i] = 2e-5
-        step = step.reshape(u.shape)
-        columns[:, i] = (tissue.forces(u + step) - tissue.forces(u - step)).ravel() / 4e-5
+    columns = columns_of(tissue.forces, u, 2e-5)
     np.testing.assert_allclose(K, columns, atol=2e-7 * scale)
     np.testing.assert_allclose(K, K.T, atol=1e-9 * scale)
 

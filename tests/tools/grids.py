@@ -19,6 +19,23 @@ CELLS = {"q1": "quad", "q1_fbar": "quad", "q2": "quad", "q2p1": "quad", "p2": "t
 SHAPES = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}
 
 
+def bend(x, y):
+    """A warp that curves every edge."""
+    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
+
+
+def wavy(points, size=0.08, phase=0.0):
+    """A smooth displacement field, far from affine."""
+    x, y = points.T
+    return size * np.column_stack([np.sin(2 * x + y + phase) + y * y, np.cos(3 * x - y) + x * y])
+
+
+def columns_of(forces, u, step=1e-5):
+    """The matrix of central differences of `forces` (N, dim) by every component of u (N, dim)."""
+    steps = step * np.eye(u.size).reshape(u.size, *u.shape)
+    return np.column_stack([(forces(u + s) - forces(u - s)).ravel() / (2.0 * step) for s in steps])
+
+
 def rectangle(element, divisions, size=(1.0, 1.0), warp=None, jitter=0.0, split=None):
     """The space of `element` on [0, w] x [0, h] in nx x ny cells.
 

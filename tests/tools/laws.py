@@ -3,6 +3,7 @@
 import numpy as np
 
 from evfem.tensor import ddot, det, inv, transpose
+from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
 
 
 def neo_hookean_energy(F, mu, lmbda):
@@ -34,3 +35,26 @@ class StressOnly:
 
     def P(self, F):
         return neo_hookean_stress(F, self.mu, self.lmbda)
+
+
+class SteepVolume:
+    """A user's law, the energy alone: lambda/16 (J^2 - 1/J^2)^2 in the place of lambda/2 (ln J)^2."""
+
+    def psi(self, F):
+        J = det(F)
+        volume = LMBDA / 16.0 * (J**2 - J**-2) ** 2
+        return 0.5 * MU * (np.sum(F * F, axis=(0, 1)) - 3.0 - 2.0 * np.log(J)) + volume
+
+
+MU, LMBDA = 0.7, 1.9
+YOUNG = MU * (3 * LMBDA + 2 * MU) / (LMBDA + MU)
+POISSON = LMBDA / (2 * (LMBDA + MU))
+#: every kind of law
+LAWS = {
+    "neo_hookean": NeoHookean(E=YOUNG, nu=POISSON),
+    "yeoh": Yeoh(c1=0.35, c2=0.1, c3=0.02, nu=0.4),
+    "ogden": Ogden(mu=[0.9, -0.2], alpha=[2.5, -1.5], bulk=2.0),
+    "linear_elastic": LinearElastic(E=YOUNG, nu=POISSON),
+    "psi_only": SteepVolume(),
+    "P_only": StressOnly(MU, LMBDA),
+}

@@ -1,4 +1,4 @@
-"""Do drawn scenes still end as they did? For changes of the solver that may take other iterations.
+"""Do drawn scenes still end as they did? Changes that take no other iterations are compared to 1e-11.
 
     python tests/tools/same_ends.py record BEFORE.csv --seed 77 --scenes 270
     python tests/tools/same_ends.py compare BEFORE.csv AFTER.csv [--tolerance 1e-6]

@@ -56,10 +56,10 @@ class Script:
     def leaves(self, old, state, target):
         return self.left
 
-    def admit(self, state, gap):
+    def add_candidates(self, state, gap):
         pass
 
-    def forget(self):
+    def discard(self):
         pass
 
     def findings(self, state, balance):

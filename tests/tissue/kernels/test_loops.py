@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from tools.grids import CELLS, rectangle, tangent_of
+from tools.grids import CELLS, bend, rectangle, tangent_of
 from tools.solids import box
 
 from evfem.tissue.dynamics import Dynamics
@@ -20,10 +20,6 @@ from evfem.tissue.pattern import Pattern
 every_element = pytest.mark.parametrize("element", list(CELLS))
 RANDOM = np.random.default_rng(2)
 STEP = 1e-2
-
-
-def bend(x, y):
-    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
 
 
 # -- layout ----------------------------------------------------------------------------------------------

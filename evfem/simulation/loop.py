@@ -1,0 +1,371 @@
+"""Steps at will: a run whose motion is decided while it goes on, one step after the other.
+
+A step is what a motion's step is to `simulate`: its exact target is reached in as many parts as it takes,
+and its row is that of the history. What is not given stays: the place, the voltage, and the load where a
+force was given last, else the indentation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from types import SimpleNamespace
+from typing import Annotated, Any, ClassVar
+
+from evfem.common import notices
+from evfem.common.checks import Checked, Within, number, set_frozen
+from evfem.common.pools import blas_limits, loaded_blas
+from evfem.electrostatics.signals import FollowForce
+from evfem.errors import ABSENT, InputError, StopRun
+from evfem.newton.control import Target
+from evfem.planning.core import Closing
+from evfem.protocols import Observer, TimeSignal
+from evfem.scene.motion import FORCE, INDENTATION, VOLTAGE, Course, Motion
+from evfem.scene.scene import SIGNALS, Scene
+from evfem.simulation.result import Frame, Result, Saved
+from evfem.simulation.run import Request, Run, Start
+from evfem.solver.stepping import Path
+
+_PLACE = number("a place in mm between -1000 and 1000", Within(-1000.0, 1000.0), "mm")
+_SECONDS = number("a time in s, not negative, up to 1e6", Within(0.0, 1e6), "s")
+
+
+@dataclass(frozen=True)
+class Asked(Checked):
+    """What one step is asked for; None stays as it is."""
+
+    position: Annotated[float | None, _PLACE, "x of the bone, of the drive where there is a hand"] = None
+    position_z: Annotated[float | None, _PLACE, "z of the bone, of a fingertip"] = None
+    indentation: Annotated[float | None, INDENTATION, "travel of the bone beyond first touch"] = None
+    force: Annotated[float | None, FORCE, "load on the bone"] = None
+    voltage: Annotated[float | None, VOLTAGE, "at the end, from the present one"] = None
+    duration: Annotated[float | None, _SECONDS, "how long the step takes; without it no time passes"] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.indentation is not None and self.force is not None:
+            raise InputError("force", "indentation and force", "one of the two")
+
+
+@dataclass(frozen=True)
+class AtWill(Motion):
+    """All steps of a loop as one motion: how many there were, and of what they did the last slide, the last
+    press and the largest voltage.
+    """
+
+    kind: ClassVar[str] = "step"
+    steps: int = 0
+    did: Course = field(default_factory=Course)
+
+    @property
+    def course(self) -> Course:
+        return self.did
+
+    @property
+    def timed(self) -> bool:
+        return True  # as far as one knows beforehand
+
+    def part(self, step: int) -> tuple[float, float, float]:
+        return 0.0, 1.0, 1.0
+
+    def and_then(self, course: Course) -> AtWill:
+        """The same with what one more step does, which is not counted yet."""
+        slide = course if course.distance else self.did
+        press = course if course.depth is not None else self.did
+        voltages = [one for one in (self.did.voltage, course.voltage) if one is not None]
+        did = replace(
+            press,
+            distance=slide.distance,
+            angle=slide.angle,
+            voltage=max(voltages, key=abs, default=None),
+            duration=max(self.did.duration, course.duration),
+        )
+        return replace(self, did=did)
+
+
+class Loop:
+    """A scene on its way, made by `ev.loop`; its own motion is done."""
+
+    def __init__(self, scene: Scene, observers: Sequence[Observer], largest_voltage: float | None) -> None:
+        notices.check_observers(observers)
+        self.scene, self._observers = scene, observers
+        self._own, self._at_will = scene.motion, AtWill(did=Course(voltage=largest_voltage))
+        self._check(Asked(voltage=largest_voltage, duration=0.0))
+        self._reasons: list[str] = []
+        with blas_limits():
+            self._run = Run(self._moved(self._at_will), None)
+            self._tell("started", self._run.model.mesh, scene, scene.total_steps)
+            self._blas = loaded_blas()
+        self._largest = self._run.scene.electrics.largest_voltage
+        with self._threads():
+            for request in self._run.requests():
+                self._reasons = self._told(self._run.advance(request))
+                if self._reasons:
+                    break
+        last, rows = scene.courses[-1:], self._run.rows
+        held = any(one.force is not None or one.hold == "force" for one in last)
+        self._load: float | None = rows[-1]["applied_force"] if held else None
+
+    def step(
+        self,
+        *,
+        position: float | None = None,
+        position_z: float | None = None,
+        indentation: float | None = None,
+        force: float | None = None,
+        voltage: float | None = None,
+        duration: float | None = None,
+    ) -> SimpleNamespace:
+        """One step to an exact target.
+
+        Parameters
+        ----------
+        position, position_z
+            Place of the bone (mm), along x and, of a fingertip, along z; of the drive where there is a
+            hand. Absolute.
+        indentation
+            Travel of the bone beyond first touch (mm), negative when hovering. This or `force`.
+        force
+            Load on the bone (N/mm, of a fingertip N), which then stays.
+        voltage
+            At the end (V); on the way it changes evenly.
+        duration
+            Seconds. Without it no time passes; needed where something depends on time, where 0 stands
+            for a step without time.
+
+        Returns
+        -------
+        types.SimpleNamespace
+            The row: the columns of the history as attributes, in its units.
+
+        Raises
+        ------
+        NotConverged
+            There is no such state. The loop is where it was, and may be asked for another one.
+        InputError
+            What is asked for does not go together, or with the scene.
+        StopRun
+            An observer raised it; the step is done.
+        """
+        asked = Asked(position, position_z, indentation, force, voltage, duration)
+        self._check(asked)
+        start = self._start()
+        course = self._course(asked, start)
+        self._check_course(course)
+        with self._threads():
+            self._make_for(course)
+            frame = self._advance(course, start, asked)
+        if course.force is not None:
+            self._load = self._run.rows[-1]["applied_force"]
+        elif course.indentation is not None:
+            self._load = None
+        reasons = self._told(frame)
+        self._reasons += reasons
+        if reasons:
+            raise StopRun("; ".join(reasons))
+        return SimpleNamespace(**self._run.rows[-1])
+
+    def result(self) -> Result:
+        """All rows so far, with the fields of every n-th step (`Output.every`) and of the last."""
+        frames = self._run.frames.copy()
+        if self._run.rows:
+            self._run.keep_last_frame()
+        found = self._run.result()
+        self._run.frames = frames
+        if self._reasons:
+            found.provenance["stopped"] = "; ".join(self._reasons)
+        self._tell("finished", found)
+        return found
+
+    def __repr__(self) -> str:
+        """Number of steps, place and forces."""
+        rows = self._run.rows
+        text = f"Loop of {self.scene.name!r}: {len(rows)} steps"
+        names = ("position", "indentation", "voltage", "normal_force", "tangential_force")
+        return ", ".join([text, *(f"{n.replace('_', ' ')} {rows[-1][n] + 0.0:.4g}" for n in names if rows)])
+
+    # -- what a step is
+
+    def _check(self, asked: Asked) -> None:
+        """Raise InputError for what the scene does not have."""
+        scene = self.scene
+        if asked.duration is None and (what := _timed(scene)):
+            raise InputError("duration", ABSENT, f"a time in s, needed with {what}")
+        if asked.voltage is None:
+            return
+        if scene.law is None:
+            raise InputError("voltage", "a voltage without a law", "a scene with an electrostatic law")
+        if isinstance(scene.electrics.voltage, SIGNALS):
+            given = f"{asked.voltage:g} beside the {type(scene.electrics.voltage).__name__} of the scene"
+            raise InputError("voltage", given, "one of the two")
+
+    def _check_course(self, course: Course) -> None:
+        """Raise InputError for a step that no motion of the scene could be."""
+        scene, dynamic = self.scene, _dynamic(self.scene)
+        if course.force == 0.0 and scene.law is None:
+            raise InputError("force", 0.0, "larger than 0 when nothing else pulls the finger down")
+        if course.distance and dynamic and not course.duration:
+            raise InputError("duration", 0.0, f"larger than 0 where the finger moves along, with {dynamic}")
+        if not course.angle:
+            return
+        if self._run.model.mesh.dim == 2:
+            raise InputError("position_z", "a way across x", "0 with a finger in the plane")
+        if scene.hand is not None:
+            raise InputError("position_z", "a way across x with a hand", "where it is: its spring is along x")
+        if isinstance(scene.voltage, FollowForce):
+            raise InputError("position_z", "a way across x with a friction force to follow", "where it is")
+
+    def _start(self) -> Start:
+        """Where the step starts."""
+        run = self._run
+        start = run.start_of(len(run.rows))
+        if self.scene.hand is not None:
+            start["position"] = float(run.state.hand[0])
+        return start if self._load is None else start | {"applied_force": self._load}
+
+    def _course(self, asked: Asked, start: Start) -> Course:
+        """What the step does; a way along x is one of angle 0 whatever its sign, as in the plane."""
+        along, across = (
+            0.0 if end is None else end - start[name]
+            for name, end in (("position", asked.position), ("position_z", asked.position_z))
+        )
+        distance, angle = along, 0.0
+        if across:
+            angle = math.degrees(math.atan2(across, along))
+            distance = math.hypot(along, across)
+        if angle <= -90.0 or angle > 90.0:
+            angle, distance = angle - math.copysign(180.0, angle), -distance
+        return Course(
+            distance=distance,
+            angle=angle,
+            indentation=asked.indentation,
+            force=asked.force,
+            hovers=(asked.indentation or 0.0) < 0.0,
+            hold="indentation" if self._load is None or asked.indentation is not None else "force",
+            voltage=asked.voltage,
+            duration=asked.duration or 0.0,
+        )
+
+    # -- the run
+
+    def _advance(self, course: Course, start: Start, asked: Asked) -> Frame | None:
+        """Do the step, or leave everything as it was."""
+        run, before = self._run, self._at_will
+        mark, substep = run.ledger.mark(), run.stepper.substep
+        path = _exactly(run.path(course, start, (0.0, 1.0), course.duration), asked)
+        request = Request(len(run.rows) + 1, len(self._own), AtWill.kind, path, course.duration)
+        self._move(before.and_then(course))
+        try:
+            frame = run.advance(request)
+        except BaseException:
+            self._move(before)
+            run.ledger.back(mark)
+            run.stepper.substep = substep
+            raise
+        self._move(replace(self._at_will, steps=before.steps + 1))
+        return frame
+
+    def _moved(self, at_will: AtWill) -> Scene:
+        """The scene with the steps so far behind its own motion; a copy that nobody else has."""
+        return replace(self.scene, motion=(*self._own, at_will))
+
+    def _move(self, at_will: AtWill) -> None:
+        """Tell the run's scene what its steps are: checked anew, a long loop would slow down."""
+        self._at_will = at_will
+        set_frozen(self._run.scene, motion=(*self._own, at_will))
+
+    def _make_for(self, course: Course) -> None:
+        """Make the model anew where a voltage is larger than any before and changes what it needs."""
+        run, voltage = self._run, abs(course.voltage or 0.0)
+        if voltage <= self._largest:
+            return
+        scene = self._moved(self._at_will.and_then(course))
+        cored = (Closing(scene, run.model.mesh).core is None) != (run.model.closing.core is None)
+        if cored or not run.scene.electrics.acts:
+            self._run = Run(scene, Saved(run.checkpoint(), run.rows) if run.rows else None)
+            self._run.frames = run.frames
+        self._largest = voltage
+
+    def _threads(self) -> Any:
+        """The BLAS has the scene's threads in three dimensions, else one: as in `simulate`."""
+        return self._blas.limit(limits=self.scene.solver.threads if self._run.model.mesh.dim == 3 else 1)
+
+    def _tell(self, event: str, *arguments: Any) -> list[str]:
+        return notices.tell_observers(self._observers, event, *arguments)
+
+    def _told(self, frame: Frame | None) -> list[str]:
+        """Tell the observers of the last step; the reasons of those who want to stop."""
+        return self._tell("step", self._run.rows[-1], frame, self._run.checkpoint)
+
+
+def _exactly(path: Path, asked: Asked) -> Path:
+    """The path with its end where it was asked for, to the last digit."""
+    places = {"x": asked.position, "z": asked.position_z}
+    ends: dict[str, Any] = {name: place for name, place in places.items() if place is not None}
+
+    def exact(done: float, fraction: float) -> Target:
+        target = path(done, fraction)
+        return replace(target, **ends) if fraction == 1.0 else target
+
+    return exact
+
+
+def _dynamic(scene: Scene) -> str:
+    """What of a scene resists by the speed, in words; empty if nothing does."""
+    if scene.solver.timed:
+        return f"dynamics = {scene.solver.dynamics}"
+    if scene.hand is not None and scene.hand.timed:
+        return "a hand that has a damping or a mass"
+    return type(scene.friction_law).__name__ if getattr(scene.friction_law, "timed", False) else ""
+
+
+def _timed(scene: Scene) -> str:
+    """What of a scene depends on time, in words; empty if nothing does."""
+    signal = isinstance(scene.electrics.voltage, TimeSignal)
+    over_time = "a voltage over time" if signal or (scene.drive is not None and scene.drive.resolved) else ""
+    return _dynamic(scene) or over_time
+
+
+def loop(
+    scene: Scene | str | PathLike[str],
+    *,
+    observers: Sequence[Observer] = (),
+    largest_voltage: float | None = None,
+) -> Loop:
+    """Take a scene step by step: its own motion is done first, if it has one.
+
+    Parameters
+    ----------
+    scene
+        A `Scene`, whose `motion` may be empty, or the path of a scene file.
+    observers
+        Told as in `simulate`: `started` at once, `step` after every step, `finished` with every
+        `Loop.result()`.
+    largest_voltage
+        Of the steps to come (V), where it is more than the scene's: the model is made for it. One
+        beyond the largest so far may change what the model needs (a core, `Solver.core`); it is then
+        made again, which takes as long as at the beginning.
+
+    Returns
+    -------
+    Loop
+        With `step(...)`, which returns a row, and `result()`.
+
+    Examples
+    --------
+    >>> import evfem as ev
+    >>> finger = ev.FingerPad(ridges=False, resolution="coarse")
+    >>> steps = loop(ev.Scene(finger, ev.Flat(friction=0.3), motion=ev.Press(force=0.02, steps=1)))
+    >>> row = steps.step(position=0.05)
+    >>> f"{row.position} mm, {row.applied_force:.4f} N/mm"
+    '0.05 mm, 0.0200 N/mm'
+    >>> steps.step(indentation=0.1).motion, len(steps.result().rows)
+    ('step', 3)
+    """
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
+    return Loop(scene, observers, largest_voltage)

@@ -1,0 +1,270 @@
+"""The table of a sweep: a row per point, with units, statistics of its columns, and back from its folder."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.storage import disk, write_text
+from evfem.common.tables import frame
+from evfem.errors import InputError, quoted, readable, unknown
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.finger.fingertip import Fingertip
+from evfem.scene.scene import Scene
+from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS
+from evfem.sweeps.file import FIRST, LAST
+from evfem.sweeps.folder import PROVENANCE, STATUS, TABLE, cell_of, sweep_csv
+
+Units = Mapping[str, str]
+#: what a plane finger with a depth has of the columns in three dimensions
+AREAS = ("contact_area", "real_contact_area")
+OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name]["unit"] for name in AREAS}}
+
+
+#: last word of a key of a scene file -> its unit
+KEY_UNITS = dict.fromkeys(("gap", "indentation", "thickness", "height", "width", "distance", "y"), "mm")
+KEY_UNITS |= {"voltage": "V", "amplitude": "V", "bias": "V", "E": "MPa", "mu": "MPa"}
+KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "Hz"}
+
+
+def unit_of(key: str, force: str = "N/mm") -> str:
+    """Unit of a dotted key of a scene file, "" for a number; `force` is that of forces.
+
+    >>> unit_of("electrostatics.insulator_thickness"), unit_of("motion.0.force"), unit_of("surface.friction")
+    ('mm', 'N/mm', '')
+    """
+    return (KEY_UNITS | {"force": force}).get(key.split(".")[-1].rsplit("_", 1)[-1], "")
+
+
+def units_of(scene: Scene) -> Units:
+    """Unit of each column of which a sweep of such scenes can have outputs.
+
+    >>> from evfem.scene.scene import default_scene
+    >>> units_of(default_scene())["normal_force"]
+    'N/mm'
+    """
+    finger = scene.finger
+    if isinstance(finger, Fingertip) or (isinstance(finger, MeshedFinger) and finger.mesh().dim == 3):
+        return SPATIAL_UNITS
+    return UNITS if scene.depth is None else OVER_DEPTH
+
+
+def table_units(
+    outputs: Sequence[str], parameters: Sequence[str], found: Collection[Units]
+) -> dict[str, str]:
+    """Unit of each output, and of the parameters that have one, where `found` are the units of the
+    scenes, each kind once.
+
+    Raises InputError for an output that not every scene has, or whose unit is not that of all.
+
+    >>> table_units(["normal_force.last"], ["motion.0.force"], [OVER_DEPTH])
+    {'motion.0.force': 'N/mm', 'normal_force.last': 'N'}
+    >>> table_units(["contact_area.last"], [], [UNITS])
+    Traceback (most recent call last):
+    evfem.errors.InputError: outputs: given "contact_area.last" of a finger without it; allowed: \
+areas where every finger has a depth or is one in three dimensions
+    """
+    force = "N" if SPATIAL_UNITS in found else "N/mm"
+    units = {key: unit for key in parameters if (unit := unit_of(key, force))}
+    for output in outputs:
+        kinds = {one.get(output.split(".")[0]) for one in found}
+        if None in kinds:
+            allowed = "areas where every finger has a depth or is one in three dimensions"
+            raise InputError("outputs", f"{quoted(output)} of a finger without it", allowed)
+        if len(kinds) > 1:
+            given = f"{output} in {' and '.join(sorted(map(str, kinds)))}"
+            raise InputError("finger.depth", given, "a depth for every finger in the plane, or for none")
+        units[output] = str(kinds.pop())
+    return units
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """The table of a sweep: `rows` in the order of the points, keys `columns`, and provenance."""
+
+    columns: tuple[str, ...]
+    rows: list[dict[str, Any]]
+    provenance: dict[str, Any]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __getitem__(self, column: str) -> Any:
+        """A column (points,): numbers as an array, NaN where there is none, else a list."""
+        if column not in self.columns:
+            raise unknown("column", str(column), self.columns, readable(column))
+        values = [row[column] for row in self.rows]
+        if all(value is None or type(value) in (int, float) for value in values):
+            return np.array([math.nan if value is None else value for value in values])
+        return values
+
+    def table(self) -> Any:
+        """A row for each point: a `pandas.DataFrame`, without pandas a numpy record array."""
+        return frame({name: self[name] for name in self.columns})
+
+    def statistics(
+        self, columns: Sequence[str] | None = None, quantiles: Sequence[float] = (0.05, 0.5, 0.95)
+    ) -> Any:
+        """Of each column of numbers the points that have one, mean, standard deviation and quantiles.
+
+        Parameters
+        ----------
+        columns
+            Names of columns; None: what is varied, and the outputs.
+        quantiles
+            Shares of the points, 0 to 1, that are below; linear between two points.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each column, in its unit; a numpy record array without pandas. The deviation is that
+            of a sample (its squares over one less than the points), and NaN of one point.
+
+        Raises
+        ------
+        InputError
+            A column that is none of numbers, or quantiles outside 0 to 1.
+
+        Examples
+        --------
+        >>> rows = [{"point": i, "surface.friction": mu} for i, mu in enumerate((0.1, 0.2, 0.6))]
+        >>> table = SweepResult(("point", "surface.friction"), rows, {})
+        >>> found = table.statistics()
+        >>> found["column"][0], round(found["mean"][0], 3), round(found["deviation"][0], 3)
+        ('surface.friction', 0.3, 0.265)
+        """
+        if not all(isinstance(q, (int, float)) and 0.0 <= q <= 1.0 for q in quantiles):
+            raise InputError("quantiles", quantiles, "numbers from 0 to 1")
+        names = self._numeric if columns is None else columns
+        found: dict[str, list[Any]] = {}
+        for name in names:
+            values = self[name]
+            if isinstance(values, list):
+                raise InputError("columns", quoted(name), f"columns of numbers: {', '.join(self._numeric)}")
+            values = values[~np.isnan(values)]
+            row = {
+                "column": name,
+                "unit": self.units.get(name, ""),
+                "points": values.size,
+                **_moments(values),
+            }
+            row |= {f"q{q:g}": np.quantile(values, q) if values.size else math.nan for q in quantiles}
+            for key, value in row.items():
+                found.setdefault(key, []).append(value)
+        return frame({key: np.array(values) for key, values in found.items()})
+
+    @property
+    def _numeric(self) -> list[str]:
+        """Columns of numbers that are varied, or outputs."""
+        own = [name for name in self.columns if name not in (*FIRST, *LAST)]
+        return [name for name in own if not isinstance(self[name], list)]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table as `evfem sweep` does (`sweep.csv`), whole or not at all."""
+        write_text(path, sweep_csv(self.columns, self.rows, self.units))
+
+    def __repr__(self) -> str:
+        """Numbers of points by status."""
+        return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
+
+
+def _moments(values: Any) -> dict[str, float]:
+    """Mean and standard deviation of a sample."""
+    if not values.size:
+        return {"mean": math.nan, "deviation": math.nan}
+    deviation = float(np.std(values, ddof=1)) if values.size > 1 else math.nan
+    return {"mean": float(np.mean(values)), "deviation": deviation}
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file begins as the table of a sweep does."""
+    begin = f"{FIRST[0]},".encode()
+    with disk(f"read {path.name}"), path.open("rb") as file:
+        return file.read(len(begin)) == begin
+
+
+def read(path: Path) -> SweepResult:
+    """The table of a sweep, from its folder, its `sweep.json` or any of its csv files.
+
+    A csv file alone has neither provenance nor the kinds of its values: what looks like a number is one.
+    Raises InputError for what is no table of a sweep.
+    """
+    table = path / TABLE if path.is_dir() else path
+    told = table.parent / PROVENANCE
+    if table.suffix == ".json":
+        told, table = table, table.parent / TABLE
+    provenance = _provenance(told) if told.is_file() else {}
+    names, units, body = _cells(table)
+    known = {name: _kept(provenance, name) for name in names}
+    rows = [
+        {name: _value(name, cell, known[name]) for name, cell in zip(names, row, strict=True)} for row in body
+    ]
+    counted = Counter(str(row["status"]) for row in rows)
+    points = {"requested": len(rows), **{name: counted[name] for name in STATUS}}
+    return SweepResult(tuple(names), rows, {"points": points, **provenance}, units)
+
+
+def _provenance(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(found["points"], dict) or not isinstance(found["outputs"], list):
+            raise ValueError("no sweep")
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError("path", f"{path.name} ({error})", f"the {PROVENANCE} of a sweep") from None
+    return dict(found)
+
+
+def _cells(path: Path) -> tuple[list[str], dict[str, str], list[list[str]]]:
+    """Names, units and rows of text."""
+    allowed = f"{TABLE} of a sweep, a point in each line"
+    try:
+        with path.open(newline="", encoding="utf-8") as lines:
+            head, *body = list(csv.reader(lines, strict=True))
+    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or "not a table"
+        raise InputError("path", f"{path.name} ({reason})", allowed) from None
+    parts = [cell.removesuffix(")").partition(" (") for cell in head]
+    names = [name for name, _, _ in parts]
+    odd = [row for row in body if len(row) != len(names)]
+    if odd or names[:1] != [*FIRST] or not set(LAST) <= set(names):
+        raise InputError("path", f"{path.name}, which starts with {','.join(head)[:60]!r}", allowed)
+    return names, {name: unit for name, _, unit in parts if unit}, body
+
+
+def _kept(provenance: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The values of a column that the sweep was given, by their text in the table."""
+    given = (provenance.get("grid") or {}).get(name, ())
+    if isinstance(given, dict):
+        return {str(label): str(label) for label in given}
+    return {str(cell_of(value)): value for value in given}
+
+
+def _value(name: str, cell: str, known: Mapping[str, Any]) -> Any:
+    """The value in a cell; None where there is none."""
+    if name in ("status", "message"):
+        return cell
+    if cell in known:
+        return known[cell]
+    if not cell:
+        return None
+    try:
+        return json.loads(cell)
+    except ValueError:
+        return cell
+
+
+def told(points: Mapping[str, int]) -> str:
+    """What became of the points, in words.
+
+    >>> told({"requested": 3, "done": 2, "refused": 0, "not_converged": 1, "failed": 0})
+    '2 done, 1 not converged'
+    """
+    words = [f"{points[name]} {name.replace('_', ' ')}" for name in STATUS if points[name]]
+    missing = points["requested"] - sum(points[name] for name in STATUS)
+    return ", ".join([*words, *([f"{missing} not computed"] if missing else [])])
