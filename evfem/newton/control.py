@@ -311,7 +311,7 @@ class FollowFriction(VoltageControl):
         if not self.free:
             return VoltageStep(problem.solve(step))
         unit, push = problem.unit()
-        along = np.zeros(step.body.dim)
+        along = np.zeros(step.bone.size)
         along[::2] = self.way
         unknown = ExtraUnknown(push, 0, self.force, along=along)
         found = problem.solve(replace(step, unknowns=(*step.unknowns, unknown)))
