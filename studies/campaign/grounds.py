@@ -58,7 +58,7 @@ def add_both_ways(random: Draw, table: Tables) -> None:
         table["points"] = [[six_digits(a), six_digits(b)] for a, b in zip(x, height, strict=True)]
     elif kind == "grating":
         period = random.between(8.0, 12.0)
-        table |= {"period": period, "groove_depth": amplitude, "wall_width": six_digits(0.5 * period)}
+        table |= {"period": period, "groove_depth": amplitude, "wall_width": six_digits(0.45 * period)}
     elif kind == "relief":
         x = np.linspace(-20.0, 20.0, 41)
         height = amplitude * np.sin(one * x) * np.cos(other * x[:, None])
