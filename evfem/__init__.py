@@ -50,6 +50,10 @@ _NAMES = {
     "scene.options": ("Output", "Solver"),
     "scene.probes": ("Probe",),
     "planning.plan": ("plan",),
+    "response.parameters": ("ShapeChange",),
+    "response.design": ("design",),
+    "response.sensitivities": ("Sensitivities", "sensitivities"),
+    "response.uncertainty": ("uncertainty",),
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),
     "simulation.checkpoint": ("Checkpoint",),
@@ -127,7 +131,9 @@ def __getattr__(name: str) -> Any:
     elif name in _GONE:
         raise AttributeError(f"{name}: {_GONE[name]}")
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        close = _import_module(f"{__name__}.errors").near(name, __all__)
+        meant = f"; did you mean {close[0]}?" if close else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
     globals()[name] = value
     return value
 

@@ -59,6 +59,11 @@ from evfem.mesh.mesh import Mesh as Mesh
 from evfem.newton.hand import Hand as Hand
 from evfem.newton.strategy import Strategy as Strategy
 from evfem.planning.plan import plan as plan
+from evfem.response.design import design as design
+from evfem.response.parameters import ShapeChange as ShapeChange
+from evfem.response.sensitivities import Sensitivities as Sensitivities
+from evfem.response.sensitivities import sensitivities as sensitivities
+from evfem.response.uncertainty import uncertainty as uncertainty
 from evfem.scene import file as _scene_file
 from evfem.scene.motion import Hover as Hover
 from evfem.scene.motion import Press as Press

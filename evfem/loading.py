@@ -11,8 +11,8 @@ from evfem.errors import InputError
 
 Found = Any  # Result, FitResult, VoltageProfile, Sampled, Scene, Sweep, SweepResult, Mesh or Texture
 ALLOWED = (
-    "the folder of a run or a sweep, a result (.npz), a fit (.json), a signal (.csv, .wav), a scene or a "
-    "sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
+    "the folder of a run or a sweep, a result (.npz), a fit (.json), a signal (.csv, .wav, .hjif), a scene "
+    "or a sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
 )
 #: format of the fast models that 0.2 saved
 FAST_MODEL = "evfem-reduced-1"
@@ -35,11 +35,11 @@ def load(path: str | Path) -> Found:
     SweepResult
         From the folder of a sweep, its `sweep.json`, or a csv file with its table.
     VoltageProfile, Sampled
-        From .csv or .wav; `Sampled` from a .csv over time.
+        From .csv, .wav or .hjif; `Sampled` from a .csv over time.
     Scene, Sweep
         From .toml.
     Mesh
-        From .vtu or .msh.
+        From .vtu, .msh or another format of meshio's.
 
     Raises
     ------
@@ -102,7 +102,16 @@ def _signal(path: Path) -> Found:
     from evfem.electrostatics.signalfile import read_voltage
     from evfem.sweeps import table
 
-    return table.read(path) if table.is_table(path) else read_voltage(path)
+    if table.is_table(path):
+        return table.read(path)
+    try:
+        return read_voltage(path)
+    except InputError as error:
+        if path.suffix.lower() != ".csv":
+            raise
+        allowed = "a voltage (position,voltage or time,voltage) or the table of a sweep; measurements: "
+        allowed += "`ev.MeasuredCurve.from_csv`, heights and friction: `evfem texture import`"
+        raise InputError("path", error.given, allowed) from None
 
 
 def _tables(path: Path) -> Found:
@@ -133,7 +142,7 @@ READERS: Mapping[str, Callable[[Path], Found]] = {
     ".csv": _signal,
     ".json": _fit,
     ".wav": _signal,
+    ".hjif": _signal,
     ".toml": _tables,
-    ".vtu": _mesh,
-    ".msh": _mesh,
+    **dict.fromkeys((".vtu", ".msh", ".inp", ".med", ".e", ".exo", ".xdmf", ".vtk", ".mesh", ".bdf"), _mesh),
 }

@@ -19,7 +19,7 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
+        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray"},
         "arrays constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
@@ -71,6 +71,7 @@ ROOMS = {
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
         "samples file folder table run check",
     ),
+    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities uncertainty design"),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
@@ -106,6 +107,7 @@ LATE = {
     "distributed",
     "pyarrow",
     "pandas",
+    "xarray",
     "SurfaceTopography",
 }
 #: compiled from C, without imports
@@ -324,5 +326,7 @@ def test_every_public_name_can_be_loaded_and_is_listed():
     for name in evfem.__all__:
         assert getattr(evfem, name) is not None
     assert set(evfem.__all__) <= set(dir(evfem))
-    with pytest.raises(AttributeError, match="no attribute 'pinger'"):
+    with pytest.raises(AttributeError, match=r"no attribute 'pinger'"):
         evfem.pinger  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'FingerPd'; did you mean FingerPad\?"):
+        evfem.FingerPd  # noqa: B018

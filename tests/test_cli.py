@@ -372,13 +372,9 @@ def test_another_failure_of_the_system_is_not_taken_for_one_of_the_output(monkey
 
 BAD_SCENES = {
     "unknown key": ("friction = 0.2", "frictoin = 0.2", "surface.frictoin"),
-    "wrong type": ("E = 0.05", "E = 'soft'", "finger.materials.soft.E"),
-    "negative": ("E = 0.05", "E = -1.0", "finger.materials.soft.E"),
     "no TOML": ("version = 1", "version = ", "scene"),
     "missing mesh": ("square.vtu", "none.vtu", "finger.mesh"),
     "mesh that is none": ("square.vtu", "square.toml", "finger.mesh"),
-    "missing region": ("[finger.materials.hard]", "[finger.materials.nail]", "finger.materials"),
-    "element of other cells": ("[output]", "[solver]\nelement = 'p2'\n[output]", "solver.element"),
     "voltage without skin": ("[output]", "[electrostatics]\nlaw = 'kaczmarek'\nvoltage = 1\n"
                              "insulator_thickness = 0.1\ninsulator_eps_r = 3\n[output]", "finger"),
     "below the finger": ("friction = 0.2", "friction = 0.2\ny = 1.0", "surface.y"),

@@ -17,6 +17,18 @@ from evfem.simulation.checkpoint import Checkpoint
 
 PRESS = f"{SQUARE_SCENE}\n[[motion]]\nkind = 'press'\nindentation = 0.1\nsteps = 2\n"
 SWEEP = "version = 1\nscene = 'square.toml'\n[grid]\nsurface.friction = [0.1, 0.2]\n"
+SETS = """*NODE
+1, 0, 0
+2, 4, 0
+3, 4, 4
+4, 0, 4
+*ELEMENT, TYPE=S4, ELSET=tissue
+1, 1, 2, 3, 4
+*NSET, NSET=pad
+1, 2
+*NSET, NSET=bone
+3, 4
+"""
 
 
 @pytest.fixture
@@ -44,6 +56,8 @@ def test_each_file_is_known_by_what_is_in_it(place):
     assert isinstance(ev.load(place / "two.toml"), ev.Sweep)
     assert ev.load("square.vtu").kind == "quad9"
     assert ev.load("square.msh").kind == "quad"
+    (place / "sets.inp").write_text(SETS)
+    assert sorted(ev.load("sets.inp").node_sets) == ["bone", "pad"]
 
 
 def test_what_is_no_file_of_ours_gets_a_sentence(place):
@@ -58,7 +72,9 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
         "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",
         "pad.npz": "a fast model; allowed: other files: the fast model is gone since 0.3, `ev.simulate`",
         "square.toml": "frictoin",
+        "scan.csv": "path: given scan.csv, which starts with 'x,height'; allowed: a voltage (position,",
     }
+    (place / "scan.csv").write_text("x,height\n0,1\n1,2\n")
     (place / "square.toml").write_text(PRESS.replace("friction", "frictoin"))
     for name, words in cases.items():
         with pytest.raises(InputError) as caught:

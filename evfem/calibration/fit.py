@@ -5,8 +5,9 @@ region reflective method (Branch, Coleman and Li 1999, doi:10.1137/S106482759528
 `least_squares` with bounds). Where a measurement has no sd, the root mean square of its values
 takes its place: all its numbers weigh the same, and measurements of other units weigh alike.
 
-The Jacobian is of one-sided differences in the unknowns (`evfem.calibration.parameters`), one step
-of `STEP` for each, computed side by side. At the end one more run for each unknown, `FAR` steps away,
+The Jacobian is exact where all that is compared has derivatives (`evfem.response`), else of one-sided
+differences in the unknowns (`evfem.calibration.parameters`), one step of `STEP` for each, computed side
+by side. At the end one more run for each unknown, `FAR` steps away,
 says whether its residuals are smooth: they are not where whole nodes, snaps or steps are counted, and
 such a fit ends anywhere. A scene that the solver does not solve makes a trial step
 shorter; one beside an accepted point is tried on the other side.
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +26,16 @@ import tomli_w
 
 from evfem.calibration.confidence import confidence
 from evfem.calibration.measured import Measured, MeasuredCurve, MeasuredValues, Question
-from evfem.calibration.parameters import Given, Parameters
+from evfem.calibration.parameters import Given, Parameters, number_at
 from evfem.calibration.result import FitResult
-from evfem.calibration.runs import Runs, grouped
+from evfem.calibration.runs import Runs, derivative_of, grouped
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.pools import open_pool
 from evfem.common.storage import alone_in
 from evfem.errors import InputError, quoted
+from evfem.response.parameters import parameter_of
 from evfem.scene.file import loads, read_text, tables_of
 from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
@@ -173,6 +175,17 @@ class _Problem:
         return tomli_w.dumps(self.parameters.applied(self.tables, keys, values))
 
     @property
+    def exact(self) -> list[str]:
+        """The parameters that have derivatives."""
+        start = {key: float(one.value(0.0)) for key, one in self.parameters.free.items()}
+        scene, found = loads(self.text(self.runs[0][0], start), self.paths), []
+        for key in self.parameters.names:
+            with suppress(InputError):
+                parameter_of(scene, key)
+                found.append(key)
+        return found
+
+    @property
     def digest(self) -> str:
         """Fingerprint of everything that the fit's steps follow from."""
         return digest((self.tables, self.parameters, self.questions, self.measured, self.scale))
@@ -203,16 +216,19 @@ class _Residuals:
     def __init__(self, problem: _Problem, runs: Runs, progress: bool) -> None:
         self.problem, self.runs, self.progress = problem, runs, progress
         self.failed = ""
+        self.exact = problem.exact
 
-    def predicted(self, points: Sequence[Floats]) -> list[Floats]:
-        """What the runs say for each measured value at each point; NaN where a scene is not solved."""
+    def predicted(self, points: Sequence[Floats], by: tuple[str, ...] = ()) -> list[Floats]:
+        """What the runs, differentiated `by` these keys, say for each measured value at each point; NaN where
+        a scene is not solved.
+        """
         problem = self.problem
         values = [problem.parameters.values(z) for z in points]
         texts = [[problem.text(keys, one) for keys, _ in problem.runs] for one in values]
         wanted = [
             (text, questions) for row in texts for text, (_, questions) in zip(row, problem.runs, strict=True)
         ]
-        answers = iter(self.runs.ask(wanted))
+        answers = iter(self.runs.ask(wanted, by))
         return [self._gathered([next(answers) for _ in row]) for row in texts]
 
     def _gathered(self, answers: list[Any]) -> Floats:
@@ -230,7 +246,7 @@ class _Residuals:
 
     def __call__(self, z: Floats) -> Floats:
         """(run - measured) / scale, (N,)."""
-        (predicted,) = self.predicted([z])
+        (predicted,) = self.predicted([z], tuple(self.exact))
         residuals = (predicted - self.problem.measured) / self.problem.scale
         if self.progress:
             told = ", ".join(f"{k} {v:.5g}" for k, v in self.problem.parameters.values(z).items())
@@ -240,13 +256,48 @@ class _Residuals:
 
     def jacobian(self, z: Floats) -> Floats:
         """Derivatives of the residuals by the unknowns, (N, P)."""
+        names, found = self.problem.parameters.names, self._derivatives(z)
+        self.exact = [name for name in self.exact if np.isfinite(found[name]).all()]
+        rest = [i for i, name in enumerate(names) if name not in self.exact]
+        differenced = dict(zip(rest, self._differences(z, rest), strict=True))
+        columns = [
+            differenced[i] if i in differenced else found[name] / self.problem.scale
+            for i, name in enumerate(names)
+        ]
+        return np.column_stack(columns)
+
+    def _derivatives(self, z: Floats) -> dict[str, Floats]:
+        """Exact derivatives (N,) of what the runs say by the unknowns that have had them; NaN without."""
+        problem, parameters = self.problem, self.problem.parameters
+        if not self.exact:
+            return {}
+        values = parameters.values(z)
+        texts = [problem.text(keys, values) for keys, _ in problem.runs]
+        wanted = [(text, questions) for text, (_, questions) in zip(texts, problem.runs, strict=True)]
+        answers = self.runs.ask(wanted, tuple(self.exact))
+        found = {}
+        for name in self.exact:
+            i = parameters.names.index(name)
+            numbers: dict[tuple[str, Question], Floats] = {}
+            for (keys, questions), text, answer in zip(problem.runs, texts, answers, strict=True):
+                slope = parameters.free[name].slope(float(z[i]), number_at(tables_of("scene", text), name))
+                for one in questions:
+                    rates = [answer.outputs.get(derivative_of(each, name)) for each in one.names]
+                    numbers[digest(dict(keys)), one] = slope * np.array(rates, dtype=float)
+            rows = [numbers[digest(dict(keys)), question] for keys, question in problem.questions]
+            found[name] = np.concatenate([np.zeros(0), *rows])
+        return found
+
+    def _differences(self, z: Floats, which: Sequence[int]) -> list[Floats]:
+        """Derivatives (N,) of the residuals by some unknowns, by one-sided differences."""
+        if not which:
+            return []
         _, high = self.problem.parameters.bounds
         steps = np.where(z + STEP <= high, STEP, -STEP)
-        here, *there = self.predicted(
-            [z, *(z + h * unit for h, unit in zip(steps, np.eye(len(z)), strict=True))]
-        )
+        here, *there = self.predicted([z, *(z + steps[i] * np.eye(len(z))[i] for i in which)])
         columns = []
-        for i, (step, beside) in enumerate(zip(steps, there, strict=True)):
+        for i, beside in zip(which, there, strict=True):
+            step = steps[i]
             if not np.isfinite(beside).all():
                 step, (beside,) = -step, self.predicted([z - step * np.eye(len(z))[i]])
             if not np.isfinite(beside).all():
@@ -255,7 +306,7 @@ class _Residuals:
                     f"parameters.{key}", f"a scene that is not solved: {self.failed}", "other bounds"
                 )
             columns.append((beside - here) / step / self.problem.scale)
-        return np.column_stack(columns)
+        return columns
 
     def roughness(self, z: Floats, residuals: Floats, jacobian: Floats) -> list[str]:
         """A sentence for every unknown whose `residuals` (N,) at z change otherwise over `FAR` steps than

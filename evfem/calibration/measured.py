@@ -21,7 +21,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice, set_frozen
 from evfem.common.tables import numbers, read_headed, read_table
-from evfem.errors import InputError, quoted, unknown
+from evfem.errors import InputError, quoted, readable, unknown
 from evfem.scene.keys import shown
 from evfem.scene.options import Solver
 from evfem.scene.scene import DEPTH
@@ -52,6 +52,11 @@ class Along:
         where = "" if self.motion is None else f" in motion {self.motion}"
         return tuple(f"{self.column} at {self.over} {x!r}{where}" for x in self.at)
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that the values follow from."""
+        return (self.column, self.over)
+
     def answers(self, result: Result) -> dict[str, float | None]:
         """The values by name."""
         values = along(result, self.column, self.over, np.array(self.at), self.motion)
@@ -68,6 +73,11 @@ class Single:
     def names(self) -> tuple[str, ...]:
         """The name of the value."""
         return (self.output,)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The column that the value follows from."""
+        return (self.output.split(".")[0],)
 
     def answers(self, result: Result) -> dict[str, float | None]:
         """The value by name."""
@@ -110,7 +120,8 @@ class MeasuredCurve:
     def __post_init__(self) -> None:
         for name in ("column", "over"):
             if getattr(self, name) not in NUMBERS:
-                raise unknown(f"data.{name}", str(getattr(self, name)), list(NUMBERS))
+                given = str(getattr(self, name))
+                raise unknown(f"data.{name}", given, list(NUMBERS), f"{quoted(given)}, no column")
         set_frozen(self, at=numbers("data.at", self.at, f"a list of places, of {self.over}"))
         set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as places"))
         if len(np.unique(self.at)) < len(self.at):
@@ -156,6 +167,11 @@ class MeasuredCurve:
             given = f"{Path(path).name} with the header {','.join(table.names)}"
             allowed = "two columns of the history, as indentation,normal_force; and sd; or `columns`"
             raise InputError("data", given, allowed)
+        foreign = [name for name in (over, *others) if name not in NUMBERS]
+        if foreign and columns is None:
+            given = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
+            allowed = 'columns of the history, or columns={"indentation": %s, "normal_force": %s}'
+            raise InputError("data", given, allowed % tuple(map(readable, (over, *others))))
         found = [
             table.column(f"data.columns.{name}", wanted[name], _bases(others[0] if name == "sd" else name))
             for name in (over, *others, "sd")

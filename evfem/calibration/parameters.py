@@ -65,6 +65,12 @@ class Parameter:
             return math.log(value / self.start)
         return (value - self.start) / (self.high - self.low)
 
+    def slope(self, unknown: float, present: float) -> float:
+        """Derivative of the number `present` that a scene has for it by its unknown z."""
+        value = float(self.value(unknown))
+        rate = value if self.logarithmic else self.high - self.low
+        return present / value * rate if self.apply == "factor" else rate
+
     def value(self, unknown: Any) -> Any:
         """The value of an unknown z, numbers or arrays."""
         if self.logarithmic:
@@ -130,13 +136,13 @@ class Parameters:
         for key, parameter in self.free.items():
             value = values[key]
             if parameter.apply != "value":
-                present = _present(changed, key)
+                present = number_at(changed, key)
                 value = present * value if parameter.apply == "factor" else present + value
             put_in(changed, key, value)
         return changed
 
 
-def _present(tables: Any, key: str) -> float:
+def number_at(tables: Any, key: str) -> float:
     """The number that the scene has under a dotted key."""
     here = tables
     for name in key.split("."):

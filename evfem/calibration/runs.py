@@ -12,24 +12,68 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import evfem
 from evfem.calibration.measured import Question
 from evfem.common.digest import digest
 from evfem.common.pools import Pool
 from evfem.errors import InputError
+from evfem.response.lines import differentiable
+from evfem.response.sensitivities import Sensitivities, sensitivities
 from evfem.scene.file import loads
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Result
+from evfem.simulation.run import simulate
 from evfem.sweeps.folder import Answer, SweepFolder
 from evfem.sweeps.run import answered, compute
 
-Job = tuple[str, str, tuple[Question, ...]]  # scene as text, folder of its paths, what is asked
+Asked = tuple[Question, ...]
+Outputs = dict[str, float | None]
+#: scene as text, folder of its paths, what is asked, keys by which it is differentiated
+Job = tuple[str, str, Asked, tuple[str, ...]]
+#: share of a parameter over which answers are differenced along the derivatives of the history
+ALONG = 1e-5
 
 
 def work(job: Job) -> Answer:
     """Run one scene and ask it all questions; whatever happens to it is in the answer."""
-    text, folder, questions = job
-    return answered(
-        text, folder, lambda result: {k: v for q in questions for k, v in q.answers(result).items()}
-    )
+    text, folder, questions, keys = job
+    columns = sorted({column for q in questions for column in q.columns})
+    if not (keys and all(map(differentiable, columns))):
+        return answered(text, folder, lambda result: _answers(result, questions))
+
+    def run(scene: Scene) -> Result | Sensitivities:
+        try:
+            return sensitivities(scene, keys, columns)
+        except InputError:  # of a parameter without derivatives, or else of the scene: then once more
+            return simulate(scene)
+
+    return answered(text, folder, lambda found: _with_derivatives(found, questions), run)
+
+
+def _answers(result: Result, questions: Asked) -> Outputs:
+    return {k: v for q in questions for k, v in q.answers(result).items()}
+
+
+def _with_derivatives(found: Result | Sensitivities, questions: Asked) -> Outputs:
+    """The answers of a run, and their derivatives by each of its parameters."""
+    if not isinstance(found, Sensitivities):
+        return _answers(found, questions)
+    outputs = _answers(found.result, questions)
+    for key, value in found.parameters.items():
+        way = ALONG * (abs(value) or 1.0)
+        more, less = (_answers(found.moved({key: sign * way}), questions) for sign in (1.0, -1.0))
+        for name in list(more):
+            ends = np.array([more[name], less[name]], dtype=float)
+            rate = float(ends[0] - ends[1]) / (2.0 * way)
+            outputs[derivative_of(name, key)] = rate if np.isfinite(rate) else None
+    return outputs
+
+
+def derivative_of(name: str, key: str) -> str:
+    """How the derivative of an answer by a key is called."""
+    return f"{name} by {key}"
 
 
 @dataclass
@@ -45,26 +89,28 @@ class Runs:
     answers: dict[str, Answer] = field(default_factory=dict)
     computed: int = 0
 
-    def ask(self, wanted: Sequence[tuple[str, tuple[Question, ...]]]) -> list[Answer]:
-        """The answers to each pair of a scene's text and the questions about it."""
+    def ask(self, wanted: Sequence[tuple[str, Asked]], by: tuple[str, ...] = ()) -> list[Answer]:
+        """The answers to each pair of a scene's text and the questions about it, and where they have them,
+        their derivatives `by` keys of the scene (`derivative_of`).
+        """
         jobs: dict[str, Job] = {}
         keys = []
         for text, questions in wanted:
-            key = self._key(text, questions)
+            key = self._key(text, questions, by)
             keys.append(key)
             if key not in self.answers:
-                jobs[key] = (text, str(self.paths), questions)
+                jobs[key] = (text, str(self.paths), questions, by)
         compute(work, jobs, self.pool, self._keep)
         return [self.answers[key] for key in keys]
 
-    def _key(self, text: str, questions: tuple[Question, ...]) -> str:
+    def _key(self, text: str, questions: Asked, by: tuple[str, ...]) -> str:
         try:
             scene = loads(text, self.paths).digest()
         except InputError as error:
             key = digest((text, "refused"))
             self.answers[key] = Answer("refused", 0.0, str(error), {})
             return key
-        key = digest((scene, questions, evfem.__version__))
+        key = digest((scene, questions, evfem.__version__, *([by] if by else [])))
         if key not in self.answers and self.folder is not None:
             kept = self.folder.read(key)
             if kept is not None:

@@ -117,6 +117,18 @@ def frame(columns: Mapping[str, Any]) -> Any:
     return records
 
 
+def dataset(
+    variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Mapping[str, Any]
+) -> Any:
+    """An `xarray.Dataset`; InputError where xarray is not installed."""
+    try:
+        from xarray import Dataset
+    except ModuleNotFoundError as error:
+        given = f"a data set of xarray, and no {error.name}"
+        raise InputError("to_xarray", given, "pip install 'evfem[xarray]', or table()") from None
+    return Dataset(variables, coordinates, attributes)
+
+
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:
     """Rows as lines of a csv file: floats with every digit that counts, nothing for None.
 

@@ -1,4 +1,4 @@
-r"""Voltage signals in files: out as csv, 16-bit WAV, friction map and MPEG haptics, back from csv and WAV.
+r"""Voltage signals in files: csv, 16-bit WAV, friction map and MPEG haptics; all but the map are read back.
 
 A WAV runs over time, a signal over position; the sliding speed turns one into the other. What a
 file needs to be understood (volts of the largest sample, speed, first position) stands in its own
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
@@ -36,6 +37,8 @@ from evfem.errors import ABSENT, InputError, quoted, readable
 
 MAP_FORM = "evfem-friction-map-1"
 MOST_COLUMNS, ROWS = 100_000, 64
+#: what a friction perception of a .hjif says of its coefficients
+FRICTIONS = re.compile(r"coefficient, (\S+) to (\S+),")
 
 
 @dataclass(frozen=True)
@@ -153,25 +156,28 @@ def read_signal(path: str | Path) -> VoltageProfile:
     Parameters
     ----------
     path
-        A `.wav` of `write_signal`, or a csv file (any other ending).
+        A `.wav` or `.hjif` of `write_signal`, or a csv file (any other ending).
 
     Returns
     -------
     VoltageProfile
         From a WAV a row per sample: the voltage within half a step (full_scale / 32767) at the
-        samples, linear in between, so that a jump takes speed / rate mm.
+        samples, linear in between, so that a jump takes speed / rate mm. From a `.hjif` a row per
+        keyframe: the magnitude that makes its friction, within 1 % of full scale.
 
     Raises
     ------
     InputError
-        A `.png`, `.hjif`, missing, cut off or foreign file, more than 1,000,000 rows, or a WAV with a
+        A `.png`, missing, cut off or foreign file, more than 1,000,000 rows, or a WAV with a
         carrier, whose samples are not the effective voltage.
     """
     ending = Path(path).suffix.lower()
     if ending == ".wav":
         return _from_wav(Path(path))
-    if ending in (".png", ".hjif"):
-        raise InputError("path", str(path), "a csv file or .wav: others do not keep the whole signal")
+    if ending == ".hjif":
+        return _from_hjif(Path(path))
+    if ending == ".png":
+        raise InputError("path", str(path), "a csv file, .wav or .hjif: a map does not keep the signal")
     return VoltageProfile.from_csv(path)
 
 
@@ -263,6 +269,19 @@ def _from_wav(path: Path) -> VoltageProfile:
         raise InputError("path", given, error.allowed) from None
     position = _positions(samples.size, start, speed / rate)
     return VoltageProfile(position, samples / wav.LARGEST_SAMPLE * full_scale)
+
+
+def _from_hjif(path: Path) -> VoltageProfile:
+    position, friction, told = wav.read_friction(path)
+    allowed = "a .hjif with the largest voltage and the friction without it, as evfem writes it"
+    try:
+        full_scale = float(told["reference_devices"][0]["maximum_voltage"])
+        ((natural, largest),) = (map(float, pair) for pair in FRICTIONS.findall(told["description"]))
+        share = (friction - natural) / (largest - natural)
+        voltage = full_scale * np.sqrt(np.clip(share, 0.0, 1.0))
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, ZeroDivisionError):
+        raise InputError("path", f"{path.name}, without them", allowed) from None
+    return VoltageProfile(position, voltage)
 
 
 def _map(profile: VoltageProfile, playback: Playback) -> bytes:
@@ -367,7 +386,7 @@ def haptics(
     perception = {
         "id": 0,
         "avatar_id": NO_AVATAR,
-        "description": f"friction coefficient, {natural:g} to {largest:g}, over the position",
+        "description": f"friction coefficient, {natural!r} to {largest!r}, over the position",
         "perception_modality": "Friction",
         "unit_exponent": exponent,
         "perception_unit_exponent": 0,

@@ -1,4 +1,5 @@
-"""WAV files, and the comment in which evfem says what a sample means.
+"""WAV files, and the comment in which evfem says what a sample means; what AHAP files and
+MPEG haptics (.hjif) of others hold.
 
 evfem writes 16 bit, one channel, and in LIST/INFO/ICMT a JSON text with the volts of the largest
 sample, the speed, the first position and the carrier. scipy reads WAVs of any width; it knows no
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import warnings
 from contextlib import suppress
@@ -25,8 +27,11 @@ FORM = "evfem-voltage-1"
 KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
 LARGEST_SAMPLE = 32_767
 MOST_SAMPLES = 50_000_000
+MOST_PATTERN = 1_000_000
 #: comment and headers of a file on top of its samples
 MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
+#: what the description of a .hjif says of the first position
+FROM = re.compile(r"from (\S+) mm")
 
 
 def encoded(samples: Any, rate: int, scale: dict[str, Any]) -> bytes:
@@ -82,3 +87,89 @@ def shares(samples: Any) -> Floats:
     if samples.dtype.kind == "u":  # 8 bit, around 128
         return (samples.astype(float) - 128.0) / 127.0
     return np.asarray(samples / float(np.iinfo(samples.dtype).max))
+
+
+def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
+    """Intensity (n,), 0 to 1, of a haptic pattern (AHAP, JSON) at `rate` (Hz) from time 0 on: at every moment
+    that of its strongest event, times the curves and values of its HapticIntensityControl.
+
+    A transient event, which has no duration, lasts `tap` s. Sharpness, audio and envelopes are left out.
+    Raises InputError for a file that is missing, damaged, without events or longer than 1,000,000 samples.
+    """
+    allowed = "an AHAP file: JSON with a Pattern of haptic events"
+    try:
+        with path.open("rb") as file:
+            pattern = json.loads(file.read(MOST_BYTES))["Pattern"]
+        events = [_event(one["Event"], tap) for one in pattern if "Event" in one]
+        events = [one for one in events if one[2] > 0.0]
+        size = int(np.ceil(max(end for _, end, _ in events) * rate)) + 1
+        if not 1 < size <= MOST_PATTERN:
+            raise InputError(key, f"{path.name} with {size} samples", f"2 to {MOST_PATTERN} samples")
+        time, found = np.arange(size) / rate, np.zeros(size)
+        for start, end, strength in events:
+            inside = (time >= start) & (time < end)
+            found[inside] = np.maximum(found[inside], strength)
+        for one in pattern:
+            found *= _control(one, time)
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise InputError(key, f"{path.name}, of another kind or damaged", allowed) from None
+    return np.clip(found, 0.0, 1.0)
+
+
+def _event(event: dict[str, Any], tap: float) -> tuple[float, float, float]:
+    """Start (s), end (s) and intensity of a haptic event; 0 of any other."""
+    start, kind = float(event["Time"]), event["EventType"]
+    if kind not in ("HapticTransient", "HapticContinuous"):
+        return start, start, 0.0
+    lasts = tap if kind == "HapticTransient" else float(event["EventDuration"])
+    own = {one["ParameterID"]: float(one["ParameterValue"]) for one in event.get("EventParameters", ())}
+    return start, start + lasts, own.get("HapticIntensity", 1.0)
+
+
+def _control(part: dict[str, Any], time: Floats) -> Any:
+    """What a part of a pattern multiplies all intensities with: straight lines between the points of a curve,
+    a value from its time on.
+    """
+    own = part.get("ParameterCurve") or part.get("Parameter") or {}
+    if own.get("ParameterID") != "HapticIntensityControl":
+        return 1.0
+    start = float(own["Time"])
+    if "ParameterValue" in own:
+        return np.where(time >= start, float(own["ParameterValue"]), 1.0)
+    points = [(float(p["Time"]), float(p["ParameterValue"])) for p in own["ParameterCurveControlPoints"]]
+    places, values = np.array(points).T
+    return np.interp(time, start + places, values, left=1.0)
+
+
+def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:
+    """Places (n,) in mm and coefficients (n,) of the first friction perception of a `.hjif`, and all that it
+    says of that perception.
+
+    Raises InputError for a file without one, or one that is no curve over a length.
+    """
+    allowed = "a .hjif with a friction perception: a curve of two or more keyframes over a length"
+    try:
+        with path.open("rb") as file:
+            whole = json.loads(file.read(MOST_BYTES))
+        (told, *_) = (one for one in whole["perceptions"] if one["perception_modality"] == "Friction")
+        (channel,) = told["channels"]
+        ((frames,),) = ([effect["keyframes"] for effect in band["effects"]] for band in channel["bands"])
+        place, share = (
+            np.array([float(frame[name]) for frame in frames])
+            for name in ("relative_position", "amplitude_modulation")
+        )
+        found = FROM.search(str(whole.get("description")))
+        start = float(found.group(1)) if found else 0.0
+        position = start + place * 10.0 ** (int(told["unit_exponent"]) + 3)
+        friction = float(channel["gain"]) * share
+        if place.size < 2 or not (np.diff(position) > 0.0).all() or not np.isfinite(friction).all():
+            raise ValueError("keyframes")
+    except OSError as error:
+        raise InputError("path", f"{path.name} ({error.strerror or error})", allowed) from None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise InputError("path", f"{path.name}, of another kind or damaged", allowed) from None
+    return position, friction, dict(told)

@@ -17,12 +17,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import check_fields, instance, one_of, set_frozen, yes_or_no
+from evfem.common.checks import check_fields, instance, one_of, set_frozen, truth
 from evfem.common.views import short
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
-from evfem.finger.scan import RidgeScan, ScannedRidges
+from evfem.finger.scan import RidgeScan, ScannedRidges, is_texture
 from evfem.finger.section import FULL, ZONE, Divisions, Section
 from evfem.finger.sizes import (
     STEEPEST,
@@ -60,6 +60,13 @@ RESOLUTIONS: Mapping[str, Divisions] = {
     "fine": Divisions(24, (("epidermis", 0), ("dermis", -1)), side=9, upper=9, nail=18),
 }
 
+
+def _ridges(key: str, value: Any) -> Any:
+    """True, False, or a scan: what a file has in `ridge_scan`."""
+    return value if isinstance(value, RidgeScan) or is_texture(value) else truth(key, value)
+
+
+RIDGES = {"allowed": "true | false", "type": bool, "check": _ridges}
 _SCAN = str | dict[str, list[float]]
 _MESH = instance("the path of a mesh file", str, os.PathLike, Mesh)
 _MESH |= {"key": "mesh", "type": str, "file": meshfile.LARGEST}
@@ -85,8 +92,10 @@ class FingerPad(LayeredFinger):
     the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep, along the ellipse's normal; with
     `ridge_crest` > 0 crest and groove are flat instead, with cosine-shaped walls. Ridges fade out between
     0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape that meets the ratio of
-    ridge to gross contact area of Adams et al. (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan` (or a
-    `RidgeScan`) takes the place of this profile; `ridge_width` then says how finely the pad is divided.
+    ridge to gross contact area of Adams et al. (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan`, or
+    as `ridges` a `RidgeScan` or a `Texture` of heights (of `evfem texture import`; its middle comes below the
+    middle of the finger), takes the place of this profile; `ridge_width` then says how finely the pad is
+    divided.
 
     **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the ridges: the
     stratum corneum is `ridge_height` thinner in a groove. Its thickness, outline and ridges are Table 2 of
@@ -114,7 +123,7 @@ class FingerPad(LayeredFinger):
     evfem.errors.InputError: finger.ridge_height: given 0.5; allowed: 0.02 to 0.4 mm
     """
 
-    ridges: Annotated[bool, yes_or_no(), "whether there are fingerprint ridges"] = True
+    ridges: Annotated[Any, RIDGES, "whether there are fingerprint ridges"] = True
     resolution: Annotated[str, one_of(*RESOLUTIONS), "about 3k, 10k, 22k, 50k nodes"] = "medium"
     ridge_scan: Annotated[
         RidgeScan | str | os.PathLike[str] | None,
@@ -130,6 +139,8 @@ class FingerPad(LayeredFinger):
         with mistakes.of_a_part():
             check_fields(self, "finger.")
         with mistakes.of_a_part():
+            if isinstance(self.ridges, RidgeScan) or is_texture(self.ridges):
+                set_frozen(self, ridge_scan=self.ridges, ridges=True)
             if self.ridge_scan is not None:
                 set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
                 _check_alone(self)

@@ -77,9 +77,16 @@ class RidgeScan:
 
     @classmethod
     def of(cls, given: Any) -> RidgeScan:
-        """A scan, or one made of the path of its file or of its columns {"x": ..., "y": ...}."""
+        """A scan, or one made of a texture of heights, whose middle comes below the middle of the finger, of
+        the path of its file, or of its columns {"x": ..., "y": ...}.
+        """
         if isinstance(given, RidgeScan):
             return given
+        if is_texture(given):
+            if given.quantity != "height":
+                raise InputError("finger.ridges", f"a texture of {given.quantity}", "a texture of heights")
+            x = np.asarray(given.x)
+            return cls(x - 0.5 * (x[0] + x[-1]), height=given.values)
         if isinstance(given, (str, Path)):
             return cls.from_csv(given)
         if isinstance(given, Mapping) and set(given) in ({"x", "height"}, {"x", "y"}):
@@ -122,6 +129,11 @@ class RidgeScan:
                 "finger.ridge_scan", given, "one that fits finger.width and finger.height, smoothed"
             )
         return foot, below
+
+
+def is_texture(given: Any) -> bool:
+    """Whether this is what `evfem texture import` made of a file."""
+    return all(hasattr(given, name) for name in ("quantity", "x", "values"))
 
 
 def _projected(outer: Ellipse, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:

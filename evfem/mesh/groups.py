@@ -157,9 +157,8 @@ def regions_in(
     nameless = {one.number for one in solid if (owner[start[one.block] + one.cells] == "").any()}
     if nameless:
         given = f"no name for {', '.join(map(str, sorted(nameless)))} of {path.name}"
-        raise InputError(
-            "finger.regions", given, "name = number (or name = group) for every cell of the mesh"
-        )
+        allowed = "name = number (or name = group) for every cell of the mesh, as tissue = "
+        raise InputError("finger.regions", given, f"{allowed}{min(nameless)}")
     if (owner == "").any():
         given = f"{path.name} with {(owner == '').sum()} cells outside every named group"
         raise InputError("finger.mesh", given, "every cell in a group with a name")

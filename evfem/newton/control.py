@@ -38,6 +38,8 @@ from evfem.newton.state import State, StepFailed
 
 #: a voltage (V) that is none
 TINY = 1e-300
+#: a given speed that changes by this share of the larger one jumps
+JUMP = 0.25
 #: why no voltage makes a gap (mm)
 TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
@@ -397,3 +399,19 @@ class Target:
     def reached(self, bone: Floats) -> bool:
         """Whether the bone's translation is, to the last digit, what is known of it."""
         return bool((self.bone(bone) == bone).all())
+
+    def going_on(self, old: State, bone: int) -> State:
+        """`old` as the next part counts it: anew where a given speed jumps on the way to here, that of node
+        `bone` or of the drive.
+        """
+        if old.seconds == 0.0 or self.duration == 0.0:
+            return old
+        before, now = old.rates[0][bone].tolist(), ((self.bone(old.bone) - old.bone) / self.duration).tolist()
+        pairs = list(zip(before, now, strict=True))
+        if self.hand is not None:
+            driven = (self.place - old.hand[0]) / self.duration
+            pairs[::2] = zip(old.hand[3].tolist(), driven.tolist(), strict=True)
+        if self.height.free:
+            del pairs[1]
+        jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)
+        return replace(old, seconds=0.0) if jumps else old

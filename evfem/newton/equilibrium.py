@@ -69,6 +69,7 @@ class Equilibrium:
             age=NO_AGE if self.interface.law is None else np.zeros(nodes),
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
+            rates=np.zeros_like(self.body.body.rates(still)),
         )
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))

@@ -367,7 +367,9 @@ class FactorisedBody:
         """The converged state with its velocity, its increment and what branches keep of it."""
         velocity, increment = self.body.velocity(state.u), state.u - old.u
         state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
-        return replace(state, pressure=NO_PRESSURE)
+        rates = self.body.rates(state.u)
+        seconds = self.body.beginning[1] if rates.size else 0.0
+        return replace(state, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
 
     def add_candidates(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""

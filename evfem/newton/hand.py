@@ -7,7 +7,8 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
 .. math:: R = k (X - x) + c\,\frac{(X - X_0) - (x - x_0)}{\Delta t}
           - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
 
-by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
+by backward Euler; beside tissue with mass by its differences of second order
+(`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts
 and the bone comes to rest. In three dimensions the same holds along z, with the same spring, damper and
 mass. The motion prescribes the bone's height.
 
@@ -19,7 +20,7 @@ kg, and the cut-off frequency of the friction, that of a first-order system, by 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, check_fields, number
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
 from evfem.newton.state import State
+from evfem.tissue.dynamics import Difference
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
 STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
@@ -97,33 +99,44 @@ class Hand:
 
 
 def at_rest(dim: int) -> Floats:
-    """The drive's x[, z] (mm), the bone's velocity (mm/s) and the drive's force (N/mm) along them, (3, d), at
-    the beginning of a run.
+    """Along x[, z], (6, d), at the beginning of a run: the drive's place (mm), the bone's velocity (mm/s),
+    the drive's force (N/mm), and mean rates of the drive's place, the bone's and its velocity over the part
+    before.
     """
-    return np.zeros((3, dim - 1))
+    return np.zeros((6, dim - 1))
 
 
 @dataclass(frozen=True)
 class HandControl:
-    """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), and
-    its velocity (mm/s), (d,) each.
+    """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), its
+    velocity (mm/s), and their mean rates over the part before, which the step's `difference` may count, (d,)
+    each.
     """
 
     hand: Hand
     drive: Any = 0.0
     duration: float = 0.0
     before: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
+    rates: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
+    difference: Difference = field(default_factory=Difference)
 
     def begun(self, old: State, drive: Floats, duration: float) -> HandControl:
         """In the step from `old` that takes the drive to x[, z] = `drive` (d,)."""
-        return HandControl(self.hand, drive, duration, (old.hand[0], old.bone[::2], old.hand[1]))
+        before, (along, moved, faster) = (old.hand[0], old.bone[::2], old.hand[1]), old.hand[3:]
+        difference = Difference.over(duration, old.seconds)
+        return HandControl(self.hand, drive, duration, before, (along, moved, faster), difference)
+
+    def _rate(self, number: int, end: Any) -> Any:
+        """Rate at the end of the step, (d,), of one of the three that were `before`."""
+        mean = (end - self.before[number]) / self.duration
+        return self.difference.share * mean - self.difference.lag * self.rates[number]
 
     @property
     def stiffness(self) -> float:
         """Stiffness of the hand at the bone, N/mm per mm."""
         if self.duration == 0.0:
             return self.hand.stiffness
-        rate = 1.0 / self.duration
+        rate = self.difference.share / self.duration
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
 
     @property
@@ -133,21 +146,20 @@ class HandControl:
 
     def velocity(self, x: Any) -> Any:
         """Velocity of the bone at the end of the step, (d,) in mm/s."""
-        return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0 * x
+        return self._rate(1, x) if self.duration > 0.0 else 0.0 * x
 
     def driving(self, x: Any) -> Any:
         """Force of the drive (d,) in N/mm, that of spring and damper, at the bone's x[, z] (d,)."""
         force = self.hand.stiffness * (self.drive - x)
         if self.duration > 0.0:
-            stretched = (self.drive - self.before[0]) - (x - self.before[1])
-            force += self.hand.damping * stretched / self.duration
+            force += self.hand.damping * (self._rate(0, self.drive) - self._rate(1, x))
         return force
 
     def force(self, x: Any) -> Any:
         """Force on the bone (d,) in N/mm: that of the drive minus the inertia of the mass."""
         force = self.driving(x)
         if self.duration > 0.0:
-            force -= self.hand.mass * (self.velocity(x) - self.before[2]) / self.duration
+            force -= self.hand.mass * self._rate(2, self.velocity(x))
         return force
 
     def missing(self, x: Any, reaction: Floats) -> Floats:
@@ -172,6 +184,9 @@ class HandControl:
         return tuple(found)
 
     def settled(self, state: State) -> State:
-        """The accepted state with drive, velocity and force."""
+        """The accepted state with what the hand keeps."""
         x = state.bone[::2]
-        return replace(state, hand=np.stack([self.drive, self.velocity(x), self.driving(x)]))
+        ends = np.stack([self.drive, x, self.velocity(x)])
+        changes = ends - self.before
+        rates = changes / self.duration if self.duration > 0.0 else 0.0 * changes
+        return replace(state, hand=np.stack([self.drive, ends[2], self.driving(x), *rates]))

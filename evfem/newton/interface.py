@@ -289,6 +289,16 @@ class Interface:
         nodal = self._slipping(old, new, nodes, mu, slip)
         return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
 
+    def limit(self, old: State, state: State, place: Floats, way: Floats) -> Floats:
+        """Bounds of friction (P,) in N/mm of the pad nodes of `state` at places (P, d), slipping by `way`
+        (P,).
+        """
+        nodes = np.arange(len(place))
+        mu = self.friction(old, nodes, place)
+        if self.law is None:
+            return np.asarray(mu * state.contact_force[:, 0])
+        return self._slipping(old, state, nodes, mu, way).bound(self.law)
+
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
         return np.zeros_like(old.contact_force)

@@ -44,6 +44,7 @@ from evfem.newton.interface import Interface
 from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import surface_state
 from evfem.tissue.body import Body
+from evfem.tissue.dynamics import Past
 
 
 def no_progress(residuals: list[float], same: bool) -> bool:
@@ -117,7 +118,7 @@ class Linearisation:
             self._outdated |= (
                 not SHORTER * self._made_at.duration <= duration <= LONGER * self._made_at.duration
             )
-        dynamics.begin(old.u, old.velocity, duration, old.inner)
+        dynamics.begin(old.u, old.velocity, duration, old.inner, old.past)
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
@@ -198,9 +199,10 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        begin, seconds, inner = self.body.beginning
+        begin, seconds, inner, past = self.body.beginning
         at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
-        self._made_at = TangentPoint(*at, state.status, state.pressure, inner)
+        before = (past.rates, past.seconds)
+        self._made_at = TangentPoint(*at, state.status, state.pressure, inner, *before)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
@@ -225,7 +227,8 @@ class Linearisation:
         """Repeats the factorisation made at `at` by the run that is resumed from `state`."""
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
-            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner)
+            still, past = np.zeros_like(at.begin), Past(at.seconds, at.rates)
+            self.body.dynamics.begin(at.begin, still, at.duration, at.inner, past)
         self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
 
     def _too_old(self, history: list[float]) -> bool:

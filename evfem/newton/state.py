@@ -12,11 +12,11 @@ from evfem.common.constants import NAMED
 from evfem.contact.signorini import OPEN, STICK
 from evfem.newton.strategy import Strategy
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import NO_BRANCHES
+from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES, Past
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
-#: drive, velocity and force of a hand where there is none
+#: what a hand keeps where there is none
 NO_HAND: Floats = np.zeros(0)
 #: the time since a node touched where nothing depends on it
 NO_AGE: Floats = np.zeros(0)
@@ -53,9 +53,10 @@ class State:
     the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
     pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
-    Coulomb's `age` (P,) in s; with a hand x[, z] of the drive, velocity of the bone, force of the
-    drive, `hand` (3, d) in mm, mm/s, N/mm; under a voltage resolved in time charges over eps_0 (M, P) in
-    V/mm. Maxwell branches keep `inner` (`evfem.tissue.branches`).
+    Coulomb's `age` (P,) in s; with a hand what it keeps, `hand` (6, d) (`evfem.newton.hand`); under a voltage
+    resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
+    (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
+    `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`).
     """
 
     u: Floats
@@ -72,6 +73,13 @@ class State:
     hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    rates: Floats = field(default_factory=lambda: NO_RATES)
+    seconds: float = 0.0
+
+    @property
+    def past(self) -> Past:
+        """The part that led here, as the next one counts it."""
+        return Past(self.seconds, self.rates)
 
     @property
     def touching(self) -> Any:
@@ -83,8 +91,8 @@ class State:
 class TangentPoint:
     """Point of a tangent: displacements u (N, dim), voltage, pad nodes that touched (P,) when the step began,
     whether the attraction was frozen, the displacements at the beginning of the time step (N, dim) and its
-    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, and the branches' inner
-    variables when the step began.
+    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, the branches' inner
+    variables when the step began, and mean rates and seconds of the part before.
     """
 
     u: Floats
@@ -96,6 +104,8 @@ class TangentPoint:
     status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
+    rates: Floats = field(default_factory=lambda: NO_RATES)
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

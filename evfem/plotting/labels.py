@@ -10,7 +10,7 @@ from typing import Any
 
 from evfem.errors import InputError, quoted
 from evfem.simulation.history import COLUMNS, SPATIAL, UNITS
-from evfem.simulation.result import Result
+from evfem.simulation.result import FIELD_UNITS, Result
 from evfem.sweeps.table import unit_of
 
 Units = Mapping[str, str]
@@ -33,8 +33,7 @@ TEXTS = {
     "seconds": "computing time",
     "min_gap": "smallest gap",
 }
-#: fields of a frame: unit if it is not MPa, and name where the underscores alone do not make one
-FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
+#: fields of a frame: name where the underscores alone do not make one
 FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
 FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
 #: quantity of a probe -> its unit if it is not MPa

@@ -3,13 +3,14 @@ r"""Whether the finger could get from one equilibrium to the next without climbi
 A part leads from u_0 to u_1. With the loads of its END held it has the potential
 
 .. math:: \Phi(u) = \psi(u) - W_e(u_0 \to u;\,U_1) - r_1\cdot(b - b_0) + D_f(\lambda_1)
-          + \tfrac{1}{2} D_v(u - u_0) + \tfrac{1}{2}\,|u - u_0 - h v_0|^2_M / h^2 ,
+          + \Phi_t(u) ,
 
 of which u_1 is a stationary point: tissue and springs, attraction, the reaction on the bone, friction under
-the contact forces of the end, and of a step in time its viscosity, drag and inertia, as backward Euler has
-them. Where it is convex it falls all along the straight way from u_0 to u_1, however long the part, whatever
-slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations have come to u_1 over it,
-the body never would. The reverse does not hold: of several equilibria some may all lie downhill.
+the contact forces of the end, and of a step in time :math:`\Phi_t` of viscosity, branches, drag and inertia
+(`evfem.tissue.dynamics`). Where it is convex it falls all along the straight way from u_0 to u_1, however
+long the part, whatever slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations
+have come to u_1 over it, the body never would. The reverse does not hold: of several equilibria some may all
+lie downhill.
 
 A bone that is held and not loaded has its place at the end already: nodes that do not touch at both ends
 begin where it carries them. Nodes that touch at both ends follow the surface, not the chord; to first
@@ -102,16 +103,12 @@ def _lifted(part: SubstepWork) -> Floats:
 
 
 def _in_time(part: SubstepWork) -> Floats:
-    """Drag, viscosity and inertia as potentials of an implicit step; drag counts from the release."""
-    body, old, new = part.model.body, part.old, part.new
-    way, dynamics = new.u - old.u, part.model.body.dynamics
+    """The potential of what time adds to the forces; drag counts from the release."""
+    body, old = part.model.body, part.old
+    way, dynamics = part.new.u - old.u, body.dynamics
     held = np.array([0.5 * body.drag_dissipation(old.u + s * way) for s in PLACES])
-    if dynamics is not None and dynamics.step > 0.0:
-        held = held + 0.5 * dynamics.damping(new.u) * PLACES**2
-        if dynamics.branches is not None:
-            held = held + [dynamics.branches.potential(old.u + s * way) for s in PLACES]
-        speed = way / dynamics.step
-        held = held + [dynamics.kinetic_energy(s * speed - old.velocity) for s in PLACES]
+    if dynamics is not None:
+        held = held + dynamics.potential(old.u, way, PLACES)
     return held - held[0]
 
 

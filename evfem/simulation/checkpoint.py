@@ -28,7 +28,7 @@ from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
 
-CHECKPOINT_FORMAT = "evfem-checkpoint-6"
+CHECKPOINT_FORMAT = "evfem-checkpoint-7"
 ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
@@ -47,9 +47,8 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """Data of the solver for the next step; of the same shapes with and without a factorisation."""
     at, status = carried.tangent_point, state.status
     begun = np.zeros_like(state.u)
-    nowhere = TangentPoint(
-        begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status), inner=state.inner
-    )
+    at_rest = (begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status))
+    nowhere = TangentPoint(*at_rest, inner=state.inner, rates=state.rates)
     made_at = {
         f"factor_{spec.name}": np.asarray(getattr(at or nowhere, spec.name)) for spec in fields(nowhere)
     }
@@ -123,7 +122,7 @@ def _unusable(name: str) -> InputError:
 def state_of(arrays: Mapping[str, np.ndarray]) -> State:
     """The state in the arrays of a checkpoint."""
     parts: dict[str, Any] = {spec.name: arrays[spec.name] for spec in fields(State)}
-    return State(**parts | {"voltage": float(arrays["voltage"])})
+    return State(**parts | {name: float(arrays[name]) for name in ("voltage", "seconds")})
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ class History:
         return getattr(self, name)
 
     def table(self) -> Any:
-        """The history with a row for each step: a `pandas.DataFrame`, without pandas a record array."""
+        """The history with a row for each step: a `pandas.DataFrame`, without pandas a numpy record array."""
         return frame({name: np.asarray(self[name]) for name in self.columns})
 
     def to_csv(self, path: str | Path) -> None:
@@ -135,6 +135,8 @@ SPATIAL: Mapping[str, Mapping[str, Any]] = {
     "real_contact_area": column("mm2", "of all that touches", "shown"),
 }
 _ABOUT = {spec.name: spec.metadata for spec in fields(History)}
+#: what is known of each column, of three dimensions too
+ABOUT: Mapping[str, Mapping[str, Any]] = {**_ABOUT, **SPATIAL}
 #: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
 UNITS: Mapping[str, str] = {name: about["unit"] for name, about in _ABOUT.items()}
 WHOLE_UNITS: Mapping[str, str] = {name: about["whole"] for name, about in _ABOUT.items()}
@@ -147,8 +149,7 @@ SPATIAL_UNITS: Mapping[str, str] = {
     **{name: about["unit"] for name, about in SPATIAL.items()},
 }
 NEEDED, SHOWN = (
-    tuple(name for name, about in {**_ABOUT, **SPATIAL}.items() if trait in about["traits"])
-    for trait in ("needed", "shown")
+    tuple(name for name, about in ABOUT.items() if trait in about["traits"]) for trait in ("needed", "shown")
 )
 
 

@@ -18,11 +18,13 @@ import numpy as np
 import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import check_ending, load_arrays, save_arrays
+from evfem.common.tables import dataset
 from evfem.common.views import curves, plus, table
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.archive import mesh_arrays, mesh_of
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.history import (
+    ABOUT,
     COLUMNS,
     DRIFT,
     INTEGERS,
@@ -79,6 +81,10 @@ class Frame:
 _SHAPES: dict[str, tuple[str, ...]] = {
     spec.name: spec.metadata["shape"] for spec in fields(Frame) if spec.metadata
 }
+#: unit of a field that is not in MPa
+FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
+#: size in a shape -> its name in a data set
+DIMENSIONS = {"N": "node", "E": "cell", "dim": "axis", "stresses": "stress"}
 POINT_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape == ("N",))
 CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
@@ -292,6 +298,35 @@ class Result(History):
             words = name.replace("_width", "_area") if self.units[name] == "mm2" else name
             found.append((words.replace("_", " "), f"{plus(self[name][-1]):.4g} {self.units[name]}"))
         return found
+
+    def to_xarray(self) -> Any:
+        """The result as an `xarray.Dataset`: every column over `step`, the fields kept over `frame` (the
+        number of its step) and `node` or `cell`, with `units` and `long_name`; places of the undeformed
+        nodes (mm) are the coordinates x, y and z.
+
+        Raises InputError where xarray is not installed (the extra `xarray`).
+        """
+        about = dict(ABOUT)
+        variables: dict[str, Any] = {
+            name: ("step", self[name], {"units": self.units[name], "long_name": about[name]["meaning"]})
+            for name in self.columns[1:]
+        }
+        for name, shape in _SHAPES.items() if self.frames else ():
+            values = np.stack([np.asarray(getattr(frame, name)) for frame in self.frames])
+            dims = ("frame", *(DIMENSIONS[size] for size in shape))
+            words = {"units": FIELD_UNITS.get(name, "MPa"), "long_name": name.replace("_", " ")}
+            variables[name] = (dims, values, words)
+        axes = "xyz"[: self.mesh.dim]
+        places = zip(axes, self.mesh.points.T, strict=True)
+        coordinates = {
+            "step": self.step,
+            "frame": [frame.step for frame in self.frames],
+            "axis": list(axes),
+            "stress": ["xx", "yy", "zz", "xy", "yz", "xz"][: 4 if self.mesh.dim == 2 else 6],
+            "region": ("cell", self.mesh.region, {"names": json.dumps(dict(self.mesh.region_names))}),
+            **{axis: ("node", place, {"units": "mm"}) for axis, place in places},
+        }
+        return dataset(variables, coordinates, {"provenance": json.dumps(self.provenance)})
 
     def save(self, path: str | Path) -> None:
         """Write one .npz file, in one step. Raises StorageError, and InputError for another ending."""

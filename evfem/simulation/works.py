@@ -23,9 +23,9 @@ The history has
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
-- ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative, and what Maxwell branches
-  lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after which
-  they are at rest, loses all of it.
+- ``viscous_dissipation`` :math:`D_v = \int 2\eta|\Delta E|^2/\Delta t`, never negative, and what Maxwell
+  branches lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after
+  which they are at rest, loses all of it.
 
 Their difference is computed term by term without the work of the bone, so the balance is a check
 that the forces of the accepted states are in equilibrium:
@@ -33,9 +33,9 @@ that the forces of the accepted states are in equilibrium:
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
           + (W_e - \bar f_e\cdot\Delta u) + W_t .
 
-What tissue and backward Euler lose on the way, the work of nodes that land, leave or begin to slip, and what
-the way adds to the attraction's work. Over a motion the sum falls with the square of the step, in time with
-the step, and is ``integrator_dissipation``.
+What tissue and backward differences lose on the way, the work of nodes that land, leave or begin to slip, and
+what the way adds to the attraction's work. Over a motion the sum falls with the square of the step, in time
+without inertia with the step, and is ``integrator_dissipation``.
 
 A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
 where time stops), and the end is far away however small the part. Then L does not fall with the step. It is

@@ -9,8 +9,9 @@ state, and contact forces :math:`\lambda` along the profile's normal and tangent
           g \ge 0,\; \lambda_n \ge 0,\; g\lambda_n = 0, \qquad
           |\lambda_t| \le \mu\lambda_n,\; \lambda_t = -\mu\lambda_n\,s/|s| \text{ if } s \ne 0 .
 
-With viscosity or inertia :math:`f_{int}` has their forces by backward Euler; another law of friction
-takes the place of :math:`\mu\lambda_n`. A step that fails leaves the accepted state as it was.
+With viscosity or inertia :math:`f_{int}` has their forces by backward differences
+(`evfem.tissue.dynamics`); another law of friction takes the place of :math:`\mu\lambda_n`. A step that
+fails leaves the accepted state as it was.
 
 **Which of several states.** Under a strong attraction several states obey these laws. The answer is
 the limit of vanishing drag [5]_ [6]_: with a drag of rate :math:`\epsilon`

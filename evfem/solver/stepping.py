@@ -210,7 +210,7 @@ class Stepper:
         """Start the clocks from `old` to `target` again: others were tried, works are booked by the last."""
         self.equilibrium.interface.begin(old, target.duration)
         if self.body is not None and self.body.dynamics is not None:
-            self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner)
+            self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
 
     def _relaxation(self, body: Body) -> Relaxation:
         """The release of `body`."""

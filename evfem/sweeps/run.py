@@ -21,6 +21,7 @@ from evfem.common.pools import Died, Pool, open_pool
 from evfem.common.storage import alone_in
 from evfem.errors import InputError, NotConverged
 from evfem.scene.file import loads
+from evfem.scene.scene import Scene
 from evfem.simulation.provenance import origin
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
@@ -246,13 +247,20 @@ def evaluate(job: Job) -> Answer:
     return answered(text, folder, ask)
 
 
-def answered(text: str, folder: str, ask: Callable[[Result], dict[str, float | None]]) -> Answer:
-    """Run the scene in a text and `ask` its result; whatever happens is in the answer."""
+def answered(
+    text: str,
+    folder: str,
+    ask: Callable[[Any], dict[str, float | None]],
+    run: Callable[[Scene], Any] | None = None,
+) -> Answer:
+    """Run the scene in a text (`simulate`, or another `run`) and `ask` what comes of it; whatever happens is
+    in the answer.
+    """
     began = clock.perf_counter()
     outputs: dict[str, float | None] = {}
     status, message = "done", ""
     try:
-        result = simulate(loads(text, folder))
+        result = (run or simulate)(loads(text, folder))
         outputs, message = ask(result), "; ".join(result.warnings)
     except NotConverged as error:
         status, message = "not_converged", str(error)

@@ -9,7 +9,7 @@ are not known from such a file: `friction_profile` takes them.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -96,7 +96,8 @@ class Table(Heights, kind="csv"):
     """A text file with columns x and height (or z), x and friction, or frequency and amplitude (1/mm).
 
     Each length has the unit that its header says, as in `x [mm], z [um]`, or without one `unit`. Heights
-    are cleaned, the others kept as they are.
+    are cleaned, the others kept as they are. What has no such columns is another program's: a `Scan`,
+    where SurfaceTopography is installed.
     """
 
     unit: Unit = None
@@ -110,12 +111,19 @@ class Table(Heights, kind="csv"):
         return names[:1] != ["time"] and (super().takes(path) or _quantity_of(names) is not None)
 
     def __call__(self, path: str | Path) -> Texture:
-        path, table = Path(path), read_headed(Path(path), "file")
+        path = Path(path)
+        try:
+            table = read_headed(path, "file")
+        except InputError as error:
+            return self._scanned(path, error)
         quantity = _quantity_of(table.names)
         if quantity is None:
             headers = " | ".join(",".join(header) for header, _ in QUANTITIES.values())
             given = f"{path.name}, which starts with {','.join(table.names)[:60]!r}"
-            raise InputError("file", given, headers)
+            refused = InputError("file", given, headers)
+            if table.names[0] != "1":
+                raise refused
+            return self._scanned(path, refused)
         table = _only(table, quantity)
         scales = [_scale(name, own, self.unit) for name, own in _units(table)]
         first, second = (column * scale for column, scale in zip(table.columns, scales, strict=True))
@@ -123,6 +131,15 @@ class Table(Heights, kind="csv"):
         if quantity != "height":
             return self.texture(path, "measured", (first, second), notes, quantity)
         return self.heights(path, "measured", first, second, notes)
+
+    def _scanned(self, path: Path, error: InputError) -> Texture:
+        """The texture of another program's text, or the `error` that says what this one has."""
+        if find_spec("SurfaceTopography") is None:
+            raise error
+        try:
+            return Scan(**{spec.name: getattr(self, spec.name) for spec in fields(self)})(path)
+        except InputError as other:
+            raise (error if other.key == "file" else other) from None
 
 
 def _quantity_of(names: list[str]) -> str | None:
@@ -214,6 +231,19 @@ def _topography(path: Path) -> Any:
     except Exception as error:  # forty readers, each with errors of its own
         reason = getattr(error, "strerror", None) or "of an unknown kind or damaged"
         raise InputError("file", f"{path.name} ({reason})", allowed) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Haptics(Importer, kind="hjif"):
+    """MPEG haptics (.hjif): the friction over x of its first friction perception."""
+
+    endings = (".hjif",)
+
+    def __call__(self, path: str | Path) -> Texture:
+        path = Path(path)
+        position, friction, told = wav.read_friction(path)
+        note = f"Friction perception {str(told.get('description', ''))[:100]!r}."
+        return self.texture(path, "measured", (position - position[0], friction), [note], "friction")
 
 
 @dataclass(frozen=True, kw_only=True)

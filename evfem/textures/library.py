@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evfem.errors import InputError, quoted
+from evfem.errors import quoted, unknown
 from evfem.textures.generate import FREE, Knobs, make
 from evfem.textures.texture import Texture, read
 
@@ -67,7 +67,7 @@ def reference(name: str) -> Texture:
         _, kind, knobs = REFERENCES[name]
         return make(kind, knobs, name)
     if name not in FRICTIONS:
-        raise InputError("texture", quoted(name), f"{', '.join(names())}, or a .json or folder")
+        raise unknown("texture", name, [*names(), "a .json or folder"], str(quoted(name)))
     what, x, friction, period = FRICTIONS[name]
     notes = (f"Made by evfem: {what}.",)
     return Texture(name, "table", np.array(x), np.array(friction), FREE, "friction", period, notes)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.tissue.dynamics import NO_BRANCHES, Dynamics
+from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES, Dynamics, Past
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
@@ -145,11 +145,17 @@ class Body:
         return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
 
     @property
-    def beginning(self) -> tuple[Floats, float, Floats]:
-        """Displacements (N, dim) that the step began with, its seconds, and what branches had kept."""
+    def beginning(self) -> tuple[Floats, float, Floats, Past]:
+        """Displacements (N, dim) that the step began with, its seconds, what branches had kept, and the part
+        before.
+        """
         if self.dynamics is None:
-            return np.zeros((self.space.size, self.space.dim)), 0.0, NO_BRANCHES
+            return np.zeros((self.space.size, self.space.dim)), 0.0, NO_BRANCHES, Past()
         return self.dynamics.beginning
+
+    def rates(self, u: Floats) -> Floats:
+        """Mean velocities and accelerations (2, N, dim) over the step that ends at u (N, dim), with mass."""
+        return NO_RATES if self.dynamics is None else self.dynamics.rates(u)
 
     @property
     def at_rest(self) -> Floats:

@@ -34,6 +34,7 @@ from evfem.errors import InputError
 from evfem.tensor import Array, det, inv, mul, trace
 from evfem.tissue.assembly import Integral, points_of
 from evfem.tissue.forms import Field, Parts, deformation_gradient, isochoric, maxwell
+from evfem.tissue.kernels.blocks import LANES, blocked, loops, padded, unblocked
 from evfem.tissue.ogden import shares_of
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
@@ -79,6 +80,12 @@ def _bulk_modulus(name: str, law: Any) -> float:
     raise InputError(f"finger.materials.{name}", type(law).__name__, "a law with bulk_modulus")
 
 
+def make_branches(space: Space, branches: list[Branch]) -> Branches:
+    """The branches in compiled loops, where there are some and only the shear modulus relaxes."""
+    bulk = any(branch.bulk.any() for branch in branches)
+    return Branches(space, branches) if bulk or loops(space.dim) is None else LoopedBranches(space, branches)
+
+
 class Branches:
     """The branches' forces, energy and loss in one step; `begin` sets the step.
 
@@ -105,7 +112,7 @@ class Branches:
 
     def begin(self, u: Floats, inner: Floats, step: float) -> None:
         """Start a step of `step` seconds (0: it ends at rest) from displacements (N, dim) and `inner`."""
-        self.step, self._inner0 = step, inner
+        self.step, self._u0, self._inner0 = step, u, inner
         self._bar0, self._theta0 = self._strain(u)
         self.integral.w.branches = [self._branch(i) for i in range(len(inner))] if step > 0.0 else []
 
@@ -217,6 +224,80 @@ class Branches:
         return Ci, kept[-1]
 
 
+class LoopedBranches(Branches):
+    """Branches of the shear modulus whose steps go through compiled loops (`relaxing.h`), twins of the form.
+
+    Arrays in blocks have B, n branches and L lanes: moduli (B, n, L), what is kept (B, Q, n, k - 1, L).
+    """
+
+    def __init__(self, space: Space, branches: list[Branch]) -> None:
+        super().__init__(space, branches)
+        self.loops = loops(space.dim)
+        self._modulus = padded(np.stack([branch.shear for branch in branches], axis=1))
+        self._time = blocked(np.stack([branch.time for branch in branches], axis=1))
+        self._end: tuple[Any, ...] = ()
+
+    def begin(self, u: Floats, inner: Floats, step: float) -> None:
+        self._end, self._in_numpy = (), step == 0.0
+        if step == 0.0:
+            super().begin(u, inner, step)
+            return
+        self.step, self._inner0, self._u0 = step, inner, u - u[:1]
+        self._kept0 = self._in_blocks(inner)
+        blocks, points, n, kept, _ = self._kept0.shape
+        self._before = np.empty((blocks, points, n, kept + 1, LANES))
+        self.loops.begin_relaxing(self.space.cells, self._u0, step / self._time, self._kept0, self._before)
+
+    def forces(self, u: Floats) -> Floats:
+        total = np.zeros_like(u)
+        if self.step > 0.0:
+            self.loops.relaxing(self.space.cells, u - u[:1], self._modulus, self._before, total)
+        return total
+
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        if self.step > 0.0:
+            begun = self.space.cells, u - u[:1], self._modulus, self._before
+            self.loops.add_relaxing(*begun, pattern.blocks, data)
+
+    def inner(self, u: Floats) -> Floats:
+        return super().inner(u) if self.step == 0.0 else self._from_blocks(self._ended(u)[0])
+
+    def energy(self, u: Floats) -> float:
+        return 0.0 if self.step == 0.0 else float(self._ended(u)[1])
+
+    def dissipation(self, u: Floats) -> float:
+        return super().dissipation(u) if self.step == 0.0 else float(self._ended(u)[2])
+
+    def potential(self, u: Floats) -> float:
+        if not self._in_numpy:
+            super().begin(self._u0, self._inner0, self.step)
+            self._in_numpy = True
+        return super().potential(u)
+
+    def _ended(self, u: Floats) -> tuple[Floats, float, float]:
+        """What is kept at the end, the stored energy and what was lost; once for each u."""
+        if not self._end or self._end[0] is not u:
+            kept = np.empty_like(self._kept0)
+            begun = self.space.cells, u - u[:1], self._modulus, self._before
+            numbers = np.stack(_loss(self.step / self._time), axis=2)
+            found = self.loops.end_relaxing(*begun, self._u0, self._kept0, numbers, kept)
+            self._end = u, kept, *found
+        return self._end[1], self._end[2], self._end[3]
+
+    def _in_blocks(self, inner: Floats) -> Floats:
+        """C_i of `inner` in blocks, of rest in cells that have no branch."""
+        cells, n, k, _, points = self.integral.points.cells, *inner.shape
+        kept = np.zeros((len(self.space.nodes), points, n, k - 1))
+        kept[..., :3] = 1.0
+        kept[cells] = inner[:, :-1].transpose(2, 3, 0, 1)
+        return blocked(kept)
+
+    def _from_blocks(self, kept: Floats) -> Floats:
+        """`inner` of C_i in blocks."""
+        found = unblocked(kept, len(self.space.nodes))[self.integral.points.cells].transpose(2, 3, 0, 1)
+        return np.concatenate([found, np.zeros_like(found[:, :1])], axis=1)
+
+
 def _root(M: Array) -> Array:
     """Cube root of the determinant."""
     return det(M) ** (1.0 / 3.0)
@@ -233,9 +314,15 @@ def _lost(x: Floats, e0: Array, e1: Array) -> Array:
     """Integral of tr(e e)/tau over the step of x relaxation times, e from e0 to e1 (n, n, C, Q) as under a
     strain that grows evenly.
     """
+    decay, first, both, last = _loss(x)
+    d = e1 - decay * e0
+    return first * trace(mul(e0, e0)) + both * trace(mul(e0, d)) + last * trace(mul(d, d))
+
+
+def _loss(x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """e^-x, and the numbers of tr(e0 e0), tr(e0 d) and tr(d d) in what is lost, d = e1 - e^-x e0."""
     g, q = -np.expm1(-x), -0.5 * np.expm1(-2.0 * x)
     series = x**3 / 3.0 * (1.0 - x * (0.75 - 0.35 * x))
     rest = np.where(x < 1e-3, series, x - 2.0 * g + q)
-    r = (e1 - np.exp(-x) * e0) / g
     twice = 2.0 * np.where(x < 1e-6, 0.5 * x * x, g - q)
-    return q * trace(mul(e0, e0)) + twice * trace(mul(e0, r)) + rest * trace(mul(r, r))
+    return np.exp(-x), q, twice / g, rest / g**2

@@ -1,21 +1,36 @@
-r"""Time: objective Kelvin-Voigt stress and inertia over one step of backward Euler, as further
-internal forces.
+r"""Time: objective Kelvin-Voigt stress and inertia over one step, as further internal forces.
 
-With the time step :math:`\Delta t`, the strain :math:`E = (F^T F - 1)/2` and the state (u_0, v_0)
-before the step,
+With the time step h, the strain :math:`E = (F^T F - 1)/2` and rates at the end of the step,
 
-.. math:: P_v = F S_v, \quad S_v = 2\eta\,(E - E_0)/\Delta t, \quad \eta = \tau\mu; \qquad
-          f = M\,(v - v_0)/\Delta t, \quad v = (u - u_0)/\Delta t .
+.. math:: P_v = F S_v, \quad S_v = 2\eta\,\dot E, \quad \eta = \tau\mu; \qquad
+          f = M\,\dot v, \quad v = \dot u .
+
+Rates are backward differences. From one part alone, backward Euler, :math:`\dot q = \Delta q/h` with the
+change :math:`\Delta q` in the step: for tissue without mass, and wherever no part before counts. With mass
+the part before counts, of length h' = h/r and mean rate :math:`\Delta q'/h'`,
+
+.. math:: \dot q = \frac{1 + 2r}{1 + r}\frac{\Delta q}{h} - \frac{r}{1 + r}\frac{\Delta q'}{h'} ,
+
+which is BDF2, of second order for steps of any length; it counts up to r = `LONGEST` (zero-stable below
+1 + sqrt 2 [1]_), and where the bone's speed does not jump.
+
+Contact, friction and attraction are those of the end of the step. The nodes of the pad have no mass, that
+of their cells is moved to the other nodes [2]_: a node that lands then has no momentum to lose, and the
+contact force follows the tissue behind it.
 
 Only the shear modulus enters the viscosity, so nothing locks. The step dissipates
-:math:`\int S_v : (E - E_0)`. A step that takes no time has neither term. The forms are
+:math:`\int 2\eta |\Delta E|^2/h`. A step that takes no time has neither term. The forms are
 `kelvin_voigt` and `mass` of `evfem.tissue.forms`. Maxwell branches (`evfem.tissue.branches`) add their
 own; after a step without time they are at rest. Drag holds a body back that is released.
+
+.. [1] Grigorieff, Numer. Math. 42 (1983) 359, doi:10.1007/BF01389580.
+.. [2] Khenous, Laborde & Renard, Eur. J. Mech. A 27 (2008) 918, doi:10.1016/j.euromechsol.2008.01.001.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
@@ -25,7 +40,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
-from evfem.tissue.branches import Branches, branches_of
+from evfem.tissue.branches import Branches, branches_of, make_branches
 from evfem.tissue.forms import Parts, deformation_gradient, green_strain, kelvin_voigt, mass
 from evfem.tissue.kernels.blocks import LANES, loops, padded
 from evfem.tissue.laws import split
@@ -34,19 +49,53 @@ from evfem.tissue.space import Space
 
 #: what branches keep where there are none
 NO_BRANCHES: Floats = np.zeros(0)
+#: mean rates of a part where none count
+NO_RATES: Floats = np.zeros(0)
+#: a part may be so many times as long as the one before for that to count
+LONGEST = 2.4
 #: `dynamics` of a scene -> its terms
 DYNAMICS: dict[str, Any] = {"quasistatic": None}
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """The part before: its seconds, 0 where it does not count, and over it the mean velocities and
+    accelerations (2, N, dim) of tissue with mass.
+    """
+
+    seconds: float = 0.0
+    rates: Floats = field(default_factory=lambda: NO_RATES)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A backward difference: the rate is `share` times the mean rate of the step, less `lag` times that of
+    the part before.
+
+    >>> Difference.over(0.1, 0.0), Difference.over(0.1, 0.1)
+    (Difference(share=1.0, lag=0.0), Difference(share=1.5, lag=0.5))
+    """
+
+    share: float = 1.0
+    lag: float = 0.0
+
+    @classmethod
+    def over(cls, step: float, before: float) -> Difference:
+        """Of a step of `step` seconds after a part of `before` seconds, 0 where that does not count."""
+        if not 0.0 < step <= LONGEST * before:
+            return cls()
+        ratio = step / before
+        return cls((1.0 + 2.0 * ratio) / (1.0 + ratio), ratio / (1.0 + ratio))
 
 
 class Dynamics:
     """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other
     term of the internal forces.
 
-    A class with a `name` is one of `DYNAMICS`. `inertia`: whether tissue has mass. At the end of a step the
-    velocity is v_0 + `slope` ((u - u_0)/dt - v_0).
+    A class with a `name` is one of `DYNAMICS`. `inertia`: whether tissue has mass; `difference` of the step.
     """
 
-    inertia, slope, scheme = False, 1.0, "backward Euler"
+    inertia, scheme, difference = False, "backward Euler", Difference()
 
     def __init_subclass__(cls, name: str) -> None:
         DYNAMICS[name] = cls
@@ -63,45 +112,75 @@ class Dynamics:
         """
         self.space, self.branches = space, branches
         self.viscosity = viscosity
-        self.mass = None if density is None else Componentwise(mass_matrices(space) * density[:, None, None])
+        self.mass = None if density is None else Componentwise(self._masses() * density[:, None, None])
         self._inertia = None if self.mass is None else assembled(space, self.mass.matrices)
         self.loops = loops(space.dim) if viscosity is not None else None
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, space.dim))
-        self._inner0 = self.at_rest
+        self._inner0, self._start, self.past = self.at_rest, self._v0, Past()
         self._strain0: Any = None
+
+    def _masses(self) -> Floats:
+        """Mass matrices per unit density (E, n, n)."""
+        return mass_matrices(self.space)
 
     @property
     def at_rest(self) -> Floats:
         """What the branches keep of the undeformed body."""
         return NO_BRANCHES if self.branches is None else self.branches.at_rest
 
-    def begin(self, u: Floats, velocity: Floats, step: float, inner: Floats = NO_BRANCHES) -> None:
+    def begin(
+        self,
+        u: Floats,
+        velocity: Floats,
+        step: float,
+        inner: Floats = NO_BRANCHES,
+        past: Past | None = None,
+    ) -> None:
         """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N,
-        dim), and what the branches kept.
+        dim), what the branches kept, and the part before.
         """
         self.step, self._u0, self._v0, self._inner0 = step, u, velocity, inner
+        self.past = past or Past()
         if self.branches is not None:
             self.branches.begin(u, inner, step)
-        if step > 0.0 and self.viscosity is not None:
-            self._strain0 = self._strain(u)
+        if step == 0.0:
+            return
+        self._start = self._begun(velocity)
+        if self.viscosity is not None:
+            self._strain0 = self._strain_before(u)
             if self.loops is None:
-                self._damping.w.step, self._damping.w.strain0 = step, self._strain0
+                self._damping.w.step, self._damping.w.strain0 = self._damped, self._strain0
+
+    def _begun(self, velocity: Floats) -> Floats:
+        """What the inertia has of the time before, over the mass (N, dim)."""
+        return velocity / self.step
+
+    def _strain_before(self, u: Floats) -> Any:
+        """The strain that the stress counts from, as `_strain`."""
+        return self._strain(u)
+
+    @property
+    def _damped(self) -> float:
+        """Seconds over which the strain counts."""
+        return self.step / self.difference.share
 
     @cached_property
     def _damping(self) -> Integral:
         """The Kelvin-Voigt form over the cells that have viscosity; its context is renewed by each step."""
         assert self.viscosity is not None
         cells = np.flatnonzero(self.viscosity)
-        w = SimpleNamespace(eta=self.viscosity[cells, None], step=self.step, strain0=self._strain0)
+        w = SimpleNamespace(eta=self.viscosity[cells, None], step=self._damped, strain0=self._strain0)
         return Integral(
             kelvin_voigt, points_of(self.space, cells), Parts(self.space.dim, grad=True), w, at_once=True
         )
 
     @property
-    def beginning(self) -> tuple[Floats, float, Floats]:
-        """Displacements (N, dim) that the step began with, its seconds, and what the branches had kept."""
-        return self._u0, self.step, self._inner0
+    def beginning(self) -> tuple[Floats, float, Floats, Past]:
+        """Displacements (N, dim) that the step began with, its seconds, what the branches had kept, and the
+        part before.
+        """
+        return self._u0, self.step, self._inner0, self.past
 
     def forces(self, u: Floats) -> Floats:
         """Nodal forces (N, dim)."""
@@ -113,7 +192,8 @@ class Dynamics:
         elif self.viscosity is not None:
             total += self._damping.forces(u)
         if self._inertia is not None:
-            total += self._inertia @ (self.slope * ((u - self._u0) / self.step**2 - self._v0 / self.step))
+            share = self.difference.share
+            total += self._inertia @ (share * (share * (u - self._u0) / self.step**2 - self._start))
         if self.branches is not None:
             total += self.branches.forces(u)
         return total
@@ -127,7 +207,7 @@ class Dynamics:
         elif self.viscosity is not None:
             self._damping.add_tangent(u, pattern, data)
         if self.mass is not None:
-            data += self.slope * self.mass.data(pattern) / self.step**2
+            data += self.difference.share**2 * self.mass.data(pattern) / self.step**2
         if self.branches is not None:
             self.branches.add_tangent(u, pattern, data)
 
@@ -135,7 +215,11 @@ class Dynamics:
         """Nodal velocities (N, dim) in mm/s at the end of the step; zero when no time passes."""
         if self.step == 0.0:
             return np.zeros_like(u)
-        return self.slope * (u - self._u0) / self.step + (1.0 - self.slope) * self._v0
+        return (u - self._u0) / self.step
+
+    def rates(self, u: Floats) -> Floats:
+        """Mean velocities and accelerations (2, N, dim) over a step that ends at u, of tissue with mass."""
+        return NO_RATES
 
     def inner(self, u: Floats) -> Floats:
         """What the branches keep of a step that ends at u (N, dim)."""
@@ -154,11 +238,34 @@ class Dynamics:
         """The share of the Kelvin-Voigt stress in `dissipation`."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
+        return self._damping_from(self._strain0, self.step, u)
+
+    def _damping_from(self, strain: Any, seconds: float, u: Floats) -> float:
+        """Dissipation of strain that grows evenly to that of u in so many seconds."""
+        assert self.viscosity is not None
         if self.loops is not None:
-            return float(self.loops.viscous(*self._request(u), np.zeros_like(u)))
-        damping, change = self._damping, self._strain(u) - self._strain0
-        power = 2.0 * damping.w.eta / self.step * ddot(change, change)[0]
+            begun = self.space.cells, np.ascontiguousarray(u), padded(self.viscosity / seconds), strain
+            return float(self.loops.viscous(*begun, np.zeros_like(u)))
+        damping, change = self._damping, self._strain(u) - strain
+        power = 2.0 * damping.w.eta / seconds * ddot(change, change)[0]
         return float(np.sum(power * damping.points.weight))
+
+    def potential(self, u: Floats, way: Floats, places: Floats) -> Floats:
+        """What the forces of the step are the derivative of, at u plus the shares `places` (w,) of a way (N,
+        dim): (w,) in N mm, in the plane per mm of depth.
+        """
+        if self.step == 0.0:
+            return np.zeros_like(places)
+        held = self._damped_potential(u, way, places)
+        if self.branches is not None:
+            held = held + [self.branches.potential(u + s * way) for s in places]
+        rate = self.difference.share / self.step
+        begun = self._u0 - u + self._start * (self.step / rate)
+        return held + [self.kinetic_energy(rate * (s * way - begun)) for s in places]
+
+    def _damped_potential(self, u: Floats, way: Floats, places: Floats) -> Floats:
+        """The share of the Kelvin-Voigt stress in `potential`, of strain that grows evenly."""
+        return 0.5 * self.damping(u + way) * places**2
 
     def kinetic_energy(self, velocity: Floats) -> float:
         """Kinetic energy of nodal velocities (N, dim): N mm, in the plane per mm of depth."""
@@ -179,7 +286,7 @@ class Dynamics:
     def _request(self, u: Floats) -> tuple[Any, ...]:
         """For the compiled loops: cells, u, viscosity over the step (B, L), strains before the step."""
         assert self.viscosity is not None
-        rate = padded(self.viscosity / self.step)
+        rate = padded(self.viscosity / self._damped)
         return self.space.cells, np.ascontiguousarray(u), rate, self._strain0
 
 
@@ -187,9 +294,49 @@ DYNAMICS["viscous"] = Dynamics
 
 
 class Inertial(Dynamics, name="inertial"):
-    """Dynamics with mass."""
+    """Dynamics with mass: backward differences of second order, and a pad whose nodes have no mass."""
 
-    inertia = True
+    inertia, scheme = True, "backward differences of second order"
+
+    def _masses(self) -> Floats:
+        return without_pad(self.space, super()._masses())
+
+    def _begun(self, velocity: Floats) -> Floats:
+        self.difference = Difference.over(self.step, self.past.seconds)
+        begun = velocity / self.step
+        if lag := self.difference.lag:
+            means, accelerations = self.past.rates
+            begun = begun + lag * (means / self.step + accelerations / self.difference.share)
+        return begun
+
+    def _strain_before(self, u: Floats) -> Any:
+        self._strain_begun = strain = self._strain(u)
+        if not self.difference.lag:
+            return strain
+        earlier = self._strain(u - self.past.seconds * self.past.rates[0])
+        return strain + self.difference.lag * self._damped / self.past.seconds * (strain - earlier)
+
+    def velocity(self, u: Floats) -> Floats:
+        mean = super().velocity(u)
+        if self.step == 0.0 or not self.difference.lag:
+            return mean
+        return self.difference.share * mean - self.difference.lag * self.past.rates[0]
+
+    def rates(self, u: Floats) -> Floats:
+        if self.step == 0.0:
+            return np.zeros((2, *u.shape))
+        return np.stack([u - self._u0, self.velocity(u) - self._v0]) / self.step
+
+    def damping(self, u: Floats) -> float:
+        if self.step == 0.0 or self.viscosity is None:
+            return 0.0
+        return self._damping_from(self._strain_begun, self.step, u)
+
+    def _damped_potential(self, u: Floats, way: Floats, places: Floats) -> Floats:
+        if self.viscosity is None:
+            return np.zeros_like(places)
+        at = [self._damping_from(self._strain0, self._damped, u + s * way) for s in places]
+        return 0.5 * np.array(at)
 
 
 def assembled(space: Space, matrices: Floats) -> Any:
@@ -210,6 +357,14 @@ def mass_matrices(space: Space) -> Floats:
     return np.ascontiguousarray(form.cell_tangents(np.zeros((space.size, dim)))[:, ::dim, ::dim])
 
 
+def without_pad(space: Space, matrices: Floats) -> Floats:
+    """Mass matrices (E, n, n) without mass at the nodes of the pad: the others of each cell have it."""
+    kept = ~np.isin(space.nodes, space.mesh.node_sets.get("pad", ()))
+    kept[~kept.any(axis=1)] = True
+    moved = matrices * kept[:, :, None] * kept[:, None, :]
+    return np.asarray(moved * (matrices.sum(axis=(1, 2)) / moved.sum(axis=(1, 2)))[:, None, None])
+
+
 def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str) -> Dynamics | None:
     """The time-dependent terms of `DYNAMICS` that the laws ask for, or None if there are none; `viscosity`
     (s) and `relaxation` of the `finger` are those of laws without their own.
@@ -228,5 +383,5 @@ def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str)
     rows = branches_of(space, laws, finger)
     if not (eta.any() or rows or kind.inertia):
         return None
-    branches = Branches(space, rows) if rows else None
+    branches = make_branches(space, rows) if rows else None
     return kind(space, eta if eta.any() else None, density if kind.inertia else None, branches)

@@ -255,8 +255,8 @@ def test_progress_is_a_line_for_each_step(path, capsys):
 
 
 def test_a_trial_that_is_not_solved_is_stepped_back_from(path, monkeypatch):
-    """Above a modulus of 0.09 nothing converges: a fit that starts there makes its first
-    differences on the other side.
+    """Above a modulus of 0.09 nothing converges, and nothing has derivatives: a fit that starts there makes
+    its first differences on the other side.
     """
     work, failed = runs.work, []
 
@@ -265,7 +265,7 @@ def test_a_trial_that_is_not_solved_is_stepped_back_from(path, monkeypatch):
         if modulus > 0.09001:
             failed.append(modulus)
             return Answer("not_converged", 0.0, "step 1 did not converge", {})
-        return work(job)
+        return work((*job[:3], ()))
 
     monkeypatch.setattr(runs, "work", fragile)
     found = ev.fit(path, measured(path, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1)
@@ -281,7 +281,7 @@ def test_outputs_that_are_counted_are_said(path, monkeypatch):
     work = runs.work
 
     def counted(job):
-        answer = work(job)
+        answer = work((*job[:3], ()))
         outputs = {name: 5e-5 * round(value / 5e-5) for name, value in answer.outputs.items()}
         return Answer(answer.status, answer.seconds, answer.message, outputs)
 

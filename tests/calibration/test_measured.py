@@ -147,7 +147,7 @@ def test_values_from_a_file(tmp_path):
         ("indentation,normal_force\n0.1\n", "without a line of numbers"),
         ("indentation,indentation\n0.1,2\n", "header indentation,indentation; allowed: two columns"),
         ("indentation,normal_force,time\n0.1,2,3\n", "indentation,normal_force,time; allowed: two columns"),
-        ("indentation,force\n0.1,2\n", "data.column: given an unknown key; allowed: "),
+        ("indentation,force\n0.1,2\n", 'or columns={"indentation": "indentation", "normal_force": "force"}'),
         ("indentation,normal_force\n0,0\n0.1,much\n", "line 3: '0.1,much'; allowed: 2 numbers"),
     ],
 )
@@ -165,8 +165,11 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: MeasuredCurve("motion", "indentation", [0.1], [1.0]), r"data\.column: given an unknown key"),
-        (lambda: MeasuredCurve("time", "depth", [0.1], [1.0]), r"data\.over: given an unknown key"),
+        (
+            lambda: MeasuredCurve("motion", "indentation", [0.1], [1.0]),
+            r'data\.column: given "motion", no column',
+        ),
+        (lambda: MeasuredCurve("time", "depth", [0.1], [1.0]), r'data\.over: given "depth", no column'),
         (lambda: MeasuredCurve("time", "position", [0.1], [1.0, 2.0]), "given 2 values; allowed: as many"),
         (lambda: MeasuredCurve("time", "position", [], []), "given 0 values"),
         (lambda: MeasuredCurve("time", "position", [1, 1], [1, 2]), "the same place twice"),

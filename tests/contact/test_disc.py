@@ -10,12 +10,10 @@ from evfem.contact.signorini import (
     OPEN,
     SLIP,
     STICK,
-    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
-    ExtraUnknowns,
 )
-from evfem.contact.solve import solve_contact, solve_with_attraction
+from evfem.contact.solve import solve_contact
 
 
 def solved(problem, force):
@@ -108,18 +106,6 @@ def test_cohesion_widens_the_disc_of_what_touches():
         assert_allclose(found.force, expected, atol=1e-12)
 
 
-def test_cohesion_of_nodes_that_feel_each_other():
-    problem, _ = half_space(10, 0.2, (0.03, -0.02), 0.2)
-    problem = replace(problem, cohesion=np.full(problem.size, 2e-3))
-    found = solved(problem, np.zeros(3 * problem.size))
-    force, slips = found.force.reshape(-1, 3), found.status == SLIP
-    assert slips.sum() > 5
-    assert_allclose(np.hypot(*force[slips, 1:].T), 0.2 * force[slips, 0] + 2e-3, rtol=1e-9)
-    way = found.state.reshape(-1, 3)[slips, 1:]
-    along = (force[slips, 1:] * way).sum(axis=1)
-    assert_allclose(along, -np.hypot(*way.T) * np.hypot(*force[slips, 1:].T), rtol=1e-9)
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("k", [1, 6, 25])
 def test_random_problems_are_solved_from_nothing_and_from_anything(k, friction):
@@ -196,40 +182,6 @@ def test_turned_tangents_turn_the_answer():
     turned = ContactProblem(R @ problem.start, R @ problem.compliance @ R.T, problem.friction)
     found, expected = (solved(one, np.zeros(3 * problem.size)) for one in (turned, problem))
     assert_allclose(found.force, R @ expected.force, atol=1e-10)
-
-
-def test_without_friction_normal_forces_alone_act():
-    problem, _ = half_space(8, 0.0, (0.04, 0.03))
-    found = solved(problem, np.zeros(3 * problem.size))
-    assert not found.force.reshape(-1, 3)[:, 1:].any()
-    assert missed(problem, found) < 1e-12
-
-
-def test_a_prescribed_force_finds_the_travel_of_the_bone():
-    """The travel found, given instead, makes the same force."""
-    problem, _ = half_space(10, 0.3, (0.02, 0.05), push=0.0)
-    down = np.tile([-1.0, 0.0, 0.0], problem.size)[:, None]
-    held = ExtraUnknowns(down, -down.T, np.full((1, 1), 1e-9), np.array([1.5]))
-    free = ContactProblem(problem.start, problem.compliance, problem.friction, held)
-    found = solved(free, np.zeros(3 * problem.size))
-    assert_allclose(found.force[::3].sum(), 1.5, rtol=1e-8)
-    at = ContactProblem(problem.start + down[:, 0] * found.extra[0], problem.compliance, problem.friction)
-    assert_allclose(solved(at, np.zeros(3 * problem.size)).force, found.force, atol=1e-8)
-
-
-def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
-    """Unit compliance. Open at 0.5: g = 0.5 + f, f = 0.2 (g - 0.4) gives g = 0.525. Closed, 1 mm deep,
-    with a gain of 0.3: it presses with 1.3.
-    """
-    start = np.array([0.5, 0.0, 0.0, -1.0, 0.0, 0.0])
-    pull = AttractionStiffness(np.array([0.2, 0.2]), np.array([0.4, 0.4]), np.array([0.1, 0.3]))
-    problem = ContactProblem(start, np.eye(6), np.full(2, 0.3))
-    found = solve_with_attraction(problem, pull, np.array([OPEN, OPEN]), np.zeros(6))
-    assert found.status.tolist() == [OPEN, STICK]
-    assert not found.reduced
-    assert_allclose(found.state[::3], [0.525, 0.0], atol=1e-12)
-    assert_allclose(found.force[::3], [0.0, 1.3], atol=1e-12)
-    assert_allclose(found.attraction_drop[::3], [0.025, -0.3], atol=1e-12)
 
 
 def test_what_has_no_solution_is_said_not_to_be_solved():

@@ -5,7 +5,7 @@ input.
 import numpy as np
 import pytest
 
-from evfem.common.tables import numbers, piecewise_linear, read_columns
+from evfem.common.tables import piecewise_linear
 from evfem.electrostatics.laws import Layer
 from evfem.errors import InputError
 from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
@@ -54,13 +54,6 @@ def test_profile_is_scipys_pchip_inside_and_level_outside():
     ends = surface.height(np.array([-9.0, -1.0, 2.0, 9.0]))
     np.testing.assert_allclose(ends, [0.0, 0.0, 0.3, 0.3], atol=1e-15)
     assert surface.slope(np.array([-9.0, 9.0])).tolist() == [0.0, 0.0]
-
-
-def test_profile_meets_its_samples_and_does_not_overshoot():
-    surface = Profile(*SAMPLES)
-    np.testing.assert_allclose(surface.height(np.array(SAMPLES[0])), SAMPLES[1], atol=1e-16)
-    between = surface.height(np.linspace(0.1, 0.9, 50))  # two equal samples: level in between
-    np.testing.assert_allclose(between, 0.02, atol=1e-16)
 
 
 def test_friction_is_linear_between_rows_and_jumps_at_a_repeated_x():
@@ -201,13 +194,3 @@ def test_profile_does_not_change_with_the_arrays_it_was_made_from():
 def test_piecewise_linear_is_numpys_interp_without_jumps():
     place, value = np.array([0.0, 1.0, 4.0]), np.array([2.0, -1.0, 0.5])
     np.testing.assert_allclose(piecewise_linear(place, value, X), np.interp(X, place, value), atol=1e-15)
-
-
-def test_numbers_name_the_place_of_a_wrong_one():
-    with pytest.raises(InputError, match="number 2, 1"):
-        numbers("table", [[1.0, 2.0], [float("inf"), 0.0]], "rows", axes=2)
-
-
-def test_columns_accept_a_byte_order_mark(tmp_path):
-    (tmp_path / "t.csv").write_bytes(b"\xef\xbb\xbfx,height\n1,2\n")
-    assert [c.tolist() for c in read_columns(tmp_path / "t.csv", ["x", "height"], "t")] == [[1.0], [2.0]]

@@ -12,6 +12,7 @@ from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.electrostatics.signalfile import Playback, write_signal
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
+from evfem.textures.importers import Haptics
 
 JUMP = VoltageProfile([1.0, 3.5, 6.0, 6.0, 11.0], [0.0, 2000.0, 500.0, 1500.0, -1500.0])
 DEVICE = Playback(full_scale=2000.0, speed=20.0, friction=(0.5, 0.6))
@@ -175,3 +176,43 @@ def test_the_carrier_stands_in_the_description():
     given = (profile, 2000.0, 20.0, (0.5, 0.6))
     assert "carrier of 10000.0 Hz" in signalfile.haptics(*given, 10_000.0)["description"]
     assert "carrier" not in signalfile.haptics(*given)["description"]
+
+
+def test_what_is_written_is_read_back_but_for_the_sign(tmp_path):
+    """Friction is straight between keyframes: the squared voltage is right to a share of 1e-4 of that at full
+    scale (`CHORD`), but for the tick that a jump takes.
+    """
+    path = tmp_path / "a.hjif"
+    write_signal(path, JUMP, Playback(full_scale=2000.0, speed=20.0, friction=(1.0 / 3.0, 0.6)))
+    back = signalfile.read_signal(path)
+    x = np.linspace(1.0, 11.0, 4001)
+    x = x[np.abs(x - 6.0) > 0.01]
+    assert (back.position[0], back.position[-1]) == (1.0, pytest.approx(11.0))
+    assert np.abs(back(x) ** 2 - JUMP(x) ** 2).max() < 1.1e-4 * 2000.0**2
+    assert back.voltage.min() >= 0.0
+    texture = Haptics(licence="CC0-1.0")(path)
+    share = (JUMP(x) / 2000.0) ** 2
+    friction = 1.0 / 3.0 + (0.6 - 1.0 / 3.0) * share
+    np.testing.assert_allclose(np.interp(x - 1.0, texture.x, texture.values), friction, atol=4e-5)
+    assert texture.quantity == "friction"
+
+
+def test_files_of_others_are_textures_or_get_a_sentence(tmp_path):
+    """A friction perception without a voltage is a texture and no signal."""
+    path = tmp_path / "a.hjif"
+    write_signal(path, JUMP, DEVICE)
+    file = json.loads(path.read_text())
+    (perception,) = file["perceptions"]
+    del perception["reference_devices"][0]["maximum_voltage"]
+    perception["perception_modality"] = "Vibration"
+    other = json.loads(json.dumps(perception)) | {"perception_modality": "Friction", "unit_exponent": -5}
+    path.write_text(json.dumps(file | {"perceptions": [perception, other]}))
+    with pytest.raises(InputError, match=r"a\.hjif, without them; allowed: a \.hjif with the largest"):
+        signalfile.read_signal(path)
+    assert Haptics(licence="CC0-1.0")(path).length == pytest.approx(100.0)  # ten times as long
+    for text in ("", "[]", json.dumps(file | {"perceptions": [perception]}), '{"perceptions": [3]}'):
+        path.write_text(text)
+        with pytest.raises(InputError, match=r"path: given a\.hjif, of another kind or damaged; allowed: a"):
+            signalfile.read_signal(path)
+    with pytest.raises(InputError, match="No such file"):
+        signalfile.read_signal(tmp_path / "none.hjif")

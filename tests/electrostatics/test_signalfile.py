@@ -285,7 +285,7 @@ def test_what_cannot_be_read_back_is_said(tmp_path):
     for ending in ("wav", "csv"):
         with pytest.raises(InputError, match="No such file"):
             read_signal(tmp_path / f"none.{ending}")
-    with pytest.raises(InputError, match="do not keep the whole signal"):
+    with pytest.raises(InputError, match="a map does not keep the signal"):
         read_signal(tmp_path / "map.png")
     (tmp_path / "folder.wav").mkdir()
     with pytest.raises(InputError, match="directory"):

@@ -12,6 +12,7 @@ from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.scan import RidgeScan, ScannedRidges
 from evfem.mesh.quality import check
 from evfem.scene import file as scenefile
+from evfem.textures.importers import Table
 
 FINGER = FingerPad(resolution="coarse", ridge_height=0.1, ridge_exponent=2.0, ridge_phase=0.2)
 OUTER = Ellipse(8.34, 6.395)
@@ -140,3 +141,20 @@ def test_depth_between_two_nodes_is_refused_on_a_coarse_mesh_alone():
     ):
         FingerPad(resolution="coarse", ridge_scan=scan)
     FingerPad(resolution="fine", ridge_scan=scan)
+
+
+def test_a_texture_of_heights_gives_ridges_below_the_middle(relief):
+    """What `evfem texture import` makes of the file of a scan begins at 0: shifted back it is that scan."""
+    texture = Table(licence="CC0-1.0", level="none")(relief)
+    pad = FingerPad(resolution="coarse", ridges=texture)
+    np.testing.assert_allclose(pad.ridge_scan.x, X, atol=1e-12)
+    wanted = FingerPad(resolution="coarse", ridge_scan=relief)
+    np.testing.assert_allclose(pad.mesh(1).points, wanted.mesh(1).points, atol=1e-12)
+    assert FingerPad(resolution="coarse", ridges=wanted.ridge_scan) == wanted
+    scene = ev.Scene(pad, ev.Flat(), motion=ev.Press(force=0.05))
+    assert scenefile.loads(scenefile.dump(scene)).digest() == scene.digest()
+    slippery = ev.Texture("a", "measured", [0.0, 1.0], [0.3, 0.4], "CC0-1.0", quantity="friction")
+    with pytest.raises(InputError, match="ridges: given a texture of friction; allowed: a texture of"):
+        FingerPad(ridges=slippery)
+    with pytest.raises(InputError, match=r'^finger\.ridges: given "yes"; allowed: true \| false$'):
+        FingerPad(ridges="yes")

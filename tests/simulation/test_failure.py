@@ -34,7 +34,7 @@ def said(
     failed = failure("nodes keep changing", [1.0])
     failed.findings, failed.released, failed.unstable = "out of balance: 1 N/mm", released, unstable
     failed.last = going.state, replace(Target.held(going.state.bone, 0.0), duration=duration)
-    going.model.equilibrium.stability_ratio = lambda state, target: StabilityRatio(share, SLOPES)
+    going.model.equilibrium.body.stability_ratio = lambda state, target: StabilityRatio(share, SLOPES)
     return advice(going.scene, going.model, failed).split("; ")
 
 

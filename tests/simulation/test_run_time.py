@@ -92,4 +92,4 @@ def test_a_finger_that_just_touches_is_loose():
     row = dict.fromkeys(("position", "indentation", "applied_force", "voltage", "electrostatic_force"), 0.0)
     for force, loose in ((0.0, True), (1e-17, True), (-1e-17, True), (1e-8, False)):
         going.rows = [row | {"normal_force": force}]
-        assert going._start_of(1)["loose"] == loose
+        assert going.start_of(1)["loose"] == loose

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
-from evfem.textures.importers import Scan
+from evfem.textures.importers import Scan, Table
 
 pytestmark = [pytest.mark.scans, pytest.mark.filterwarnings("ignore::ImportWarning")]
 SOURCE = {"licence": "CC0-1.0"}
@@ -43,3 +43,18 @@ def test_a_damaged_file_is_refused(tmp_path, name):
     (tmp_path / name).write_bytes(b"PK\x03\x04 nothing of that kind")
     with pytest.raises(InputError, match="file: given"):
         Scan(**SOURCE)(tmp_path / name)
+
+
+def test_a_foreign_csv_is_left_to_surfacetopography(tmp_path):
+    """A matrix as Gwyddion exports it, in um below comments, called .csv; not columns with other names."""
+    lines = "\n".join("\t".join(f"{1e3 * h:.6f}" for h in factor * HEIGHT) for factor in (1.0, 2.0, 3.0))
+    (tmp_path / "a.csv").write_text(f"# Width: 2 mm\n# Height: 0.1 mm\n# Value units: um\n{lines}\n")
+    texture = Table(**SOURCE, level="none")(tmp_path / "a.csv")
+    np.testing.assert_allclose(texture.values, 2.0 * HEIGHT, atol=1e-8)
+    assert texture.kind == "scan"
+    (tmp_path / "b.csv").write_text("a,b\n1,2\n3,4\n")
+    with pytest.raises(InputError, match=r"b\.csv, which starts with 'a,b'; allowed: x,height \| x,friction"):
+        Table(**SOURCE)(tmp_path / "b.csv")
+    (tmp_path / "c.csv").write_text("nothing\n")
+    with pytest.raises(InputError, match=r"c\.csv without a line of numbers"):
+        Table(**SOURCE)(tmp_path / "c.csv")

@@ -1,12 +1,12 @@
-/* The loops for Python, twins of the weak forms `neo_hookean` (`elastic.h`) and `kelvin_voigt` (`viscous.h`),
-   in the plane and in space (DIM): of each a version for every instruction set of x86, chosen when the module
+/* The loops for Python, twins of the weak forms `neo_hookean` (`elastic.h`), `kelvin_voigt` (`viscous.h`) and
+   `maxwell` (`relaxing.h`), in the plane and in space (DIM): of each a version for every instruction set of x86, chosen when the module
    is loaded; elsewhere for the one there is. */
 
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030b0000
 #define STRAINS (DIM * (DIM + 1) / 2)
 #define STRESSES (DIM == 2 ? 4 : 6)
-#include "viscous.h"
+#include "relaxing.h"
 #include "arrays.h"
 
 /* -- one version for each instruction set ---------------------------------------------------- */
@@ -45,10 +45,29 @@
                                              double *data) {                                             \
         SIZED(viscous_tangent, u, rate, strain0, places, data)                                           \
     }                                                                                                    \
+    ISA static void begin_##SUFFIX(const mesh *m, const double *u, int branches, const stored *x,        \
+                                   const stored *kept, stored *before) {                                 \
+        SIZED(relaxing_begin, u, branches, x, kept, before)                                              \
+    }                                                                                                    \
+    ISA static void relaxing_##SUFFIX(const mesh *m, const double *u, int branches,                      \
+                                      const stored *modulus, const stored *before, double *out) {        \
+        SIZED(relaxing_forces, u, branches, modulus, before, out)                                        \
+    }                                                                                                    \
+    ISA static void relaxing_tangent_##SUFFIX(const mesh *m, const double *u, int branches,              \
+                                              const stored *modulus, const stored *before,               \
+                                              const int32_t *places, double *data) {                     \
+        SIZED(relaxing_tangent, u, branches, modulus, before, places, data)                              \
+    }                                                                                                    \
+    ISA static double end_##SUFFIX(const mesh *m, const double *u, int branches, const stored *modulus,  \
+                                   const stored *before, const double *u0, const stored *kept,           \
+                                   const stored *loss, stored *out, double *lost) {                      \
+        SIZED(relaxing_end, u, branches, modulus, before, u0, kept, loss, out, lost)                     \
+    }                                                                                                    \
     static const versions version_##SUFFIX = {                                                           \
         forces_##SUFFIX,   tangent_##SUFFIX, log_volumes_##SUFFIX, volume_forces_##SUFFIX,               \
         stresses_##SUFFIX, smallest_##SUFFIX, strains_##SUFFIX,    viscous_##SUFFIX,                     \
-        viscous_tangent_##SUFFIX};
+        viscous_tangent_##SUFFIX, begin_##SUFFIX, relaxing_##SUFFIX, relaxing_tangent_##SUFFIX,          \
+        end_##SUFFIX};
 
 typedef struct {
     double (*forces)(const mesh *, const double *, const stored *, const stored *, double *, double *);
@@ -62,6 +81,12 @@ typedef struct {
     double (*viscous)(const mesh *, const double *, const stored *, const stored *, double *);
     void (*viscous_tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *,
                             double *);
+    void (*begin)(const mesh *, const double *, int, const stored *, const stored *, stored *);
+    void (*relaxing)(const mesh *, const double *, int, const stored *, const stored *, double *);
+    void (*relaxing_tangent)(const mesh *, const double *, int, const stored *, const stored *,
+                             const int32_t *, double *);
+    double (*end)(const mesh *, const double *, int, const stored *, const stored *, const double *,
+                  const stored *, const stored *, stored *, double *);
 } versions;
 
 VERSION(plain, )
@@ -277,6 +302,93 @@ static PyObject *call_add_viscous(PyObject *self, PyObject *args) {
     return finish(&r, Py_NewRef(Py_None));
 }
 
+/* Numbers of each branch (B, branches, LANES), and how many branches there are. */
+static const stored *hold_branches(request *r, PyObject *array, int *branches) {
+    const stored *found = hold(&r->all, array, 'd', -1, 0);
+    if (!found) return NULL;
+    Py_ssize_t each = r->m.blocks * LANES * (Py_ssize_t)sizeof(double);
+    Py_ssize_t length = r->all.views[r->all.count - 1].len;
+    if (length < 0 || (each ? length % each || length / each > INT16_MAX : length))
+        PyErr_SetString(PyExc_ValueError, "branches of other cells");
+    *branches = PyErr_Occurred() || !each ? 0 : (int)(length / each);
+    return found;
+}
+
+/* `items` of each branch at each point (B, Q, branches, items, LANES). */
+static stored *hold_points(request *r, PyObject *array, int branches, int items, int writable) {
+    return hold(&r->all, array, 'd', r->m.blocks * r->m.at.count * branches * items * LANES, writable);
+}
+
+static PyObject *call_begin_relaxing(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *x, *kept, *before;
+    request r;
+    int branches = 0;
+    if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &x, &kept, &before)) return NULL;
+    read_request(&r, cells, u, NULL, NULL, 0);
+    const stored *steps = hold_branches(&r, x, &branches);
+    const stored *given = hold_points(&r, kept, branches, KEPT, 0);
+    stored *found = hold_points(&r, before, branches, KEPT + 1, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->begin(&r.m, r.u, branches, steps, given, found);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_relaxing(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *modulus, *before, *out;
+    request r;
+    int branches = 0;
+    if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &modulus, &before, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const stored *moduli = hold_branches(&r, modulus, &branches);
+    const stored *begun = hold_points(&r, before, branches, KEPT + 1, 0);
+    double *force = hold(&r.all, out, 'd', DIM * size, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->relaxing(&r.m, r.u, branches, moduli, begun, force);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_add_relaxing(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *modulus, *before, *places, *data;
+    request r;
+    int branches = 0;
+    if (!PyArg_ParseTuple(args, "OOOOOO", &cells, &u, &modulus, &before, &places, &data)) return NULL;
+    read_request(&r, cells, u, NULL, NULL, 0);
+    const stored *moduli = hold_branches(&r, modulus, &branches);
+    const stored *begun = hold_points(&r, before, branches, KEPT + 1, 0);
+    double *values;
+    const int32_t *place = hold_places(&r, places, data, &values);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->relaxing_tangent(&r.m, r.u, branches, moduli, begun, place, values);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_end_relaxing(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *modulus, *before, *u0, *kept, *loss, *out;
+    request r;
+    int branches = 0;
+    if (!PyArg_ParseTuple(args, "OOOOOOOO", &cells, &u, &modulus, &before, &u0, &kept, &loss, &out))
+        return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const stored *moduli = hold_branches(&r, modulus, &branches);
+    const stored *begun = hold_points(&r, before, branches, KEPT + 1, 0);
+    const double *first = hold(&r.all, u0, 'd', DIM * size, 0);
+    const stored *given = hold_points(&r, kept, branches, KEPT, 0);
+    const stored *numbers = hold(&r.all, loss, 'd', 4 * r.m.blocks * branches * LANES, 0);
+    stored *found = hold_points(&r, out, branches, KEPT, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    double stored_energy, lost;
+    Py_BEGIN_ALLOW_THREADS
+    stored_energy = version->end(&r.m, r.u, branches, moduli, begun, first, given, numbers, found, &lost);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_BuildValue("dd", stored_energy, lost));
+}
+
 static PyMethodDef methods[] = {
     {"bounded", call_bounded, METH_VARARGS,
      "bounded(numbers, end): nodes or places, all from 0 to below end, as the other functions take them."},
@@ -298,6 +410,16 @@ static PyMethodDef methods[] = {
      "viscous(cells, u, rate, strain0, out): add the nodal forces (N, DIM); dissipated energy."},
     {"add_viscous", call_add_viscous, METH_VARARGS,
      "add_viscous(cells, u, rate, strain0, places, data): add the tangent of `viscous`."},
+    {"begin_relaxing", call_begin_relaxing, METH_VARARGS,
+     "begin_relaxing(cells, u, x, kept, before): B and a (B, Q, branches, KEPT + 1, LANES) of steps of x\n"
+     "relaxation times (B, branches, LANES), from C_i `kept` (B, Q, branches, KEPT, LANES)."},
+    {"relaxing", call_relaxing, METH_VARARGS,
+     "relaxing(cells, u, modulus, before, out): add the branches' nodal forces (N, DIM)."},
+    {"add_relaxing", call_add_relaxing, METH_VARARGS,
+     "add_relaxing(cells, u, modulus, before, places, data): add the tangent of `relaxing`."},
+    {"end_relaxing", call_end_relaxing, METH_VARARGS,
+     "end_relaxing(cells, u, modulus, before, u0, kept, loss, out): C_i at the end; stored energy, and what\n"
+     "was lost, with the numbers `loss` (B, branches, 4, LANES) of `relaxing_end`."},
     {NULL, NULL, 0, NULL}};
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, MODULE, "Compiled element loops.", -1, methods};

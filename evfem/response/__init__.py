@@ -1,0 +1,1 @@
+"""How what a scene does answers to its parameters: exact derivatives, uncertainty, design."""

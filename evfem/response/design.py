@@ -1,0 +1,189 @@
+"""Parameters of a scene that make a number of its run smallest, by scipy's L-BFGS-B with exact gradients.
+
+Unknowns are the parameters over the distance of their bounds. A run that is not found, or whose derivatives
+end (a snap), ends the search at the best one so far, and `told` says so. Source: R. H. Byrd, P. Lu, J.
+Nocedal, C. Zhu, SIAM J. Sci. Comput. 16 (1995) 1190-1208, doi:10.1137/0916069.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from evfem.common import notices
+from evfem.common.arrays import Floats
+from evfem.errors import InputError, NotConverged, quoted
+from evfem.response.parameters import parameter_of
+from evfem.response.sensitivities import sensitivities
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Result
+from evfem.sweeps.file import check_output
+from evfem.sweeps.run import output
+
+#: most runs with their derivatives; relative change of the objective, and gradient in unknowns, that end it
+MOST, SMALL, FLAT = 100, 1e-9, 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """The best `parameters` by key, the `objective` there, its `scene` and `result`; `gradient` by key; the
+    number of `runs`, and how it ended (`told`).
+    """
+
+    parameters: Mapping[str, float]
+    objective: float
+    scene: Scene
+    result: Result
+    gradient: Mapping[str, float]
+    runs: int
+    told: str
+
+    def __repr__(self) -> str:
+        """Objective and parameters."""
+        values = ", ".join(f"{key} = {value:.6g}" for key, value in self.parameters.items())
+        return f"Design after {self.runs} runs: objective {self.objective:.6g} at {values} ({self.told})"
+
+
+class _Ends(Exception):
+    """The search cannot go on."""
+
+
+@dataclass
+class _Search:
+    """The objective and its gradient as functions of the unknowns (P,) from 0 to 1."""
+
+    scene: Scene
+    objective: Callable[[Result], float]
+    keys: tuple[str, ...]
+    bounds: Floats
+    progress: bool
+    best: Design | None = None
+    runs: int = 0
+    scale: float = field(default=0.0)
+
+    def __call__(self, z: Floats) -> tuple[float, Floats]:
+        low, high = self.bounds.T
+        scene = self.scene
+        values = dict(zip(self.keys, (low + z * (high - low)).tolist(), strict=True))
+        for key, value in values.items():
+            one = parameter_of(scene, key)
+            scene = one.applied(scene, value - one.value)
+        try:
+            found = sensitivities(scene, self.keys)
+        except NotConverged as error:
+            raise _Ends(str(error)) from None
+        self.runs += 1
+        value = float(self.objective(found.result))
+        slope = found.gradient(self.objective)
+        gradient = np.array([slope[key] for key in self.keys]) * (high - low)
+        if not (np.isfinite(value) and np.isfinite(gradient).all()):
+            raise _Ends("; ".join(found.reasons.get(key, "") for key in self.keys))
+        if self.best is None or value < self.best.objective:
+            self.best = Design(values, value, scene, found.result, slope, self.runs, "")
+        if self.progress:
+            notices.tell(f"design: run {self.runs}, objective {value:.6g}")
+        self.scale = self.scale or abs(value) or 1.0
+        return value / self.scale, gradient / self.scale
+
+
+def design(
+    scene: Scene | str | PathLike[str],
+    objective: Callable[[Result], float] | str,
+    parameters: Sequence[str],
+    bounds: Mapping[str, Sequence[float]] | Sequence[Sequence[float]],
+    progress: bool = False,
+) -> Design:
+    """The parameters within bounds that make a number of a scene's run smallest.
+
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file; its own parameters are the start.
+    objective
+        A smooth function from a `Result` to a number, or COLUMN.STATISTIC[.MOTION] as the outputs of a sweep,
+        with a minus before it to make that largest.
+    parameters
+        Dotted keys of the scene.
+    bounds
+        {key: (low, high)}, or the pairs in the order of the keys.
+    progress
+        Print a line per run.
+
+    Returns
+    -------
+    Design
+        `parameters`, `objective`, `scene` and `result` of the best run.
+
+    Raises
+    ------
+    InputError
+        What is no parameter, or starts out of its bounds, or a start that has no derivatives.
+
+    Examples
+    --------
+    >>> from evfem import Display, FingerPad, Hover, Kaczmarek
+    >>> pad = FingerPad(ridges=False, resolution="coarse")
+    >>> scene = Scene(pad, Display(), Kaczmarek(), 500.0, Hover(gap=0.3, steps=1))
+    >>> wanted = lambda run: (1e4 * run.electrostatic_force[0] - 0.5) ** 2
+    >>> found = design(scene, wanted, ["electrostatics.voltage"], [(100.0, 1000.0)])
+    >>> round(1e4 * float(found.result.electrostatic_force[0]), 4)
+    0.5
+    """
+    from scipy.optimize import minimize
+
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
+    keys = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+    limits = _bounds(scene, keys, bounds)
+    search = _Search(scene, _objective(scene, objective), keys, limits, progress)
+    start = np.array([parameter_of(scene, key).value for key in keys])
+    z = (start - limits[:, 0]) / np.diff(limits, axis=1)[:, 0]
+    options = {"maxfun": MOST, "ftol": SMALL, "gtol": FLAT}
+    try:
+        ended = minimize(
+            search, z, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(z), options=options
+        )
+        told = str(ended.message).lower()
+    except _Ends as reason:
+        told = f"ended early: {reason}"
+    if (best := search.best) is None:
+        raise InputError("scene", told, "a start whose run has derivatives")
+    return Design(best.parameters, best.objective, best.scene, best.result, best.gradient, search.runs, told)
+
+
+def _bounds(scene: Scene, keys: tuple[str, ...], given: Any) -> Floats:
+    """Bounds (P, 2) of the keys, the start within."""
+    pairs: list[Any] = [given.get(key) for key in keys] if isinstance(given, Mapping) else list(given)
+    rows = []
+    if len(pairs) != len(keys):
+        raise InputError("bounds", f"{len(pairs)} for {len(keys)} parameters", "a pair (low, high) for each")
+    for key, pair in zip(keys, pairs, strict=True):
+        value = parameter_of(scene, key).value
+        numbers = isinstance(pair, Sequence) and len(pair) == 2 and not isinstance(pair, str)
+        if (
+            not numbers
+            or not float(pair[0]) < float(pair[1])
+            or not float(pair[0]) <= value <= float(pair[1])
+        ):
+            raise InputError(
+                f"bounds.{key}", quoted(pair), f"(low, high) around {value:g}, that of the scene"
+            )
+        rows.append([float(pair[0]), float(pair[1])])
+    return np.array(rows)
+
+
+def _objective(scene: Scene, given: Any) -> Callable[[Result], float]:
+    """The objective as a function."""
+    if callable(given):
+        return given
+    if not isinstance(given, str):
+        raise InputError("objective", quoted(given), "a function of a result, or COLUMN.STATISTIC[.MOTION]")
+    sign, name = (-1.0, given[1:]) if given.startswith("-") else (1.0, given)
+    check_output(name, len(scene.motion))
+    return lambda result: sign * float(output(result, name) or 0.0)

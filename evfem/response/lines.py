@@ -1,0 +1,344 @@
+"""One parameter on its way through a run: derivatives of states, books and rows, part by part.
+
+Total derivatives are sums of two partial ones, each a central difference of fourth order of what the run
+itself evaluates: by the parameter at fixed states, between four models of changed scenes (`Beside`), and
+along the derivative of the states at a fixed scene, in one more model of the scene (`Line`).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.newton.state import State
+from evfem.response.parameters import Parameter
+from evfem.response.parts import Equations
+from evfem.scene.scene import Scene
+from evfem.simulation.history import UNITS
+from evfem.simulation.ledger import Ledger
+from evfem.simulation.run import Request, Run
+from evfem.simulation.works import Books
+from evfem.surface.ways import Steps
+
+#: share of a parameter between neighbours, their places in steps and the weights of the difference
+STEP = 1e-3
+PLACES, WEIGHTS = (-2, -1, 1, 2), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
+#: the farthest place goes no further than this share of the way to a kink of the attraction or to another
+#: status, than this share of the length over which the attraction changes, and at least so far
+NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
+#: how far (mm) nodes of the undeformed finger move between places
+SHIFT = 5e-6
+#: refinements at most; the relative change that is still to come when they are done, that from which on it is
+#: rounding where it falls no more than by the next factor, and what is too much; the factor by which it must
+#: fall with the matrix of another part
+ROUNDS, DONE, ROUNDING, NOISE, WRONG, SLOW = 30, 1e-13, 1e-7, 0.5, 1e-6, 0.01
+LOST = "the linear equations of step {} were not solved"
+#: columns with units that are counted all the same
+WHOLE = (
+    "contact_width",
+    "real_contact_width",
+    "mean_contact_pressure",
+    "contact_area",
+    "real_contact_area",
+)
+#: derivatives of states and books, by their fields
+Change = dict[str, Any]
+
+
+def differentiable(column: str) -> bool:
+    """Whether a column of the history is a smooth function of the parameters.
+
+    >>> differentiable("normal_force"), differentiable("substeps"), differentiable("contact_width")
+    (True, False, False)
+    """
+    return UNITS.get(column, "N") not in ("", "s") and column not in WHOLE
+
+
+def is_work(column: str) -> bool:
+    """Whether a column is a work or an energy."""
+    return column.endswith(("_work", "_energy", "_dissipation"))
+
+
+def difference(values: Sequence[Any], step: float) -> Any:
+    """Derivative from values of numbers or arrays at the `PLACES`, so many steps apart.
+
+    >>> round(float(difference([np.exp(0.01 * k) for k in PLACES], 0.01)), 8)
+    1.0
+    """
+    return sum(weight * np.asarray(value) for weight, value in zip(WEIGHTS, values, strict=True)) / step
+
+
+def numbers_of(owner: Any) -> Change:
+    """The fields of a state or of books that are real numbers."""
+    values = {spec.name: getattr(owner, spec.name) for spec in fields(owner)}
+    return {name: v for name, v in values.items() if np.asarray(v).dtype.kind == "f"}
+
+
+def changes(owners: Sequence[Any], step: float) -> Change:
+    """`difference` of every field of states or books."""
+    found = [numbers_of(one) for one in owners]
+    return {name: difference([one[name] for one in found], step) for name in found[0]}
+
+
+def added(first: Change, second: Change) -> Change:
+    """The sum of two derivatives."""
+    return {name: value + second[name] for name, value in first.items()}
+
+
+def moved(owner: Any, change: Change, way: float) -> Any:
+    """A state, or books, so far along a derivative."""
+    return replace(owner, **{name: getattr(owner, name) + way * value for name, value in change.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A part that a run accepted: its states and their margins, which part of the step it is, where a jump of
+    friction holds nodes (`pins`, (P, d) in mm, else nan), and the books of the run before and after it.
+    """
+
+    old: State
+    new: State
+    margins: Floats
+    span: tuple[float, float]
+    pins: Floats
+    books: tuple[Books | None, Books]
+    sums: tuple[dict[str, float], dict[str, float]]
+
+
+@dataclass
+class Beside:
+    """A run that is never solved, of the scene with its parameter changed by `way`."""
+
+    run: Run
+    way: float
+    requests: Iterator[Request]
+    request: Request | None = None
+
+    @classmethod
+    def of(cls, scene: Scene, parameter: Parameter | None, way: float) -> Beside:
+        """Of a scene, which does without the warnings that the run itself has given."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = Run(scene if parameter is None else parameter.applied(scene, way), None)
+        return cls(run, way, run.requests())
+
+    def begin(self, part: Accepted, jumps: Sequence[Steps], old: State) -> Equations:
+        """The equations of a part from `old`; `jumps` of friction are those of the followed run."""
+        assert self.request is not None
+        pins, own = part.pins.copy(), self.run.model.equilibrium.interface.jumps.steps
+        for node in np.flatnonzero(np.isfinite(pins[:, 0])):
+            away = [np.abs(pins[node, one.axis] - one.place) for one in jumps]
+            nearest = int(np.argmin([each.min() for each in away]))
+            jump, axis = int(away[nearest].argmin()), jumps[nearest].axis
+            pins[node, axis] += own[nearest].place[jump] - jumps[nearest].place[jump]
+        return Equations.begin(self.run.model, old, self.request.path(*part.span), pins)
+
+    def booked(self, old: State, new: State, begin: Books | None, sums: dict[str, float]) -> Ledger:
+        """The books after a part that begins with these."""
+        ledger = Ledger(self.run.model, dict(sums), begin)
+        ledger.accept(old, new)
+        return ledger
+
+    def row(self, state: State, step: int, books: Books, sums: dict[str, float]) -> dict[str, Any]:
+        """The row at the end of the present step."""
+        assert self.request is not None
+        one, run = self.request, self.run
+        ledger = Ledger(run.model, sums, books)
+        return ledger.row(state, step, one.motion_index, one.kind, run.time + one.duration)
+
+
+@dataclass
+class Line:
+    """One parameter: `beside`, runs of changed scenes at the `PLACES` in steps of `step`, and `centre`, one
+    of the scene itself, for places along the states at most `longest` apart; derivatives of state, books and
+    sums so far, and what was found step by step. Books are kept if it `works`.
+    """
+
+    name: str
+    step: float
+    longest: float
+    beside: list[Beside]
+    centre: Beside
+    lengths: Callable[[State], Floats]
+    works: bool
+    state: Change = field(default_factory=dict)
+    books: Change = field(default_factory=dict)
+    sums: dict[str, float] = field(default_factory=dict)
+    rows: list[dict[str, float]] = field(default_factory=list)
+    valid_to: list[float] = field(default_factory=list)
+    reach: float = np.inf
+    way: float = 0.0
+    reason: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        parameter: Parameter,
+        centre: Beside,
+        lengths: Callable[[State], Floats],
+        works: bool,
+    ) -> Line:
+        """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
+        step = longest = STEP * parameter.size
+        last = Beside.of(scene, parameter, PLACES[-1] * step)
+        shift = _shift(last, centre.run.model.mesh.points) / PLACES[-1]
+        if shift > SHIFT:
+            step *= SHIFT / shift
+            last = Beside.of(scene, parameter, PLACES[-1] * step)
+        beside = [*(Beside.of(scene, parameter, place * step) for place in PLACES[:-1]), last]
+        state = changes([one.run.state for one in beside], step)
+        return cls(parameter.name, step, longest, beside, centre, lengths, works, state)
+
+    # -- a part
+
+    def follow(
+        self, part: Accepted, solve: Callable[[Floats], Floats], jumps: Sequence[Steps], patient: bool
+    ) -> bool:
+        """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
+        equations = [one.begin(part, jumps, part.old) for one in self.beside]
+        change = self._nothing(
+            part.new, difference([one.target.voltage.voltage for one in equations], self.step)
+        )
+        by_parameter = difference([one.residual(part.new) for one in equations], self.step)
+        rate, before, rounds = 1.0, 1.0, 0
+        while rounds < ROUNDS:
+            rounds += 1
+            more = solve(-by_parameter - self._along(part, jumps, change))
+            self._add(change, more)
+            share = self._share(more, change, part.new)
+            rate, before = share / before if rounds > 1 else 1.0, share
+            if share * rate <= DONE or (share <= ROUNDING and rate > NOISE):
+                break
+            if not np.isfinite(share) or (rate > SLOW and rounds > 1 and not patient):
+                break
+        if before <= WRONG and (patient or rate <= SLOW or before <= ROUNDING):
+            self._end(part, equations, jumps, change)
+            return True
+        self.reason = LOST if patient else ""
+        return False
+
+    def _nothing(self, state: State, voltage: Any) -> Change:
+        """The derivative of a part's end before anything is known but that of the voltage."""
+        zero = {name: np.zeros_like(getattr(state, name)) for name in ("u", "bone", "contact_force")}
+        return {**zero, "voltage": float(voltage)}
+
+    def _add(self, change: Change, more: Floats) -> None:
+        """Add a solution (m,) of a part's equations to a derivative."""
+        body = self.centre.run.model.body
+        change["u"] = change["u"] + body.expand(more[: body.size])
+        change["bone"] = change["bone"] + more[body.bone]
+        change["contact_force"] = change["contact_force"] + more[body.size :].reshape(
+            change["contact_force"].shape
+        )
+
+    def _share(self, more: Floats, change: Change, state: State) -> float:
+        """The largest change of displacements and of contact forces, as a share of the largest derivative of
+        each, or of the largest value over the parameter.
+        """
+        shares, size = [], self.centre.run.model.body.size
+        for name, part in (("u", slice(0, size)), ("contact_force", slice(size, None))):
+            usual = STEP / self.longest * np.abs(getattr(state, name)).max(initial=0.0)
+            largest = max(np.abs(change[name]).max(initial=0.0), usual, 1e-300)
+            shares.append(np.abs(more[part]).max(initial=0.0) / largest)
+        return float(max(shares))
+
+    def _along(self, part: Accepted, jumps: Sequence[Steps], change: Change) -> Floats:
+        """Derivative (m,) of the part's equations along those of its states, the end's being `change`."""
+        way = self._way(part, change)
+        found = []
+        for place in PLACES:
+            begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
+            found.append(begun.residual(moved(part.new, change, place * way)))
+        return np.asarray(difference(found, way))
+
+    def _way(self, part: Accepted, change: Change, reach: float = np.inf) -> float:
+        """How far places are apart along the states: no node moves further than it may, and all stay within
+        `reach` of the parameter.
+        """
+        model = self.centre.run.model
+        slope = model.equilibrium.interface.surface_at(part.new).slope
+        moves = change["u"][model.pad.nodes]
+        rate = np.maximum(np.abs(moves[:, 1] - np.sum(slope * moves[:, ::2], axis=1)), 1e-300)
+        nearest = min(float((self.lengths(part.new) / rate).min()), NEAR * reach)
+        return max(min(self.longest, nearest / max(PLACES)), LEAST * self.longest)
+
+    def _end(
+        self, part: Accepted, equations: list[Equations], jumps: Sequence[Steps], change: Change
+    ) -> None:
+        """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
+        step, way = self.step, self._way(part, change)
+        by_parameter = changes([one.ended(part.new) for one in equations], step)
+        along, margins = [], []
+        for place in PLACES:
+            at = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
+            new = moved(part.new, change, place * way)
+            margins.append(at.margins(new))
+            along.append(at.ended(new))
+        state = added(by_parameter, changes(along, way)) | change
+        with np.errstate(invalid="ignore"):
+            rate = difference(margins, way) + difference([one.margins(part.new) for one in equations], step)
+        counts = np.isfinite(part.margins) & np.isfinite(rate) & (rate != 0.0)
+        reach = np.abs(part.margins[counts] / rate[counts])
+        nearest = float(reach.min(initial=np.inf))
+        self.reach = min(self.reach, nearest)
+        self.way = self._way(part, change, nearest)
+        if self.works:
+            self._book(part, jumps, state, self.way)
+        self.state = state
+
+    def _book(self, part: Accepted, jumps: Sequence[Steps], state: Change, way: float) -> None:
+        """The derivatives of the books after the part that ends with these of the state."""
+        (begin, _), (sums, _) = part.books, part.sums
+        fixed = [one.booked(part.old, part.new, begin, sums) for one in self.beside]
+        along = []
+        for place in PLACES:
+            far = place * way
+            old = moved(part.old, self.state, far)
+            self.centre.begin(part, jumps, old)
+            books = begin if begin is None else moved(begin, self.books, far)
+            along.append(self.centre.booked(old, moved(part.new, state, far), books, sums))
+        self.books = added(
+            changes([one.end for one in fixed], self.step), changes([one.end for one in along], way)
+        )
+        for name in sums:
+            more = difference([one.sums[name] for one in fixed], self.step)
+            more += difference([one.sums[name] for one in along], way)
+            self.sums[name] = self.sums.get(name, 0.0) + float(more)
+
+    # -- a step
+
+    def ends(
+        self, step: int, state: State, books: Books, sums: dict[str, float], row: dict[str, Any]
+    ) -> None:
+        """A step is done: the derivative of its row, and how far its statuses hold."""
+        fixed = [one.row(state, step, books, sums) for one in self.beside]
+        way, along = self.way, []
+        for place in PLACES:
+            far = place * way
+            of_sums = {name: value + far * self.sums.get(name, 0.0) for name, value in sums.items()}
+            here = moved(state, self.state, far), step, moved(books, self.books, far), of_sums
+            along.append(self.centre.row(*here))
+        names = [name for name in fixed[0] if differentiable(name) and (self.works or not is_work(name))]
+        found = {}
+        for name in names:
+            by_parameter = difference([one[name] for one in fixed], self.step)
+            found[name] = float(by_parameter + difference([one[name] for one in along], way))
+        self.rows.append(found)
+        self.valid_to.append(self.reach)
+        self.reach = np.inf
+        for one in self.beside:
+            assert one.request is not None
+            one.run.time += one.request.duration
+            one.run.rows.append({**row, **{n: row[n] + one.way * value for n, value in found.items()}})
+
+
+def _shift(one: Beside, points: Floats) -> float:
+    """How far (mm) the nodes of a finger are from `points` (N, dim) at most; 0 for other meshes."""
+    own = one.run.model.mesh.points
+    return float(np.abs(own - points).max()) if own.shape == points.shape else 0.0

@@ -1,0 +1,142 @@
+r"""The equations of an accepted part of a run, its nodes' statuses fixed, and their matrix.
+
+With w = (u, bone, :math:`\lambda`) at the end of a part, the state z before it and the parameters p, a part
+obeys R(w; z, p) = 0: the balance of the free unknowns; for every axis of the bone its place or the force on
+it; and per pad node
+
+=====  ========================================================
+open   :math:`\lambda = 0`
+stick  :math:`g = 0`, slip since z :math:`= 0`
+slip   :math:`g = 0`, :math:`\lambda_t + b(\lambda_n, x, s)\,s/|s| = 0`
+=====  ========================================================
+
+with the bound b of friction, :math:`\mu(x)\lambda_n` under Coulomb's law. `Equations.residual` asks the parts
+of the run's own model: tissue, attraction, surface, law of friction, controls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, sizes
+from evfem.newton.control import Target, Unsupported
+from evfem.newton.interface import Interface
+from evfem.newton.state import State
+from evfem.simulation.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """R of one part of `model` from `old` to `target`; `begin` makes its clocks those of the part."""
+
+    model: Model
+    old: State
+    target: Target
+
+    @classmethod
+    def begin(cls, model: Model, old: State, target: Target, pins: Floats) -> Equations:
+        """Start the part from `old`: velocities, branches, charges and slips count from there; `pins`
+        (P, d) are places of nodes that a jump of friction holds, else nan.
+        """
+        target = target.begun(old)
+        interface, attraction = model.equilibrium.interface, model.attraction
+        interface.begin(old, target.duration)
+        interface.jumps.place = pins
+        if model.body.dynamics is not None:
+            model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner)
+        if attraction is not None and attraction.charging is not None:
+            pressing = old.contact_force[:, 0]
+            charged = attraction.charged(interface.resting(old), old.voltage, pressing, old.charges)
+            attraction.charging.begin(charged, target.duration)
+        return cls(model, old, target)
+
+    @property
+    def interface(self) -> Interface:
+        """Of the model."""
+        return self.model.equilibrium.interface
+
+    def loaded(self, state: State) -> tuple[State, Floats]:
+        """The state with its attraction and reaction, and the reduced balance (n,)."""
+        model, body = self.model, self.model.body
+        attraction = model.equilibrium.attraction_at(self.old, state, state.voltage)
+        nodal = body.forces(state.u)
+        nodal[model.pad.nodes] -= attraction + self.interface.contact_forces(state)
+        forces = body.reduce(nodal)
+        return replace(state, attraction=attraction, reaction=forces[body.bone]), forces
+
+    def ended(self, state: State) -> State:
+        """The state as the run would accept it, with the history that it leaves behind."""
+        state, attraction = self.loaded(state)[0], self.model.attraction
+        state = self.interface.aged(self.old, self.model.equilibrium.body.accepted(self.old, state))
+        if self.target.hand is not None:
+            state = self.target.hand.settled(state)
+        if attraction is None or attraction.charging is None:
+            return state
+        resting, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        return replace(state, charges=attraction.charged(resting, state.voltage, pressing).charges)
+
+    def residual(self, state: State) -> Floats:
+        """R (m,): balance of the free unknowns, bone, contact of all pad nodes."""
+        loaded, forces = self.loaded(state)
+        return np.concatenate(
+            [forces[: -state.bone.size], self._bone(loaded), self.contact(state)[0].ravel()]
+        )
+
+    def _bone(self, state: State) -> Floats:
+        """What the bone lacks (dim,): of its place in mm, or of the force on it in N/mm."""
+        target, found = self.target, state.bone - self.target.bone(state.bone)
+        if target.height.free:
+            found[1] = target.height.missing(float(state.bone[1]), state.reaction)
+        elif isinstance(target.height, Unsupported):
+            found[1] = state.bone[1] - self.old.bone[1]
+        if target.hand is not None:
+            found[::2] = target.hand.missing(state.bone[::2], state.reaction)
+        return found
+
+    def _slip(self, state: State) -> Floats:
+        """Slips (P, dim - 1) in mm with what a penalty yields."""
+        yields = self.interface.compliance(self.old)[:, 1:]
+        return self.interface.slip(self.old, state) + yields * (
+            state.contact_force[:, 1:] - self.old.contact_force[:, 1:]
+        )
+
+    def bound(self, state: State, place: Floats, way: Floats) -> Floats:
+        """Bound of friction (P,) in N/mm at places (P, d) with slips of the size `way` (P,)."""
+        return self.interface.limit(self.old, state, self.interface.jumps.at(place), way)
+
+    def contact(self, state: State) -> tuple[Floats, Floats, Floats]:
+        """What contact lacks (P, dim), slips (P, dim - 1) and bounds of friction (P,)."""
+        interface, status = self.interface, state.status
+        normal, shear = np.split(state.contact_force, [1], axis=1)
+        gap = interface.surface_at(state).normal_gap + interface.compliance(self.old)[:, 0] * normal[:, 0]
+        slip = self._slip(state)
+        way = np.where(status >= FORWARD, sizes(slip), 0.0)
+        bound = self.bound(state, interface.places(state), way)
+        sliding = shear + bound[:, None] * directions(status, slip)
+        along = np.where(
+            (status == STICK)[:, None], slip, np.where((status >= FORWARD)[:, None], sliding, shear)
+        )
+        return np.column_stack([np.where(status == OPEN, normal[:, 0], gap), along]), slip, bound
+
+    def margins(self, state: State) -> Floats:
+        """How far nodes are from another status (P, 2): gap (mm) of open ones, contact force of closed ones;
+        shear force below the bound of sticking ones, slip (mm) of slipping ones, inf of open ones.
+        """
+        slip, bound = self.contact(state)[1:]
+        touching = state.status != OPEN
+        gap = self.interface.surface_at(state).gap
+        first = np.where(touching, state.contact_force[:, 0], np.where(self.interface.pad.free, gap, np.inf))
+        left = bound - sizes(state.contact_force[:, 1:])
+        second = np.where(state.status == STICK, left, sizes(slip))
+        return np.column_stack([first, np.where(touching, second, np.inf)])
+
+
+def directions(status: Ints, slip: Floats) -> Floats:
+    """Unit vectors (P, dim - 1) along the slips of slipping nodes, else 0."""
+    if slip.shape[1] == 1:
+        return np.subtract(status == FORWARD, status == BACKWARD, dtype=float)[:, None]
+    found = slip / np.maximum(sizes(slip), 1e-300)[:, None]
+    return np.where((status >= FORWARD)[:, None], found, 0.0)

@@ -1,0 +1,404 @@
+r"""Exact derivatives of everything that a run reports, by any parameters of its scene.
+
+Direct differentiation through the accepted parts. A part obeys R(w; z, p) = 0 (`evfem.response.parts`), with
+its nodes' statuses fixed; the history h that it leaves to the next one (displacements, slips' origins,
+velocities, viscous strains, branches, charges, drive of the hand) and the row of the history c are functions
+of w, z, p. With :math:`' = d/dp`
+
+.. math:: \frac{\partial R}{\partial w}\,w' = -\Bigl(\frac{\partial R}{\partial p}
+          + \frac{\partial R}{\partial z}\,z'\Bigr), \qquad
+          z' \leftarrow \frac{dh}{dp}, \qquad c' = \frac{dc}{dp} .
+
+**Every partial derivative is a central difference of fourth order of the partial function alone**: of R, of
+what a part leaves behind, of works and rows, by the run's own code, with no equilibrium solved
+(`evfem.response.lines`). By the parameter, states fixed, over models of changed scenes
+:math:`\epsilon = 10^{-3}` of the parameter apart (of Poisson's ratio of its distance to 1/2; of shapes so
+that no node moves by more than 5e-6 mm); along the derivative of the states so far that no gap changes by
+more than 1/1000 of the length over which the attraction does, or passes a kink of it. With a scale L
+of the argument the error is :math:`12 (\epsilon/L)^4`, about 1e-11, by rounding :math:`10^{-16}/\epsilon`,
+about 1e-12 of what is summed up. So every law, form, surface and mesh is differentiated as it is, whether it
+knows complex numbers or not.
+
+w' is found by refinement, :math:`w' \leftarrow w' - K^{-1} R'`, with K of `evfem.response.tangent`,
+until R', the derivative of R along all of z', w' and p, is rounding. So K decides only how fast, and that of
+the part before serves while no status changes. What does not converge is nan, and the reason is told.
+
+The derivative is that of the piece between changes of status. How far the piece reaches is `valid_to`: for
+the margin m of a node (gap, contact force, shear force below the bound, slip) :math:`|m / m'|`, the least of
+all nodes and parts of the step. The widths of contact, counts and times have none.
+
+Sources: P. Michaleris, D. A. Tortorelli, C. A. Vidal, Int. J. Numer. Methods Eng. 37 (1994) 2471-2499,
+doi:10.1002/nme.1620371408.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from evfem.common import notices
+from evfem.common.arrays import Floats
+from evfem.common.pools import blas_limits
+from evfem.common.tables import frame
+from evfem.contact.signorini import OPEN
+from evfem.electrostatics.laws import traction_derivative
+from evfem.errors import InputError, unknown
+from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
+from evfem.newton.control import FollowFriction, Target, Unsupported
+from evfem.newton.state import State
+from evfem.planning.plan import scene_mesh
+from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
+from evfem.response.parameters import Parameter, parameter_of
+from evfem.response.parts import Equations
+from evfem.response.tangent import Tangent
+from evfem.scene.scene import Scene
+from evfem.simulation.history import COLUMNS, SPATIAL
+from evfem.simulation.ledger import Ledger
+from evfem.simulation.result import Result
+from evfem.simulation.run import Request, Run
+from evfem.simulation.works import Books
+
+#: why columns have no derivative
+COUNTED = "it counts, or is measured by, whole nodes, steps or seconds"
+SNAPPED = "the finger snapped or was released in step {}: no derivative goes through that"
+SOUGHT = "a voltage that is an unknown of the step is not differentiated (step {})"
+LIFTED = "a finger without a load that is touched is not differentiated (step {})"
+
+
+class _Followed(Ledger):
+    """Books that tell of every part: `told(old, new, books before)`, unless it snapped."""
+
+    told: Callable[[State, State, tuple[dict[str, float], Books | None]], None]
+    snapped = False
+
+    def accept(self, old: State, new: State) -> bool:
+        before = self.mark()
+        if (found := super().accept(old, new)) and before[1] is not None:
+            self.snapped = True  # in a first part, whose loads are raised in full, it is none of stability
+        self.told(old, new, before)
+        return found
+
+
+class _Differentiated:
+    """A run that is followed, its parameters' lines, and the factorised matrix of the last part."""
+
+    def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
+        self.run = Run(scene, None)
+        self.ledger = self.run.ledger = _Followed(self.run.model)
+        self.ledger.told = self._accepted
+        self.centre = Beside.of(scene, None, 0.0)
+        self.lines = [Line.of(scene, one, self.centre, self._lengths, works) for one in parameters.values()]
+        for line in self.lines:
+            self._check(line)
+        self._calls: list[tuple[float, float]] = []
+        self._taken = 0
+        self._known: tuple[bytes, Callable[[Floats], Floats]] = (b"", np.zeros_like)
+        self._factor: Pardiso | SuperLU | None = None
+        self.stopped = ""
+
+    def _check(self, line: Line) -> None:
+        """Refuse a parameter that changes which unknowns or laws there are."""
+        model = self.run.model
+        for each in (one.run.model for one in line.beside):
+            same = np.array_equal(each.mesh.cells, model.mesh.cells)
+            same = same and (each.closing.core is None) == (model.closing.core is None)
+            if not (same and each.body.size == model.body.size):
+                given = (
+                    "a small change of it changes the cells of the mesh, or whether the attraction has a core"
+                )
+                raise InputError(f"parameters.{line.name}", given, "a parameter that leaves both as they are")
+
+    def _lengths(self, state: State) -> Floats:
+        """How far (mm) gaps of the pad nodes (P,) may change for differences: inf where they are closed."""
+        model = self.run.model
+        gap, attraction = model.equilibrium.interface.surface_at(state).gap, model.attraction
+        found, core = NEAR * np.abs(gap), model.closing.core
+        if attraction is not None and state.voltage != 0.0:
+            apart = np.maximum(gap, 0.0)
+            pull = np.asarray(attraction.law.traction(apart, state.voltage, attraction.layers))
+            rate = np.asarray(traction_derivative(attraction.law, apart, state.voltage, attraction.layers))
+            found = np.minimum(found, 2.0 * SMOOTH * np.abs(pull) / np.maximum(np.abs(rate), 1e-300))
+            if core is not None:
+                found = np.minimum(
+                    found, NEAR * np.abs(gap - core.law.line(state.voltage, attraction.layers).end)
+                )
+        return np.where(state.status == OPEN, found, np.inf)
+
+    def advance(self, request: Request) -> None:
+        """One step of the run and of its derivatives."""
+
+        def path(done: float, fraction: float) -> Target:
+            self._calls, self._taken = [*self._calls[-2:], (done, fraction)], 0
+            return request.path(done, fraction)
+
+        self.centre.request = request
+        for each in (one for line in self._followed for one in line.beside):
+            each.request = next(each.requests)
+        self._request, self._calls = request, []
+        self.run.advance(replace(request, path=path))
+        if not self.stopped and self.run.rows[-1]["relaxations"]:
+            self._stop(SNAPPED)
+        for line in self.lines:
+            if self.stopped or line.reason:
+                line.rows.append({})
+                line.valid_to.append(0.0)
+                continue
+            assert self.ledger.end is not None
+            line.ends(request.step, self.run.state, self.ledger.end, self.ledger.sums, self.run.rows[-1])
+        self.centre.run.time += request.duration
+
+    @property
+    def _followed(self) -> list[Line]:
+        """The parameters whose derivatives go on."""
+        return [] if self.stopped else [line for line in self.lines if not line.reason]
+
+    def _stop(self, reason: str) -> None:
+        self.stopped = reason.format(self._request.step)
+
+    def _span(self) -> tuple[float, float]:
+        """Which part of the step was accepted: the last one tried, or its halves one after the other."""
+        spans = self._calls[-1:] if self.run.stepper.allowed is None else self._calls[-2:]
+        self._taken += 1
+        return spans[self._taken - 1]
+
+    def _accepted(self, old: State, new: State, before: tuple[dict[str, float], Books | None]) -> None:
+        """The run has accepted a part: its derivatives."""
+        if not self._followed:
+            return
+        if self.ledger.snapped or self.run.model.body.drag_rate > 0.0:
+            self._stop(SNAPPED)
+            return
+        span, pins = self._span(), self.run.model.equilibrium.interface.jumps
+        here = Equations(self.run.model, old, self._request.path(*span).begun(old))
+        if reason := _refused(here.target, new):
+            self._stop(reason)
+            return
+        assert self.ledger.end is not None
+        books, sums = (before[1], self.ledger.end), (before[0], self.ledger.sums)
+        part = Accepted(old, new, here.margins(new), span, pins.place.copy(), books, sums)
+        for line in self._followed:
+            self._follow(line, part, here)
+
+    def _follow(self, line: Line, part: Accepted, here: Equations) -> None:
+        """One parameter, with the matrix at hand or, where that is not as good as exact, one of this part."""
+        jumps, fresh = self.run.model.equilibrium.interface.jumps.steps, False
+        if self._known[0] != part.new.status.tobytes():
+            fresh = self._factorise(here, part.new)
+        if not line.follow(part, self._known[1], jumps, patient=fresh) and not fresh:
+            self._factorise(here, part.new)
+            line.follow(part, self._known[1], jumps, patient=True)
+        line.reason = line.reason.format(self._request.step)
+
+    def _factorise(self, here: Equations, new: State) -> bool:
+        """Factorise the matrix of a part; what is singular solves to nan."""
+        model = self.run.model
+        near = np.union1d(model.equilibrium.body.reusable().candidates, np.flatnonzero(new.status != OPEN))
+        kept = np.concatenate([model.body.unknowns[model.pad.nodes[near]].ravel(), model.body.bone])
+        if self._factor is None or not np.array_equal(kept, self._factor.kept):
+            self._factor = make_condensation(model.body.pattern, kept, self.run.scene.solver.threads)
+        try:
+            self._factor.factorise(model.body.tangent(new.u))
+            solve = Tangent(here, new, self._factor, kept).solve
+        except Singular:
+            solve = _unsolved
+        self._known = (new.status.tobytes(), solve)
+        return True
+
+
+def _unsolved(right: Floats) -> Floats:
+    """What a singular matrix gives."""
+    return np.full_like(right, np.nan)
+
+
+def _refused(target: Target, new: State) -> str:
+    """Why a part is not differentiated, or nothing."""
+    if target.voltage.follows or target.voltage.free or isinstance(target.voltage, FollowFriction):
+        return SOUGHT
+    return LIFTED if isinstance(target.height, Unsupported) and bool((new.status != OPEN).any()) else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Derivatives of a run: `found[column, parameter]` (steps,), in the units of both.
+
+    `result` is the run; `valid_to[parameter]` (steps,) how far the parameter may change until a node's
+    status does in this step; `parameters` their values; `reasons` why something is nan, by column or
+    parameter.
+    """
+
+    result: Result
+    parameters: Mapping[str, float]
+    columns: tuple[str, ...]
+    values: Mapping[tuple[str, str], Floats]
+    valid_to: Mapping[str, Floats]
+    reasons: Mapping[str, str]
+
+    def __getitem__(self, which: tuple[str, str]) -> Floats:
+        """The derivative (steps,) of a column by a parameter."""
+        column, parameter = which
+        if parameter not in self.parameters:
+            raise unknown("parameter", str(parameter), tuple(self.parameters))
+        if column not in self.columns:
+            raise unknown("column", str(column), self.columns)
+        return self.values[column, parameter]
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """The warnings of the run."""
+        return self.result.warnings
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """d ln column / d ln parameter (steps,) by column and parameter; nan where the column is 0."""
+        return Elasticity(self)
+
+    def moved(self, changes: Mapping[str, float]) -> Result:
+        """The run as its derivatives say it is with parameters changed by so much; columns without stay."""
+        columns: dict[str, Any] = {}
+        for name in (one for one in self.columns if differentiable(one)):
+            more = sum((change * self[name, key] for key, change in changes.items()), np.zeros(1))
+            columns[name] = np.asarray(self.result[name]) + more
+        own: dict[str, Any] = {name: value for name, value in columns.items() if name in COLUMNS}
+        space = {name: columns.get(name, value) for name, value in self.result.in_space.items()}
+        return replace(self.result, **own, in_space=space)
+
+    def gradient(self, function: Callable[[Result], float]) -> dict[str, float]:
+        """Derivatives by every parameter of a number that a smooth `function` makes of a run.
+
+        ``found.gradient(lambda run: run.tangential_force.mean())``
+        """
+        found = {}
+        for key, value in self.parameters.items():
+            way = STEP * (abs(value) or 1.0) / 10.0
+            more, less = (float(function(self.moved({key: sign * way}))) for sign in (1.0, -1.0))
+            found[key] = (more - less) / (2.0 * way)
+        return found
+
+    def table(self) -> Any:
+        """A row for each step, a column `COLUMN by PARAMETER` for each pair: a `pandas.DataFrame`, without
+        pandas a record array.
+        """
+        pairs = {
+            f"{column} by {key}": self[column, key] for key in self.parameters for column in self.columns
+        }
+        return frame({"step": np.asarray(self.result.step), **pairs})
+
+    def __repr__(self) -> str:
+        """The parameters by the relative change of normal and tangential force at the end."""
+        lines = [f"Sensitivities of {len(self.result.step)} steps, d ln force / d ln parameter at the end:"]
+        for key in self.parameters:
+            shares = [
+                f"{name} {self.elasticity[name, key][-1]:.4g}"
+                for name in ("normal_force", "tangential_force")
+                if name in self.columns
+            ]
+            lines.append(f"  {key}: {', '.join(shares)}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """Relative derivatives of `found`."""
+
+    found: Sensitivities
+
+    def __getitem__(self, which: tuple[str, str]) -> Floats:
+        value = np.asarray(self.found.result[which[0]], dtype=float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = self.found[which] * self.found.parameters[which[1]] / value
+        return np.where(value == 0.0, np.nan, share)
+
+
+def sensitivities(
+    scene: Scene | str | PathLike[str],
+    parameters: Any,
+    columns: Sequence[str] | None = None,
+    progress: bool = False,
+) -> Sensitivities:
+    """Derivatives of the history of a scene by its parameters, exact but for rounding.
+
+    Parameters
+    ----------
+    scene
+        A `Scene`, or the path of a scene file. Its `tolerance` limits the digits: forces that are known to
+        1e-8 have derivatives known to about as much.
+    parameters
+        A dotted key of the scene, a `ShapeChange`, or several of them.
+    columns
+        Columns of the history; None: all. Columns that count nodes, steps or seconds are nan.
+    progress
+        Show a progress bar.
+
+    Returns
+    -------
+    Sensitivities
+        One value a step for each column and parameter, with the run itself.
+
+    Raises
+    ------
+    InputError
+        A parameter that the scene does not have, that is 0, or that changes the mesh's cells.
+    NotConverged
+        A step has no solution.
+
+    Examples
+    --------
+    >>> from evfem import Display, FingerPad, Hover, Kaczmarek
+    >>> pad = FingerPad(ridges=False, resolution="coarse")
+    >>> scene = Scene(pad, Display(), Kaczmarek(), 100.0, Hover(gap=0.3, steps=1))
+    >>> found = sensitivities(scene, ["electrostatics.voltage"], ["electrostatic_force"])
+    >>> round(float(found.elasticity["electrostatic_force", "electrostatics.voltage"][0]), 5)
+    2.00005
+    """
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
+    given = (
+        [parameters] if isinstance(parameters, str) or hasattr(parameters, "applied") else list(parameters)
+    )
+    known = {one.name: one for one in (parameter_of(scene, each) for each in given)}
+    with blas_limits(), notices.shown(progress):
+        wanted = _columns(scene_mesh(scene)[0].dim, columns)
+        run = _Differentiated(scene, known, any(map(is_work, wanted)))
+        bar = notices.bar(scene.total_steps, "step", 0, progress)
+        try:
+            for request in run.run.requests():
+                run.advance(request)
+                bar.update(1)
+        finally:
+            bar.close()
+    return _gathered(run, known, wanted)
+
+
+def _columns(dim: int, columns: Sequence[str] | None) -> tuple[str, ...]:
+    """The columns asked for."""
+    names = COLUMNS if dim == 2 else (*COLUMNS, *SPATIAL)
+    numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
+    for name in columns or ():
+        if name not in numbers:
+            raise unknown("columns", str(name), numbers)
+    return numbers if columns is None else tuple(columns)
+
+
+def _gathered(
+    run: _Differentiated, known: Mapping[str, Parameter], columns: tuple[str, ...]
+) -> Sensitivities:
+    """What was found."""
+    reasons = {name: COUNTED for name in columns if not differentiable(name)}
+    for line in run.lines:
+        if reason := line.reason or run.stopped:
+            reasons[line.name] = reason
+    values = {
+        (name, line.name): np.array([row.get(name, np.nan) for row in line.rows])
+        for line in run.lines
+        for name in columns
+    }
+    valid_to = {line.name: np.array(line.valid_to) for line in run.lines}
+    return Sensitivities(
+        run.run.result(), {key: one.value for key, one in known.items()}, columns, values, valid_to, reasons
+    )
