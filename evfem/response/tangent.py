@@ -172,7 +172,7 @@ class Tangent:
         return found
 
     def _bound_slopes(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Derivatives of the bound of friction by contact force (P,), place (P, d) and size of the slip (P,)."""
+        """Derivatives of the bound of friction by contact force, place (P, d) and size of the slip."""
         state, interface, bound = self.state, self.equations.interface, self.equations.bound
         place, force = interface.places(state), state.contact_force
         normal, length = SHARE * np.maximum(force[:, 0], 1e-12), SHARE * interface.length

@@ -17,7 +17,6 @@ from typing import Annotated, Any, ClassVar
 from evfem.common import notices
 from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.common.pools import blas_limits, loaded_blas
-from evfem.electrostatics.signals import FollowForce
 from evfem.errors import ABSENT, InputError, StopRun
 from evfem.newton.control import Target
 from evfem.planning.core import Closing
