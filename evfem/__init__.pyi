@@ -86,6 +86,10 @@ from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate
 from evfem.simulation.spectrum import spectrum as spectrum
 from evfem.surface import surfaces as surfaces
+from evfem.surface.adhesion import Capillary as Capillary
+from evfem.surface.adhesion import Dugdale as Dugdale
+from evfem.surface.elastic import ElasticLayer as ElasticLayer
+from evfem.surface.elastic import ElasticStack as ElasticStack
 from evfem.surface.friction import AdhesiveFriction as AdhesiveFriction
 from evfem.surface.friction import AgeingFriction as AgeingFriction
 from evfem.surface.friction import Coulomb as Coulomb

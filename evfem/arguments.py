@@ -27,6 +27,13 @@ FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}
 FOLDERS = {"bash": "_shtab_compgen_dirs", "zsh": "_files -/", "tcsh": "d"}
 
 
+class Known(tuple[str, ...]):
+    """Names that a shell completes; another one is not refused here, but by whoever looks it up."""
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser that reports a mistake in one sentence."""
 
@@ -64,6 +71,7 @@ def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
         ("init", "write a commented scene to begin with", _init_options),
         ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument),
         ("check", "run a scene by several ways and compare where they end", _scene_argument),
+        ("sensitivities", "derivatives of forces, works and energies by keys of a scene", _response_options),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
         ("sweep", "run many scenes side by side and write one table of all", _sweep_options),
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
@@ -90,8 +98,18 @@ def _run_options(run: argparse.ArgumentParser) -> None:
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
 
 
+def _response_options(command: argparse.ArgumentParser) -> None:
+    _path(command, "scene", "SCENE.toml", help="the scene")
+    said = "dotted keys of the scene, as surface.friction"
+    command.add_argument("--by", nargs="+", metavar="KEY", required=True, help=said)
+    _results(command)
+
+
 def _study_options(study: argparse.ArgumentParser) -> None:
-    study.add_argument("names", nargs="+", metavar="NAME", help=_study_names())
+    names, told = _study_names(), "name of a study"
+    if names:
+        told = f"{', '.join(names[:-1])}, or all (all but {' and '.join(studies().APART)})"
+    study.add_argument("names", nargs="+", metavar="NAME", choices=names or None, help=told)
     _path(study, "--out", "DIR", FOLDERS, default=Path(), help="folder; default: here")
     study.add_argument("--quick", action="store_true", help="coarser and shorter")
     drawn = study.add_argument_group("campaign alone", "scenes drawn at random")
@@ -124,12 +142,12 @@ def _again(command: argparse.ArgumentParser, resume: str, overwrite: str) -> Non
     either.add_argument("--overwrite", action="store_true", help=overwrite)
 
 
-def _study_names() -> str:
-    """Help on the names of studies; a checkout that is not installed has none."""
+def _study_names() -> Known:
+    """Names of studies, and all; a checkout that is not installed has none."""
     try:
-        return f"{', '.join(studies().NAMES)}, or all (all but {' and '.join(studies().APART)})"
+        return Known((*studies().NAMES, "all"))
     except InputError:
-        return "name of a study, or all"
+        return Known()
 
 
 def _sweep_options(sweep: argparse.ArgumentParser) -> None:
@@ -166,7 +184,10 @@ def _texture_options(texture: argparse.ArgumentParser) -> None:
 
 
 def _texture_argument(command: argparse.ArgumentParser) -> None:
-    _path(command, "name", "NAME", type=str, help="a reference texture, a .json or a folder")
+    from evfem.textures.library import names
+
+    said = "a reference texture, a .json or a folder"
+    _path(command, "name", "NAME", type=str, choices=Known(names()), help=said)
 
 
 def _about_texture(command: argparse.ArgumentParser) -> None:

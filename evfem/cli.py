@@ -154,6 +154,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
         "init": _init,
         "plan": _plan,
         "check": _check,
+        "sensitivities": _sensitivities,
         "study": _study,
         "sweep": _sweep,
         "mesh": _mesh,
@@ -304,6 +305,19 @@ def _check(given: argparse.Namespace) -> int:
     found = check(_scene(given.scene))
     print(found, flush=True)
     return DONE if found.agrees else DIFFERENT
+
+
+def _sensitivities(given: argparse.Namespace) -> int:
+    from evfem.response.sensitivities import sensitivities
+    from evfem.runfolder import write_sensitivities
+
+    scene = _scene(given.scene)
+    folder = given.out or Path(f"{scene.name}-out")
+    found = sensitivities(scene, given.by, progress=True)
+    for key in (key for key in found.parameters if key in found.reasons):
+        notices.tell(f"{key}: {found.reasons[key]}")
+    print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
+    return DONE
 
 
 def _study(given: argparse.Namespace) -> int:

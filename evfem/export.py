@@ -21,7 +21,7 @@ from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
-from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS, Frame, Result, Row
+from evfem.simulation.result import CELL_FIELDS, LATER_FIELDS, POINT_FIELDS, Frame, Result, Row
 
 #: what the files of a run may take (bytes) where the scene does not say how they are to be written
 MOST = 25_000_000
@@ -174,7 +174,8 @@ def frame_in(path: str | Path, row: Row, mesh: Mesh) -> Frame:
     parts = meshfile.parts(Path(path))
     if len(parts.points) != len(mesh.points) or [block.type for block in parts.cells] != [mesh.kind]:
         raise ValueError(f"{path} on another mesh")
-    nodal = {name: np.asarray(parts.point_data[name]) for name in ("displacement", *POINT_FIELDS)}
+    data = {name: np.zeros(len(mesh.points)) for name in LATER_FIELDS} | parts.point_data
+    nodal = {name: np.asarray(data[name]) for name in ("displacement", *POINT_FIELDS)}
     of_cells = {name: np.asarray(parts.cell_data[name][0], dtype=float) for name in CELL_FIELDS}
     values = {name: value.astype(int if name == "contact_status" else float) for name, value in nodal.items()}
     values["displacement"] = np.ascontiguousarray(values["displacement"][:, : mesh.dim])

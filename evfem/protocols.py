@@ -9,8 +9,10 @@ part                   goes to                                   needs
 =====================  ========================================  =======================================
 electrostatic law      ``Scene(law=...)``                        `ForceLaw`
 rough faces            ``Scene(roughness_gap=...)``              `RoughnessLaw`
+adhesion               ``Scene(adhesion=...)``                   `AdhesionLaw`
 material               ``FingerPad(materials={region: ...})``    `StressLaw`, `EnergyLaw` or a `WeakForm`
 surface                ``Scene(surface=...)``                    `Surface`
+elastic surface        ``Flat(elastic=...)``, any surface        `Elastic`
 friction               ``Scene(friction_law=...)``               `FrictionLaw`
 voltage over time      ``Scene(voltage=...)``                    `TimeSignal`
 weak form              ``Scene.with_term(form(...), on=...)``    `WeakForm`
@@ -38,6 +40,17 @@ class ForceLaw(Protocol):
         `layers.reduced` is the sum of thickness / permittivity of the solid layers,
         `layers.thickness` that of their thicknesses, in mm. Complex-safe, or it is differenced.
         """
+
+
+@runtime_checkable
+class AdhesionLaw(Protocol):
+    """Adhesion without a voltage. Optional: `traction_derivative` (MPa/mm) of the same argument."""
+
+    def traction(self, gap: Any) -> Any:
+        """Attraction in MPa, never negative or growing, at gaps in mm. Complex-safe, or differenced."""
+
+    def potential(self, gap: Any) -> Any:
+        """Potential in N/mm, whose derivative by the gap is the traction, 0 far away."""
 
 
 @runtime_checkable
@@ -90,13 +103,29 @@ class Surface(Protocol):
 
     Optional attributes: `friction`, a number or a table [[x, coefficient], ...] (without it 0);
     `y`, the height (mm) at which the profile lies (without it or None: first touch); `insulator`,
-    a `Layer`; `angle` (degrees), the direction of x on the display below a finger in three dimensions.
-    Optional methods of x: `slope` and `curvature`, which are derived otherwise;
+    a `Layer`; `elastic`, an `Elastic`; `angle` (degrees), the direction of x on the display below a finger
+    in three dimensions. Optional methods of x: `slope` and `curvature`, which are derived otherwise;
     `friction_coefficient`, instead of `friction`.
     """
 
     def height(self, x: Any) -> Any:
         """Height (mm) of the profile at x (mm, any shape)."""
+
+
+@runtime_checkable
+class Elastic(Protocol):
+    """How a surface gives way under forces on strips of it, linear and quasi-static.
+
+    Optional: `compliance_slope(x, lengths)` (2n, 2n), its derivative by the place of the displaced strip;
+    otherwise it is differenced.
+    """
+
+    def compliance(self, x: Any, lengths: Any) -> Any:
+        """Mean displacements of n strips by forces on them, (2n, 2n) in mm per N/mm, symmetric and positive.
+
+        `x` and `lengths` (n,) are their middles and lengths in mm; first the n displacements into the
+        surface, then the n along +x; columns in the same order, forces on the surface into it and along +x.
+        """
 
 
 @runtime_checkable
@@ -112,6 +141,10 @@ class CompleteSurface(Surface, Protocol):
     @property
     def insulator(self) -> Any:
         """Layer over the electrode, or None."""
+
+    @property
+    def elastic(self) -> Any:
+        """How the surface gives way, or None."""
 
     @property
     def is_flat(self) -> bool:

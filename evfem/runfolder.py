@@ -17,6 +17,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from evfem.common.arrays import Floats
 from evfem.common.manifest import Manifest
 from evfem.common.notices import LOG
@@ -24,6 +26,7 @@ from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
+from evfem.response.sensitivities import Sensitivities
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import ANOTHER, Checkpoint
 from evfem.simulation.checkpoint import PROBES as AT_PROBES
@@ -387,12 +390,27 @@ def _present(path: Path) -> list[str]:
         return sorted(p.name for p in path.iterdir() if OURS.fullmatch(p.name)) if path.exists() else []
 
 
-def _picture(result: Result, path: Path) -> None:
-    from matplotlib.figure import Figure
+def write_sensitivities(found: Sensitivities, folder: Path) -> Path:
+    """Write `sensitivities.csv` and a picture of the last step into a folder; returns the table's path."""
+    from evfem.plotting.response import tornado
 
+    with disk(f"write to {folder}"):
+        folder.mkdir(parents=True, exist_ok=True)
+    found.to_csv(table := folder / "sensitivities.csv")
+    for column in ("tangential_force", "normal_force", "electrostatic_force"):
+        if np.isfinite(list(found.effects(column)[0].values())).any():
+            _save(tornado(found, column).figure, folder / "sensitivities.png")
+            break
+    return table
+
+
+def _picture(result: Result, path: Path) -> None:
     from evfem.plotting.curves import forces
 
+    _save(forces(result).figure, path)
+
+
+def _save(figure: Any, path: Path) -> None:
+    """Write a figure whole or not at all."""
     with replacing(path) as temporary:
-        figure = forces(result).figure
-        assert isinstance(figure, Figure)
         figure.savefig(temporary, format="png", dpi=150)

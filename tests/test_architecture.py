@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray"},
-        "arrays constants notices checks views pools digest storage manifest tables pictures",
+        "arrays quadrature constants notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -44,10 +44,14 @@ ROOMS = {
         {"numpy", "scipy", "skfem"},
         "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "ways friction surfaces relief textures usersurface pad skin"),
+    "surface": (
+        {"numpy", "scipy"},
+        "ways friction adhesion elastic surfaces relief textures usersurface pad skin",
+    ),
     "contact": (
         {"numpy", "scipy"},
-        "charging attraction fullfield drivenfield signorini slipping solve follower condensed stability",
+        "charging attraction adhesive bed fullfield drivenfield signorini slipping solve follower condensed "
+        "stability",
     ),
     "newton": (
         {"numpy", "scipy", "pypardiso"},
@@ -61,7 +65,8 @@ ROOMS = {
     ),
     "planning": (
         {"numpy"},
-        "resolution loaddrift partchecks parts plausibility fieldchoice core timescales pathdependence plan",
+        "resolution loaddrift partchecks parts plausibility fieldchoice core adhesion timescales "
+        "pathdependence plan",
     ),
     "simulation": (
         {"numpy", "scipy"},
@@ -83,7 +88,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "labels figures fields finger footprint curves sweeps meshes movie",
+        "labels figures fields finger footprint curves sweeps meshes movie response",
     ),
     "studio": ({"numpy"}, "state page runs server"),
 }

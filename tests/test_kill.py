@@ -15,6 +15,7 @@ import pytest
 from tools import kills
 from tools.commands import called, run_process
 
+import evfem
 from evfem import runfolder
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.scene.file import load
@@ -138,6 +139,7 @@ def flipped(path, at):
     path.write_bytes(bytes(data))
 
 
+NOT_OURS = f"written by evfem '0.0.1', not by '{evfem.__version__}'"
 DAMAGES = {
     "empty": (lambda p: p.write_bytes(b""), "cut off"),
     "cut off": (lambda p: p.write_bytes(p.read_bytes()[:-200]), "cut off"),
@@ -147,7 +149,14 @@ DAMAGES = {
     "flipped at 0.8": (lambda p: flipped(p, 0.8), "checkpoint"),
     "no archive": (lambda p: p.write_text("mine"), "another kind"),
     "another format": (lambda p: save_arrays(p, {"format": np.array("evfem-result-1")}), "another format"),
-    "another version": (lambda p: replaced(p, version=np.array("0.0.1")), "written by evfem '0.0.1'"),
+    "another format of another version": (
+        lambda p: save_arrays(p, {"format": np.array("evfem-checkpoint-1"), "version": np.array("0.0.1")}),
+        f"another format, {NOT_OURS}",
+    ),
+    "another version": (
+        lambda p: replaced(p, version=np.array("0.0.1")),
+        NOT_OURS,
+    ),
     "another scene": (lambda p: replaced(p, scene=np.array("0" * 64)), "another scene"),
     "no state": (lambda p: replaced(p, state__u=np.zeros(0)), "no usable u"),
     "text": (lambda p: replaced(p, state__time=np.array("now")), "no usable time"),

@@ -22,7 +22,7 @@ SETS = """*NODE
 2, 4, 0
 3, 4, 4
 4, 0, 4
-*ELEMENT, TYPE=S4, ELSET=tissue
+*ELEMENT, TYPE=CPE4H, ELSET=tissue
 1, 1, 2, 3, 4
 *NSET, NSET=pad
 1, 2

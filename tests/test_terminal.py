@@ -17,7 +17,7 @@ from tools.fakes import SQUARE_SCENE
 from tools.meshes import square_mesh
 
 import evfem as ev
-from evfem import cli
+from evfem import cli, studies
 from evfem.common import notices
 from evfem.mesh import file as meshfile
 
@@ -181,7 +181,7 @@ def test_notices_are_shown_once_and_the_logger_is_left_as_it_was(capsys):
     assert (notices.LOG.level, notices.LOG.handlers) == before
 
 
-def test_shells_can_complete():
+def test_shells_can_complete(capsys):
     """What shtab reads: every path has its kind of completion, and the commands are there."""
     commands = cli.parser()._subparsers._group_actions[0].choices
     for name, command in commands.items():
@@ -190,3 +190,13 @@ def test_shells_can_complete():
                 assert action.complete == cli.FILES, (name, action.metavar)
             if action.metavar == "DIR":
                 assert action.complete == cli.FOLDERS, (name, action.metavar)
+    assert set(_action(commands["study"], "NAME").choices) == {*studies.NAMES, "all"}
+    show = commands["texture"]._subparsers._group_actions[0].choices["show"]
+    assert "wave-2mm" in set(_action(show, "NAME").choices)
+    assert cli.main(["texture", "show", "wafe-2mm"]) == 2  # what is no name is refused with a sentence
+    assert 'texture: given "wafe-2mm"; allowed: wave-2mm?' in capsys.readouterr().err
+
+
+def _action(command, metavar):
+    (found,) = (action for action in command._actions if action.metavar == metavar)
+    return found

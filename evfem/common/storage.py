@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+import evfem
 from evfem.common.notices import LOG
 from evfem.errors import InputError, StorageError
 
@@ -183,7 +184,9 @@ def load_arrays(path: str | Path, key: str, form: str) -> dict[str, np.ndarray]:
             raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
         raise InputError(key, f"{path}, cut off or of another kind", allowed) from error
     if "format" not in arrays or arrays["format"].ndim or str(arrays["format"]) != form:
-        raise InputError(key, f"{path}, of another format", allowed)
+        by = f", written by evfem {str(arrays['version'])[:40]!r}" if "version" in arrays else ""
+        told = f"{by}, not by {evfem.__version__!r}" if by else ""
+        raise InputError(key, f"{path}, of another format{told}", allowed)
     return arrays
 
 

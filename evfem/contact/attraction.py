@@ -30,7 +30,7 @@ import scipy.sparse as sparse
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charged, Charging
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
-from evfem.electrostatics.roughness import Cored, separation_derivative
+from evfem.electrostatics.roughness import separation_derivative
 from evfem.surface.pad import Pad, surface_state
 from evfem.surface.skin import Skin
 from evfem.tensor import derivative, mul, positive_part
@@ -66,6 +66,16 @@ class Attraction:
     air_layer: bool = True
     roughness: Any = None
     charging: Charging | None = None
+
+    @property
+    def electric(self) -> Attraction | None:
+        """That part of it which is a voltage's: all."""
+        return self
+
+    @property
+    def adhesive(self) -> Attraction | None:
+        """That part of it which is adhesion: none."""
+        return None
 
     def acts(self, voltage: float) -> bool:
         """Whether anything attracts at this voltage: charges may without it."""
@@ -143,7 +153,7 @@ class Attraction:
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
         """Parts of closed nodes' attraction (P,) in MPa that a core takes away, and leaves; or None."""
-        if not isinstance(self.law, Cored) or voltage == 0.0:
+        if not hasattr(self.law, "withheld") or voltage == 0.0:
             return None
         found = np.broadcast_arrays(*self.law.withheld(voltage, self.layers), np.zeros(self.pad.nodes.size))
         return found[0], found[1]

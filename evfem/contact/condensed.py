@@ -126,7 +126,9 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class StepSolution:
-    """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns."""
+    """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns; by how
+    much more an elastic surface has `given` way (dim c,), None of a rigid one.
+    """
 
     moved: Floats
     force: Floats
@@ -134,6 +136,17 @@ class StepSolution:
     extra: Floats
     solves: int
     reduced: bool
+    given: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CandidatesBed:
+    """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
+    what it lacks without contact forces of what the present attraction asks for, `pulled` (2 c,) in mm.
+    """
+
+    compliance: Floats
+    pulled: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,15 +228,23 @@ class LinearContactStep:
     residual: Floats
     bone: Floats
     unknowns: tuple[ExtraUnknown, ...] = ()
+    bed: CandidatesBed | None = None
+
+    @cached_property
+    def seen(self) -> Floats:
+        """Compliance of the candidates' places relative to the surface."""
+        return self.body.compliance if self.bed is None else self.body.compliance + self.bed.compliance
 
     def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
-        free = self._free_motion()
+        free = alone = self._free_motion()
+        if self.bed is not None:
+            free = free + np.pad(self.bed.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
-        gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
+        gap = normal_gap + self._along_normal(free[:, 0] + self.seen @ self._present)
         status, solves = self.candidates.status.copy(), 0
-        own = np.diagonal(self.body.compliance)[1 :: self.body.dim]
+        own = np.diagonal(self.seen)[1 :: self.body.dim]
         # in contact, in the surface, or attracted with a feedback on the node itself
         near = np.flatnonzero(
             (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
@@ -231,10 +252,11 @@ class LinearContactStep:
         if not near.size:  # the dense problem has at least one node: the one with the smallest gap
             near = np.array([np.argmin(gap)])
         while True:  # solve on the near nodes, join those that sink in, until none does
-            found, pushed = self._solve_near(near, free, status[near])
+            found, pushed = self._solve_near(near, free, alone, status[near])
             solves += found.solves
             status[near] = found.status
-            moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
+            whole = self._whole(near, pushed)
+            moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
             gap = normal_gap + self._along_normal(moved)
             gap[near] = 0.0  # the dense problem has settled theirs
             penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
@@ -247,7 +269,18 @@ class LinearContactStep:
         way = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), way)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
-        return StepSolution(moved, force, status, found.extra, solves, found.reduced)
+        given = None
+        if self.bed is not None:
+            given = self.bed.pulled + self.bed.compliance @ whole
+            moved = moved - given
+        return StepSolution(moved, force, status, found.extra, solves, found.reduced, given)
+
+    def among(self, near: Ints) -> Floats:
+        """`seen` among these candidates, in the order of `CondensedTangent.rows`."""
+        if self.bed is None:
+            return self.body.among(near)
+        rows = self.body.rows(near)
+        return self.body.among(near) + self.bed.compliance[np.ix_(rows, rows)]
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
         """Force (N/mm) that the bone lacks along the first unknown's axis, were its `travel` given."""
@@ -263,7 +296,7 @@ class LinearContactStep:
     @cached_property
     def _own(self) -> Floats:
         """Each candidate's own compliance along x[, z], (c, d)."""
-        return np.diagonal(self.body.compliance).reshape(-1, self.body.dim)[:, ::2]
+        return np.diagonal(self.seen).reshape(-1, self.body.dim)[:, ::2]
 
     def _along_normal(self, moved: Floats) -> Floats:
         normal, dim = self.candidates.surface.axes[:, 0], self.body.dim
@@ -283,14 +316,17 @@ class LinearContactStep:
         force = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.surface.axes)
         return force[:, COMPONENTS[: self.body.dim]].ravel()
 
-    def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
-        """Candidates' motion (dim c,) by forces on the near ones, in the order of `CondensedTangent.rows`."""
+    def _whole(self, near: Ints, pushed: Floats) -> Floats:
+        """Forces on all candidates (dim c,), of those on the near ones in `CondensedTangent.rows`."""
         force = np.zeros(self.body.dim * self.candidates.status.size)
         force[self.body.rows(near)] = pushed
-        return self.body.compliance @ force
+        return force
 
-    def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
-        """Contact among the `near` nodes: solution in their frames, and the forces (dim k,) that move the
+    def _solve_near(
+        self, near: Ints, free: Floats, alone: Floats, status: Ints
+    ) -> tuple[ContactSolution, Floats]:
+        """Contact among the `near` nodes, by how they move `free` of contact forces, and the body `alone`:
+        solution in their frames, and the forces (dim k,) that move the
         body, those of the follower stiffness included.
 
         What moves beyond the present forces `held` is small near the equilibrium: a steep stiffness, of
@@ -298,11 +334,11 @@ class LinearContactStep:
         """
         known, rows, dim = self.candidates, self.body.rows(near), self.body.dim
         follower = FollowerStiffness.of(known.follower_rate(self._own)[near])
-        among, own, held = self.body.among(near), free[rows], self._present[rows]
+        among, own, held = self.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
         W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
-        problem = self._problem(near, (C, W), self._bone_balance(rows, free, (C, W), follower))
+        problem = self._problem(near, (C, W), self._bone_balance(rows, alone, (C, W), follower))
         attraction = AttractionStiffness(
             known.negative_stiffness[near],
             known.surface.normal_gap[near],

@@ -93,7 +93,7 @@ def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
 
 def _compliance(step: LinearContactStep) -> Floats:
     """Compliance of the candidates (2 c, 2 c) below a bone that stands still, in their frames."""
-    axes, C = step.candidates.surface.axes, step.body.among(np.arange(step.candidates.status.size))
+    axes, C = step.candidates.surface.axes, step.among(np.arange(step.candidates.status.size))
     return local(axes, local(axes, C).T).T + np.diag(_yielding(step.candidates).ravel())
 
 

@@ -8,7 +8,7 @@ of the voltage (`evfem.newton.control.ConstrainedVoltage`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -255,6 +255,11 @@ class PadState:
     def forces(self, voltage: float) -> Floats:
         """Attraction (P, dim) of the pad nodes under a voltage (V)."""
         return np.asarray(self.attraction.forces(self.position, voltage, self.touching, self.pressing))
+
+    @property
+    def unit(self) -> Floats:
+        """Attraction (P, dim) of a kV."""
+        return replace(self, attraction=self.attraction.electric).forces(KILOVOLT)
 
     @property
     def slope(self) -> Floats:

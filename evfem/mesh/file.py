@@ -39,6 +39,12 @@ PIXELS: Mapping[str, tuple[str, list[int]]] = {
     "pixel": ("quad", [0, 1, 3, 2]),
     "voxel": ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6]),
 }
+#: elements of Abaqus for plane strain, which meshio does not know
+PLANE_STRAIN = {
+    f"CPE{nodes}{kind}": cell
+    for nodes, cell in ((3, "triangle"), (4, "quad"), (6, "triangle6"), (8, "quad8"))
+    for kind in ("", "H", "I", "IH", "M", "MH", "R", "RH")
+}
 #: kinds that are refused for what they lack
 _TETRAHEDRA = "Gmsh makes hexahedra of tetrahedra and wedges: docs/howto/mesh.md, From tetrahedra"
 LACKING: Mapping[str, str] = {
@@ -118,6 +124,7 @@ def parts(path: Path) -> meshio.Mesh:
     meshio._vtk_common.vtk_to_meshio_type[11] = "voxel"  # which it does not know, and pixels by name alone
     meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)
     meshio._mesh.topological_dimension.update(pixel=2, voxel=3)
+    meshio.abaqus._abaqus.abaqus_to_meshio_type.update(PLANE_STRAIN)
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             warnings.simplefilter("ignore")

@@ -16,12 +16,16 @@ so a combination obeys them as long as no status has changed. Source: D. G. Ande
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
 from evfem.newton.state import State
+
+#: what of a state is combined, beside the squared voltage
+MIXED = ("u", "contact_force", "bone", "pressure", "given", "strain")
 
 
 class Anderson:
@@ -67,16 +71,16 @@ class Anderson:
 
 def _vector(state: State) -> Floats:
     squared = np.copysign((state.voltage / KILOVOLT) ** 2, state.voltage)
-    parts = (state.u, state.contact_force, state.bone, state.pressure)
+    parts = (getattr(state, name) for name in MIXED)
     return np.concatenate([*(part.ravel() for part in parts), [squared]])
 
 
 def _state(state: State, vector: Floats) -> State:
-    parts, end = [], 0
-    for part in (state.u, state.contact_force, state.bone, state.pressure):
+    parts: list[Any] = []
+    end = 0
+    for part in (getattr(state, name) for name in MIXED):
         begin, end = end, end + part.size
         parts.append(vector[begin:end].reshape(part.shape))
-    u, force, bone, pressure = parts
     squared = max(np.copysign(1.0, state.voltage) * vector[-1], 0.0)
     voltage = float(np.copysign(KILOVOLT * np.sqrt(squared), state.voltage))
-    return replace(state, u=u, contact_force=force, bone=bone, pressure=pressure, voltage=voltage)
+    return replace(state, **dict(zip(MIXED, parts, strict=True)), voltage=voltage)

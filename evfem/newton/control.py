@@ -269,7 +269,7 @@ class GivenGap(ConstrainedVoltage):
         return smallest_gap(pad), self.gap
 
     def unit(self, pad: PadState) -> Floats:
-        return pad.forces(KILOVOLT)
+        return pad.unit
 
     def lacking(self, pad: PadState) -> float:
         return abs(smallest_gap(pad).value / self.gap - 1.0)

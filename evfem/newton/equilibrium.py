@@ -32,8 +32,9 @@ from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
-from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, State, StepFailed
+from evfem.newton.state import NO_AGE, NO_BED, NO_CHARGES, Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
+from evfem.surface.adhesion import ON
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
@@ -69,6 +70,8 @@ class Equilibrium:
             age=NO_AGE if self.interface.law is None else np.zeros(nodes),
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
+            given=NO_BED if self.interface.bed is None else zero,
+            strain=NO_BED if self.interface.bed is None else zero,
             rates=np.zeros_like(self.body.body.rates(still)),
         )
         attraction = self.attraction_at(state, state, voltage)
@@ -78,7 +81,15 @@ class Equilibrium:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
+        found = PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
+        return self.interface.tilted(state, found)
+
+    def adhesion_at(self, state: State, strength: float = ON) -> Floats:
+        """Adhesion alone on the pad nodes (P, dim) in `state`, 0 without any."""
+        adhesive = None if self.attraction is None else self.attraction.adhesive
+        if adhesive is None:
+            return np.zeros_like(state.contact_force)
+        return PadState.of(adhesive, self.interface, state, state.touching).forces(strength)
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""
@@ -164,7 +175,7 @@ class Equilibrium:
             if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
-            self.interface.jumps.watch(self.interface.places(state), state.touching)
+            self.interface.jumps.watch(self.interface.on_display(state), state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     CANDIDATE_GROWTH,
     CANDIDATE_ROUNDS,
@@ -34,7 +34,7 @@ from evfem.common.constants import (
     TURNED,
 )
 from evfem.contact.attraction import Attraction
-from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
+from evfem.contact.condensed import CandidatesBed, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import PadState
@@ -126,10 +126,11 @@ class FactorisedBody:
     def balance(self, state: State, attraction: Floats, target: Target) -> tuple[State, Balance]:
         """Out-of-balance forces of the reduced unknowns and their relative size."""
         nodal = self.body.forces(state.u)
-        nodal[self.pad.nodes] -= attraction + self.interface.contact_forces(state)
+        nodal[self.pad.nodes] -= (pad := attraction + self.interface.contact_forces(state))
         forces = self.body.reduce(nodal)
         state = replace(state, attraction=attraction, reaction=forces[self.body.bone])
         residual, mixed = self._largest(state, target, forces), self._with_pressure(state, target, forces)
+        residual = max(residual, self.interface.unyielded(state, pad))
         return state, Balance(forces, residual, attraction, mixed)
 
     def _with_pressure(self, state: State, target: Target, forces: Floats) -> MixedBalance | None:
@@ -252,7 +253,16 @@ class FactorisedBody:
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
             unknowns=self._unknowns(state, target),
+            bed=self._bed(state, c),
         )
+
+    def _bed(self, state: State, c: Ints) -> CandidatesBed | None:
+        """The elastic surface below the candidates c, if there is one."""
+        if self.interface.bed is None:
+            return None
+        below = self.interface.below(state)
+        pulled = (below.given(state.attraction) - state.given)[c]
+        return CandidatesBed(below.among(c), pulled.ravel())
 
     def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
         """Travels of the bone that are not given: first along y, then along x[, z]."""
@@ -286,7 +296,7 @@ class FactorisedBody:
             still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
             return row, still, own
 
-        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.forces(KILOVOLT))
+        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.unit)
         return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
@@ -298,7 +308,7 @@ class FactorisedBody:
         voltage = state.voltage
         if update.driven:
             voltage = target.voltage.after(voltage, fraction * update.driven)
-        return replace(
+        after = replace(
             state,
             u=state.u + fraction * update.u,
             contact_force=state.contact_force + fraction * (force - state.contact_force),
@@ -306,6 +316,18 @@ class FactorisedBody:
             bone=target.bone(state.bone) if whole else state.bone + fraction * update.bone,
             voltage=voltage,
         )
+        return after if update.contact.given is None else self._sunk(state, after, update)
+
+    def _sunk(self, state: State, after: State, update: Update) -> State:
+        """The iterate `after` with what the elastic surface below gives way by under its forces: below the
+        candidates that of the linear step, which knows how the attraction changed.
+        """
+        below = self.interface.below(state)
+        force = self.interface.contact_forces(replace(after, u=state.u)) + state.attraction
+        given, c = below.given(force), self.linearisation.candidates
+        changed = np.asarray(update.contact.given).reshape(c.size, -1)
+        given[c] = state.given[c] + update.fraction * changed
+        return replace(after, given=given, strain=below.change(force))
 
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:
         """Largest fraction 1, 1/2, 1/4 ... of an update that keeps every sampled volume."""

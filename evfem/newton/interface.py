@@ -25,6 +25,7 @@ from evfem.common.constants import (
     SHORTEST_LENGTH,
     SMALLEST_FORCE,
 )
+from evfem.contact.bed import Bed, Yielding
 from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.contact.slipping import OscillatingNodes
@@ -126,7 +127,7 @@ class Interface:
     are dropped.
     """
 
-    _surfaces: tuple[tuple[Floats, SurfaceState], ...] = ()
+    _surfaces: tuple[tuple[Floats, Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -136,6 +137,10 @@ class Interface:
         self.length = pad.spacing(self.points)
         self._down = pad.facing(self.points)
         self.jumps = FrictionJumps(surface.friction_steps(SHORT_RAMP * self.length), self.points[:, ::2])
+        elastic, least = getattr(surface, "elastic", None), SHORTEST_LENGTH * self.length
+        self.bed: Bed | None = None
+        if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
+            self.bed = Bed(elastic, pad, self.length, least)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
         self._oscillating = OscillatingNodes(pad.nodes.size)
@@ -144,7 +149,7 @@ class Interface:
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
-        self.jumps.begin(self.places(old))
+        self.jumps.begin(self.on_display(old))
         self._oscillating = OscillatingNodes(self.pad.nodes.size)
         self.duration = duration
 
@@ -153,21 +158,58 @@ class Interface:
         return self.points + u[self.pad.nodes]
 
     def places(self, state: State) -> Floats:
-        """Current x of the pad nodes (P, 1), in space x and z (P, 2)."""
-        return self.positions(state.u)[:, ::2]
+        """Current positions of the pad nodes (P, dim) relative to the surface, as if it were rigid."""
+        return self.positions(state.u) if self.bed is None else self.positions(state.u) + state.given
+
+    def on_display(self, state: State) -> Floats:
+        """x of `places` (P, 1), in space x and z (P, 2)."""
+        return self.places(state)[:, ::2]
 
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states, which many ask for."""
-        for u, found in self._surfaces:
-            if u is state.u:
+        for u, given, found in self._surfaces:
+            if u is state.u and given is state.given:
                 return found
-        found = surface_state(self.surface, self.positions(state.u))
-        self._surfaces = ((state.u, found), *self._surfaces[:1])
+        found = surface_state(self.surface, self.places(state))
+        if self.bed is not None:
+            shortened, sunk = state.strain.T
+            found = replace(found, slope=(found.slope - sunk[:, None]) / (1.0 - shortened)[:, None])
+        self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
+
+    def below(self, state: State) -> Yielding:
+        """The elastic surface below the pad."""
+        assert self.bed is not None
+        position = self.positions(state.u)
+        return self.bed.below(self.places(state), surface_state(self.surface, position).gap)
+
+    def tilted(self, state: State, force: Floats) -> Floats:
+        """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
+        if self.bed is None:
+            return force
+        (shortened, sunk), (along, up) = state.strain.T, force.T
+        return np.stack([(along + sunk * up) / (1.0 - shortened), up], axis=1)
+
+    def untilted(self, state: State, force: Floats) -> Floats:
+        """The same attraction as above a surface that has not sunk, whose work is that of the field."""
+        if self.bed is None:
+            return force
+        (shortened, sunk), (along, up) = state.strain.T, force.T
+        return np.stack([along * (1.0 - shortened) - sunk * up, up], axis=1)
+
+    def unyielded(self, state: State, force: Floats) -> float:
+        """By how much, over the tolerances' lengths, what an elastic surface gives way by misses what the
+        forces on the nodes (P, 2) ask for; 0 of a rigid one.
+        """
+        if self.bed is None:
+            return 0.0
+        below = self.below(state)
+        missing = np.abs(below.given(force) - state.given).max() / self.length
+        return float(max(missing, np.abs(below.change(force) - state.strain).max()))
 
     def resting(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""
-        position = self.positions(state.u)
+        position = self.places(state)
         touching = state.status != OPEN
         position[touching, 1] -= self.surface_at(state).gap[touching]
         return position
@@ -179,14 +221,14 @@ class Interface:
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes (P, dim - 1) in mm, along the surface's tangents."""
-        way = self.places(state) - self.jumps.at(self.places(old))
+        way = self.on_display(state) - self.jumps.at(self.on_display(old))
         return np.asarray(np.einsum("paj,pj->pa", self.surface_at(state).travel, way))
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
         """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
-        place, surface = self.places(state), self.surface_at(state).of(c)
+        place, surface = self.on_display(state), self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
         friction = self.friction(old, c, self.jumps.at(place)[c])
@@ -258,7 +300,7 @@ class Interface:
 
     def tributary(self, state: State) -> Floats:
         """Tributary lengths or areas (P,) in a state."""
-        return self.tributary_of(self.positions(state.u))
+        return self.tributary_of(self.places(state))
 
     def tributary_at(self, part: tuple[State, State], place: Floats) -> Floats:
         """Tributary lengths or areas (P,) at places (P, d) between two states; in space the mean of both."""
@@ -335,7 +377,7 @@ class Interface:
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
-        place, surface = self.places(state), self.surface_at(state)
+        place, surface = self.on_display(state), self.surface_at(state)
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self._weak(state)
@@ -383,7 +425,7 @@ def slipped(interface: Interface, old: State, new: State) -> Floats:
     """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left;
     along the mean of the surface's tangents.
     """
-    way = interface.places(new) - interface.places(old)
+    way = interface.on_display(new) - interface.on_display(old)
     travel = 0.5 * (interface.surface_at(old).travel + interface.surface_at(new).travel)
     slip = np.einsum("paj,pj->pa", travel, way)
     status = np.where(new.touching | (old.status == STICK), new.status, old.status)

@@ -122,7 +122,7 @@ class Linearisation:
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
-        position = self.interface.positions(state.u)
+        position = self.interface.places(state)
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
@@ -201,13 +201,13 @@ class Linearisation:
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         begin, seconds, inner, past = self.body.beginning
         at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
-        before = (past.rates, past.seconds)
-        self._made_at = TangentPoint(*at, state.status, state.pressure, inner, *before)
+        more = (past.rates, past.seconds, state.given, state.strain)
+        self._made_at = TangentPoint(*at, state.status, state.pressure, inner, *more)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
         """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
-        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.positions(state.u))
+        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.places(state))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
         weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
@@ -229,7 +229,8 @@ class Linearisation:
         if self.body.dynamics is not None:
             still, past = np.zeros_like(at.begin), Past(at.seconds, at.rates)
             self.body.dynamics.begin(at.begin, still, at.duration, at.inner, past)
-        self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
+        there = replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure)
+        self.factorise(replace(there, given=at.given, strain=at.strain))
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:
@@ -300,7 +301,9 @@ class Linearisation:
         None without attraction, or where they are faint: a symmetric compliance takes a third of
         the time. None with charges too, so that a factorisation does not depend on the step.
         """
-        if self.attraction is None or state.voltage == 0.0 or self.frozen or self.attraction.charging:
+        if self.attraction is None or self.frozen or self.attraction.charging:
+            return None
+        if not self.attraction.acts(state.voltage):
             return None
         position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
         pressing = state.contact_force[:, 0]

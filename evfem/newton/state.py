@@ -20,6 +20,8 @@ NO_PRESSURE: Floats = np.zeros((0, 0))
 NO_HAND: Floats = np.zeros(0)
 #: the time since a node touched where nothing depends on it
 NO_AGE: Floats = np.zeros(0)
+#: what a rigid surface gives way by, and its change along x
+NO_BED: Floats = np.zeros((0, 2))
 #: the charges where the voltage is not resolved in time
 NO_CHARGES: Floats = np.zeros((2, 0))
 
@@ -56,7 +58,9 @@ class State:
     Coulomb's `age` (P,) in s; with a hand what it keeps, `hand` (6, d) (`evfem.newton.hand`); under a voltage
     resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
     (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
-    `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`).
+    `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface
+    adds to the places of the pad's nodes relative to it is `given` (P, 2) in mm, its derivative along x
+    `strain` (P, 2).
     """
 
     u: Floats
@@ -75,6 +79,8 @@ class State:
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
     rates: Floats = field(default_factory=lambda: NO_RATES)
     seconds: float = 0.0
+    given: Floats = field(default_factory=lambda: NO_BED)
+    strain: Floats = field(default_factory=lambda: NO_BED)
 
     @property
     def past(self) -> Past:
@@ -106,6 +112,8 @@ class TangentPoint:
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
     rates: Floats = field(default_factory=lambda: NO_RATES)
     seconds: float = 0.0
+    given: Floats = field(default_factory=lambda: NO_BED)
+    strain: Floats = field(default_factory=lambda: NO_BED)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -107,12 +108,12 @@ class Closing:
             return None
         if isinstance(wanted, str) and not self.snaps:
             return None
-        (law, layers), (stiffness, distance, height) = self.electrics.attraction, self._local
-        first = height <= height.min() + FIRST * np.ptp(self.mesh.points[:, 1])
+        (law, layers), (stiffness, distance, _) = self.electrics.attraction, self._local
+        first = self.first
         given = None if isinstance(wanted, str) else wanted
-        cored = Cored(law, self._closed, RESOLVED * stiffness, given)
-        length = np.max((cored.line(voltage, layers).end - self._closed)[first])
-        ratio = np.max(self._slope[first] / (RESOLVED * stiffness[first]))
+        cored = Cored(law, self.closed, self.resolved * stiffness, given)
+        length = np.max((cored.line(voltage, layers).end - self.closed)[first])
+        ratio = np.max(self._slope[first] / (self.resolved * stiffness[first]))
         work = np.max(cored.adhesion(voltage, layers))
         fits = given is not None or float(length) <= SEEN * self._gap
         return Core(cored, float(ratio), float(length), float(np.max(distance[first])), float(work), fits)
@@ -120,9 +121,31 @@ class Closing:
     @cached_property
     def snaps(self) -> bool:
         """Whether the law itself is steeper than the mesh resolves, so that a node can snap by itself."""
-        stiffness, _, height = self._local
-        low = height <= height.min() + LOW * np.ptp(self.mesh.points[:, 1])
-        return bool((self._slope > RESOLVED * stiffness)[low].any())
+        stiffness, *_ = self._local
+        return bool((self._slope > self.resolved * stiffness)[self._low].any())
+
+    @property
+    def resolved(self) -> float:
+        """`RESOLVED`, half of it of each law beside another one."""
+        both = self.scene.adhesion is not None and self.scene.electrics.acts
+        return 0.5 * RESOLVED if both else RESOLVED
+
+    @property
+    def stiffness(self) -> Floats:
+        """E*/h (P,) in MPa/mm of the nodes of the pad."""
+        return self._local[0]
+
+    @property
+    def first(self) -> Any:
+        """Nodes (P,) with which the finger touches first."""
+        height = self._local[2]
+        return height <= height.min() + FIRST * np.ptp(self.mesh.points[:, 1])
+
+    @property
+    def _low(self) -> Any:
+        """Nodes (P,) that the finger touches with first."""
+        height = self._local[2]
+        return height <= height.min() + LOW * np.ptp(self.mesh.points[:, 1])
 
     @property
     def trapped(self) -> bool:
@@ -145,7 +168,7 @@ class Closing:
         return np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
 
     @cached_property
-    def _closed(self) -> float:
+    def closed(self) -> float:
         """The gap (mm) of closed faces, that of rough ones without pressure."""
         rough = roughness_of(self.scene.roughness_gap)
         return 0.0 if rough is None else float(rough.separation(0.0))
@@ -154,7 +177,7 @@ class Closing:
     def _slope(self) -> Floats:
         """How fast the traction falls with the gap of closed faces under the largest voltage (P,), MPa/mm."""
         law, layers = self.electrics.attraction
-        slope = traction_derivative(law, self._closed, self.scene.electrics.largest_voltage, layers)
+        slope = traction_derivative(law, self.closed, self.scene.electrics.largest_voltage, layers)
         return -np.broadcast_to(slope, self._nodes.shape)
 
     @cached_property

@@ -18,6 +18,7 @@ from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
+from evfem.planning.adhesion import told
 from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
@@ -184,6 +185,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         _contact(scene),
         _friction(scene),
         _electricity(closing),
+        *_adhesion(closing),
         *_field(scene, mesh),
         *_drive(scene),
         _time(scene),
@@ -221,7 +223,17 @@ def _contact(scene: Scene) -> Term:
     if cells := getattr(scene.finger, "ridge_cells", 0.0):
         error = f"{100.0 * area_error(cells):.2g} %"
         shape += f"; with {cells:g} cells per ridge the real contact area is known to {error}"
-    return Term("contact", True, shape)
+    return Term("contact", True, shape + _giving_way(scene))
+
+
+def _giving_way(scene: Scene) -> str:
+    """What an elastic surface is made of, in words; empty for a rigid one."""
+    elastic = scene.ground.elastic
+    if elastic is None:
+        return ""
+    layers = getattr(elastic, "layers", ())
+    made = ", ".join(f"{one.E:g} MPa over {one.thickness:g} mm" for one in layers) or type(elastic).__name__
+    return f"; it gives way: {made}, its compliance added to the tissue's"
 
 
 def _friction(scene: Scene) -> Term:
@@ -251,6 +263,11 @@ def _electricity(closing: Closing) -> Term:
     pull = "" if traction is None else f", up to {traction:.2g} MPa where it touches"
     cored = "" if core is None else f"; {core}"
     return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")
+
+
+def _adhesion(closing: Closing) -> tuple[Term, ...]:
+    """The adhesion of a scene that has any."""
+    return () if closing.scene.adhesion is None else (Term("adhesion", True, told(closing)),)
 
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
@@ -355,7 +372,7 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
     stiff = [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]
     if stiff:
         lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")
-    unsymmetric = [name for name in ("friction", "electricity") if needed[name]]
+    unsymmetric = [name for name in ("friction", "electricity", "adhesion") if needed.get(name)]
     if unsymmetric:
         lines.append(
             f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "

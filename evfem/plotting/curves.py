@@ -7,6 +7,7 @@ along the abscissa: any column that grows or falls, by default the one that the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -96,7 +97,12 @@ def _changes(values: Floats) -> bool:
     return steps.size > 0 and bool(np.all(steps > least) or np.all(steps < -least))
 
 
-def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
+def forces(
+    result: Result,
+    over: str | None = None,
+    ax: Axes | None = None,
+    sd: Mapping[str, Any] | None = None,
+) -> Axes:
     """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
 
     Parameters
@@ -109,6 +115,8 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
         finger waits, else the step, with the motions marked.
     ax
         Axes to draw in; None: new ones.
+    sd
+        Standard deviations of columns (steps,), as `evfem.uncertainty` gives: bands of one around them.
 
     Returns
     -------
@@ -120,18 +128,25 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
     InputError
         Another `over`.
     """
-    return _of_one_kind(ax, result, FORCES, "applied_force", over)
+    return _of_one_kind(ax, result, FORCES, "applied_force", over, sd or {})
 
 
 def energies(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Works, stored energy and dissipations (N) over `over`, as in `forces`."""
-    return _of_one_kind(ax, result, ENERGIES, "external_work", over)
+    return _of_one_kind(ax, result, ENERGIES, "external_work", over, {})
 
 
 def _of_one_kind(
-    ax: Axes | None, result: Result, texts: Mapping[str, tuple[str, str, str]], always: str, over: str | None
+    ax: Axes | None,
+    result: Result,
+    texts: Mapping[str, tuple[str, str, str]],
+    always: str,
+    over: str | None,
+    sd: Mapping[str, Any],
 ) -> Axes:
-    """Lines of columns of one kind; those that are 0 throughout only if they must `always` be there."""
+    """Lines of columns of one kind, with bands of their `sd`; those that are 0 throughout only if they must
+    `always` be there.
+    """
     over = checked_over(over, result)
     x, drawn = along(result, over, over), {name: along(result, name, over) for name in texts}
     least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
@@ -141,6 +156,11 @@ def _of_one_kind(
         if name == always or np.any(np.abs(drawn[name]) > least)
     ]
     ax = _marked(curves(ax, lines, "", axis_label(always, result.units)), over, result)
+    for name, (_, colour, _) in ((name, look) for name, look in texts.items() if name in sd):
+        middle, wide = np.asarray(result[name]), np.asarray(sd[name])
+        moved: list[dict[str, Any]] = [{name: middle - wide}, {name: middle + wide}]
+        ends = (along(replace(result, **one), name, over) for one in moved)
+        ax.fill_between(x, *ends, color=colour, alpha=0.2, linewidth=0)
     ax.legend()
     return ax
 

@@ -35,7 +35,17 @@ Height = Callable[[Floats], Floats]
 def height_of(result: Result, frame: Frame) -> Height:
     """Height (mm) of the surface at x (mm) of the laboratory, while the finger is as in `frame`."""
     known = _from_scene(result)
-    return _from_gaps(result, frame) if known is None else known
+    if known is None:
+        return _from_gaps(result, frame)
+    return known if not frame.surface_sink.any() else _sunk(known, result, frame)
+
+
+def _sunk(height: Height, result: Result, frame: Frame) -> Height:
+    """The surface, which has sunk below the pad; beside it as the pad's last node has it."""
+    pad = np.flatnonzero(np.isfinite(frame.gap))
+    x, sink = (result.mesh.points + frame.displacement)[pad, 0], frame.surface_sink[pad]
+    order = np.argsort(x)
+    return lambda at: height(at) - np.interp(at, x[order], sink[order])
 
 
 def _from_scene(result: Result) -> Height | None:
@@ -63,7 +73,7 @@ CELL_FIELDS = ("von_mises", *STRESSES, "J")
 FIELDS = (*CELL_FIELDS, "displacement", *POINT_FIELDS)
 #: fields whose colours begin at 0; fields with a sign, and the value in their middle, which is white
 FROM_ZERO = ("von_mises", "gap", "contact_pressure", "electrostatic_traction")
-MIDDLES = {**dict.fromkeys(STRESSES, 0.0), "J": 1.0, "shear_traction": 0.0}
+MIDDLES = {**dict.fromkeys(STRESSES, 0.0), "J": 1.0, "shear_traction": 0.0, "surface_sink": 0.0}
 Window = tuple[float, float, float, float]
 #: most arrows across a picture, and the longest one as a share of the surface's depth in it
 MOST_ARROWS, LONGEST = 36, 0.8

@@ -74,7 +74,8 @@ def deformed(
         A result of a plane finger.
     field
         A field of the tissue (stress, `J`, `displacement`) fills the finger. A field of the pad
-        (`contact_pressure`, `shear_traction`, `electrostatic_traction`, `gap`, `contact_status`)
+        (`contact_pressure`, `shear_traction`, `electrostatic_traction`, `gap`, `contact_status`,
+        `surface_sink`)
         colours its outline; tractions are arrows too, the longest where they are largest.
     frame
         Index in `result.frames`.
@@ -351,7 +352,7 @@ def _mark_probes(ax: Axes, result: Result, frame: Frame, window: Window) -> None
 
 
 def _draw_surface(ax: Axes, height: Height, window: Window) -> None:
-    """The rigid surface, filled down to the lower end of the window."""
+    """The surface, filled down to the lower end of the window."""
     x = np.linspace(window[0], window[1], 2001)
     y = height(x)
     ax.fill_between(x, y, min(window[2], y.min()), color=GROUND, linewidth=0.0, zorder=0.5)

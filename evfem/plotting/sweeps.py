@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 #: steps of a grid are uneven where the largest is so many times the smallest
 UNEVEN = 3.0
+#: so many places have their number on a logarithmic abscissa
+FEW = 8
 #: one for each line, told apart without colour
 MARKERS = "os^Dv<>P"
 
@@ -60,6 +62,9 @@ def sweep(
         lines.append((across[order], up[order], look | {"label": _value(table, by, value), "marker": marker}))
     ax = curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
     ax.set(**{f"{axis}scale": "log" for axis in log})
+    if "x" in log and (places := np.unique(np.concatenate([line[0] for line in lines]))).size <= FEW:
+        ax.set_xticks(places, [f"{place:g}" for place in places])
+        ax.set_xticks([], minor=True)
     if names:
         ax.set_xticks(range(len(names)), [str(name) for name in names])
         ax.margins(x=0.15)

@@ -31,12 +31,16 @@ PLACES, WEIGHTS = (-2, -1, 1, 2), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 #: the farthest place goes no further than this share of the way to a kink of the attraction or to another
 #: status, than this share of the length over which the attraction changes, and at least so far
 NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
-#: how far (mm) nodes of the undeformed finger move between places
-SHIFT = 5e-6
+#: how far (mm) nodes of the undeformed finger move between places, and nodes along a profile
+SHIFT, ALONG = 5e-6, 1e-5
+#: how many times as far apart places are for what is smooth
+FAR = 4.0
 #: refinements at most; the relative change that is still to come when they are done, that from which on it is
 #: rounding where it falls no more than by the next factor, and what is too much; the factor by which it must
 #: fall with the matrix of another part
 ROUNDS, DONE, ROUNDING, NOISE, WRONG, SLOW = 30, 1e-13, 1e-7, 0.5, 1e-6, 0.01
+#: what of a state knows the kinks of the attraction
+NEARBY = ("attraction", "charges")
 LOST = "the linear equations of step {} were not solved"
 #: columns with units that are counted all the same
 WHOLE = (
@@ -195,6 +199,11 @@ class Line:
         state = changes([one.run.state for one in beside], step)
         return cls(parameter.name, step, longest, beside, centre, lengths, works, state)
 
+    @property
+    def far(self) -> float:
+        """How far places are apart for what is smooth."""
+        return FAR * self.longest
+
     # -- a part
 
     def follow(
@@ -251,11 +260,13 @@ class Line:
     def _along(self, part: Accepted, jumps: Sequence[Steps], change: Change) -> Floats:
         """Derivative (m,) of the part's equations along those of its states, the end's being `change`."""
         way = self._way(part, change)
-        found = []
+        near, far = [], []
         for place in PLACES:
             begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
-            found.append(begun.residual(moved(part.new, change, place * way)))
-        return np.asarray(difference(found, way))
+            near.append(begun.kinked(moved(part.new, change, place * way)))
+            begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * self.far))
+            far.append(begun.smooth(moved(part.new, change, place * self.far)))
+        return np.asarray(difference(near, way) + difference(far, self.far))
 
     def _way(self, part: Accepted, change: Change, reach: float = np.inf) -> float:
         """How far places are apart along the states: no node moves further than it may, and all stay within
@@ -266,6 +277,8 @@ class Line:
         moves = change["u"][model.pad.nodes]
         rate = np.maximum(np.abs(moves[:, 1] - np.sum(slope * moves[:, ::2], axis=1)), 1e-300)
         nearest = min(float((self.lengths(part.new) / rate).min()), NEAR * reach)
+        if not model.surface.is_flat:
+            nearest = min(nearest, ALONG / max(float(np.abs(moves[:, 0]).max()), 1e-300))
         return max(min(self.longest, nearest / max(PLACES)), LEAST * self.longest)
 
     def _end(
@@ -274,13 +287,17 @@ class Line:
         """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
         step, way = self.step, self._way(part, change)
         by_parameter = changes([one.ended(part.new) for one in equations], step)
-        along, margins = [], []
+        near, far, margins = [], [], []
         for place in PLACES:
             at = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
             new = moved(part.new, change, place * way)
             margins.append(at.margins(new))
-            along.append(at.ended(new))
-        state = added(by_parameter, changes(along, way)) | change
+            near.append(at.ended(new))
+            at = self.centre.begin(part, jumps, moved(part.old, self.state, place * self.far))
+            far.append(at.ended(moved(part.new, change, place * self.far)))
+        along = changes(far, self.far)
+        along |= {name: value for name, value in changes(near, way).items() if name in NEARBY}
+        state = added(by_parameter, along) | change
         with np.errstate(invalid="ignore"):
             rate = difference(margins, way) + difference([one.margins(part.new) for one in equations], step)
         counts = np.isfinite(part.margins) & np.isfinite(rate) & (rate != 0.0)

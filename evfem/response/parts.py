@@ -17,6 +17,7 @@ of the run's own model: tissue, attraction, surface, law of friction, controls.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Equations:
         interface.begin(old, target.duration)
         interface.jumps.place = pins
         if model.body.dynamics is not None:
-            model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner)
+            model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
         if attraction is not None and attraction.charging is not None:
             pressing = old.contact_force[:, 0]
             charged = attraction.charged(interface.resting(old), old.voltage, pressing, old.charges)
@@ -58,18 +59,27 @@ class Equations:
         """Of the model."""
         return self.model.equilibrium.interface
 
-    def loaded(self, state: State) -> tuple[State, Floats]:
-        """The state with its attraction and reaction, and the reduced balance (n,)."""
-        model, body = self.model, self.model.body
-        attraction = model.equilibrium.attraction_at(self.old, state, state.voltage)
-        nodal = body.forces(state.u)
-        nodal[model.pad.nodes] -= attraction + self.interface.contact_forces(state)
-        forces = body.reduce(nodal)
-        return replace(state, attraction=attraction, reaction=forces[body.bone]), forces
+    def loaded(self, state: State) -> State:
+        """The state with its attraction and reaction."""
+        attraction = self.model.equilibrium.attraction_at(self.old, state, state.voltage)
+        state = replace(state, attraction=attraction)
+        forces = self._tissue(state) - self._pushed(state)
+        return replace(state, reaction=forces[self.model.body.bone])
+
+    def _tissue(self, state: State) -> Floats:
+        """Internal forces (n,)."""
+        body = self.model.body
+        return body.reduce(body.forces(state.u))
+
+    def _pushed(self, state: State) -> Floats:
+        """Forces (n,) of attraction and contact on the pad, the state's own."""
+        nodal = np.zeros_like(state.u)
+        nodal[self.model.pad.nodes] = state.attraction + self.interface.contact_forces(state)
+        return self.model.body.reduce(nodal)
 
     def ended(self, state: State) -> State:
         """The state as the run would accept it, with the history that it leaves behind."""
-        state, attraction = self.loaded(state)[0], self.model.attraction
+        state, attraction = self.loaded(state), self.model.attraction
         state = self.interface.aged(self.old, self.model.equilibrium.body.accepted(self.old, state))
         if self.target.hand is not None:
             state = self.target.hand.settled(state)
@@ -80,10 +90,31 @@ class Equations:
 
     def residual(self, state: State) -> Floats:
         """R (m,): balance of the free unknowns, bone, contact of all pad nodes."""
-        loaded, forces = self.loaded(state)
-        return np.concatenate(
-            [forces[: -state.bone.size], self._bone(loaded), self.contact(state)[0].ravel()]
-        )
+        return self.smooth(state) + self.kinked(state)
+
+    def smooth(self, state: State) -> Floats:
+        """The part of R (m,) that is smooth over long ways: tissue, bone; on flat surfaces gaps, sticking."""
+        forces = self._tissue(state)
+        contact = np.where(self._near(state), 0.0, self.contact(state)[0])
+        bone = self._bone(replace(state, reaction=forces[self.model.body.bone]))
+        return np.concatenate([forces[: -state.bone.size], bone, contact.ravel()])
+
+    def kinked(self, state: State) -> Floats:
+        """The rest of R (m,): attraction, contact forces, friction, and what follows a profile."""
+        attraction = self.model.equilibrium.attraction_at(self.old, state, state.voltage)
+        pushed = -self._pushed(replace(state, attraction=attraction))
+        pushed[self.model.body.bone] *= [-float(self.pulled(axis)) for axis in range(state.bone.size)]
+        contact = np.where(self._near(state), self.contact(state)[0], 0.0)
+        return np.concatenate([pushed, contact.ravel()])
+
+    def _near(self, state: State) -> Any:
+        """Which of what contact lacks is `kinked`, (P, dim) bool."""
+        slips = (state.status >= FORWARD)[:, None]
+        return (slips & (np.arange(state.bone.size) > 0)) | (not self.interface.surface.is_flat)
+
+    def pulled(self, axis: int) -> bool:
+        """Whether the bone lacks a force along an axis, not a way."""
+        return self.target.hand is not None if axis == 0 else axis == 1 and self.target.height.free
 
     def _bone(self, state: State) -> Floats:
         """What the bone lacks (dim,): of its place in mm, or of the force on it in N/mm."""
@@ -114,7 +145,7 @@ class Equations:
         gap = interface.surface_at(state).normal_gap + interface.compliance(self.old)[:, 0] * normal[:, 0]
         slip = self._slip(state)
         way = np.where(status >= FORWARD, sizes(slip), 0.0)
-        bound = self.bound(state, interface.places(state), way)
+        bound = self.bound(state, interface.on_display(state), way)
         sliding = shear + bound[:, None] * directions(status, slip)
         along = np.where(
             (status == STICK)[:, None], slip, np.where((status >= FORWARD)[:, None], sliding, shear)

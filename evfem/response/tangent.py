@@ -79,12 +79,7 @@ class Tangent:
         own[row] = 1.0
         if axis == 0 and target.hand is not None:
             return -target.hand.stiffness * own - balance
-        return -balance if self._loaded(axis) else own
-
-    def _loaded(self, axis: int) -> bool:
-        """Whether the bone lacks a force along an axis, not a way."""
-        target = self.equations.target
-        return target.hand is not None if axis == 0 else axis == 1 and target.height.free
+        return -balance if self.equations.pulled(axis) else own
 
     def solve(self, right: Floats) -> Floats:
         """w (m,) with K w = `right` (m,)."""
@@ -98,7 +93,7 @@ class Tangent:
         for axis in range(dim):
             row = self.kept.size - dim + axis
             lacking = right[size - dim + axis]
-            dense[row] = lacking - condensed[row] if self._loaded(axis) else lacking
+            dense[row] = lacking - condensed[row] if self.equations.pulled(axis) else lacking
         found = scipy.linalg.lu_solve(self.dense, dense, check_finite=False)
         pressing = right[size:].copy()  # of open nodes, as they are
         pressing[self._closed] = found[self.kept.size :]
@@ -174,7 +169,7 @@ class Tangent:
     def _bound_slopes(self, way: Floats) -> tuple[Floats, Floats, Floats]:
         """Derivatives of the bound of friction by contact force, place (P, d) and size of the slip."""
         state, interface, bound = self.state, self.equations.interface, self.equations.bound
-        place, force = interface.places(state), state.contact_force
+        place, force = interface.on_display(state), state.contact_force
         normal, length = SHARE * np.maximum(force[:, 0], 1e-12), SHARE * interface.length
         more, less = (
             replace(state, contact_force=force + sign * normal[:, None] * (np.arange(force.shape[1]) == 0))

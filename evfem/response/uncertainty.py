@@ -20,7 +20,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, real
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, quoted, unknown
 from evfem.response.lines import differentiable
 from evfem.response.parameters import parameter_of
 from evfem.response.sensitivities import Sensitivities, sensitivities
@@ -51,6 +51,16 @@ class Uncertainty:
     contribution: Mapping[tuple[str, str], Floats]
     checked: Check
     found: Sensitivities
+
+    def effects(self, column: str, step: int = -1) -> tuple[dict[str, float], str]:
+        """The contribution of every parameter to a column at a step, counted from 0, and what it is."""
+        if column not in self.sd:
+            raise unknown("column", str(column), tuple(self.sd))
+        keys = self.found.parameters
+        unit = self.result.units[column]
+        return {
+            key: float(self.contribution[column, key][step]) for key in keys
+        }, f"{column} for one sd ({unit})"
 
     def __repr__(self) -> str:
         """The check, and the standard deviations of the forces at the end."""

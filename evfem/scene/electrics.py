@@ -227,6 +227,10 @@ def without_field(scene: Any) -> tuple[str, str] | None:
         return type(scene.law).__name__, allowed
     if not scene.air_layer:
         return "air_layer = false", "air_layer = true: the field pulls through the air beside the contact too"
+    if scene.adhesion is not None:
+        return "adhesion", "a scene without adhesion"
+    if scene.ground.elastic is not None:
+        return "an elastic surface", "a rigid surface: the field's insulator does not bend"
     if scene.drive is None:
         return None
     if scene.drive.resolved:

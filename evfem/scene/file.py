@@ -34,6 +34,8 @@ from evfem.scene.keys import VERSION, at, check_size, kind_of, read, read_kind, 
 from evfem.scene.motion import MOTIONS, Motion
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.serialiser import dump
+from evfem.surface.adhesion import ADHESIONS
+from evfem.surface.elastic import ElasticLayer, ElasticStack
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.surface.surfaces import Display
 
@@ -114,6 +116,9 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
         with mistakes.of_a_part():
             if (table := getattr(top, key)) is not None:
                 parts[key] = read(cls, table, key, homes=HOMES)
+    with mistakes.of_a_part():
+        if top.adhesion is not None:
+            parts["adhesion"] = read_kind(top.adhesion, "adhesion", ADHESIONS, tag="law", homes=HOMES)
     mistakes.report()
     return Scene(**parts, name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")))
 
@@ -152,6 +157,8 @@ def _surface(
     mistakes, found = Mistakes(), dict[str, Any]()
     with mistakes.of_a_part():
         kind, kinds, more = kind_of(table, "surface", SURFACES), SURFACES, {"insulator": insulator}
+        if "elastic" in table:
+            more["elastic"] = _elastic(table["elastic"])
         if electrodes is not None and kind != "flat":
             given = f"beside a surface of kind {kind}"
             raise InputError("electrostatics.electrodes", given, "a flat surface")
@@ -165,6 +172,18 @@ def _surface(
             found["friction_law"] = read_kind(table["friction_law"], "surface.friction_law", FRICTIONS)
     mistakes.report()
     return found
+
+
+def _elastic(table: Any) -> Any:
+    """The layer in a table, or the stack in several."""
+    if not isinstance(table, list):
+        return read(ElasticLayer, table, "surface.elastic", homes=HOMES)
+    mistakes, layers = Mistakes(), []
+    for i, one in enumerate(table):
+        with mistakes.of_a_part():
+            layers.append(read(ElasticLayer, one, f"surface.elastic[{i}]", homes=HOMES))
+    mistakes.report()
+    return ElasticStack(tuple(layers))
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:

@@ -34,8 +34,9 @@ from evfem.scene.scene import (
     Solver,
 )
 from evfem.surface import textures
+from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.relief import Relief
-from evfem.surface.surfaces import Angle, Flat, Friction, Insulator, Profile, Shift
+from evfem.surface.surfaces import Angle, Flat, Friction, GivesWay, Insulator, Profile, Shift
 
 Table = Mapping[str, Any]
 Pairs = list[list[float]]
@@ -72,6 +73,11 @@ class SceneTable:
     electrostatics: Annotated[
         Table | None, _table("electrostatics"), "insulator, voltage and force law; without it no attraction"
     ] = None
+    adhesion: Annotated[
+        Table | None,
+        _table("adhesion", f" with a law: {' | '.join(ADHESIONS)}"),
+        "what attracts without a voltage; without it nothing",
+    ] = None
     hand: Annotated[
         Table | None, _table("hand"), "between drive and bone; without it the drive moves the bone itself"
     ] = None
@@ -104,12 +110,17 @@ class BesideFinger:
 
 @dataclass(frozen=True)
 class BesideSurface:
-    """The key of [surface] that is the scene's."""
+    """The keys of [surface] that stand in tables of their own."""
 
     friction_law: Annotated[
         Table | None,
         _table("surface.friction_law", " with a kind"),
         "what the coefficient means; without it Coulomb's law",
+    ] = None
+    elastic: Annotated[
+        Table | list[Table] | None,
+        {"allowed": "a table [surface.elastic], or several [[surface.elastic]] from the top"},
+        "how the surface gives way; without it it is rigid",
     ] = None
 
 
@@ -124,11 +135,13 @@ class ProfileTable:
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
     angle: Angle = 0.0
 
     def made(self) -> Profile:
         """The profile of the file or of the points."""
-        common: Any = {name: getattr(self, name) for name in ("friction", "y", "insulator", "angle")}
+        names = ("friction", "y", "insulator", "elastic", "angle")
+        common: Any = {name: getattr(self, name) for name in names}
         if (self.file is None) == (self.points is None):
             given = ABSENT if self.file is None else "file and points"
             raise InputError("surface.file", given, _HEIGHTS)
@@ -150,10 +163,11 @@ class ReliefTable:
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
 
     def made(self) -> Relief:
         """The surface of the file or of the heights."""
-        common: Any = {name: getattr(self, name) for name in ("friction", "y", "insulator")}
+        common: Any = {name: getattr(self, name) for name in ("friction", "y", "insulator", "elastic")}
         here = [name for name in ("x", "z", "height") if getattr(self, name) is not None]
         if len(here) != (0 if self.file is not None else 3):
             given = " and ".join([*(["file"] if self.file is not None else []), *here]) or ABSENT

@@ -20,13 +20,15 @@ from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.newton.hand import Hand
-from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
+from evfem.protocols import AdhesionLaw, CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive, without_field
 from evfem.scene.motion import MOTIONS, VOLTAGE, Course, Motion, Press, Slide
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
+from evfem.surface.adhesion import ADHESION, adhesion_of
 from evfem.surface.friction import Coulomb
 from evfem.surface.usersurface import completed
 from evfem.tissue.forms import Form
@@ -45,6 +47,7 @@ FieldChoice = Annotated[
     str, one_of(*FIELDS), "full: Poisson's problem, not column by column; auto: where it matters"
 ]
 Grounded = Annotated[bool, yes_or_no(), "false: the finger has no charge; with field full"]
+Adhesion = Annotated[AdhesionLaw | None, {"allowed": ADHESION, "check": adhesion_of}]
 Coupling = Annotated[str, one_of(*COUPLINGS), "staggered_once: the paper's, once in each step"]
 
 
@@ -86,9 +89,10 @@ class Scene:
     bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it alternate, or leak. `law`
     None and `voltage` 0: no electrostatics. Only where the field is full may the finger be not `grounded`:
     without a charge, above electrodes of different voltages. `friction_law` says what the surface's
-    coefficient means (`Coulomb`, ... or one's own). A `hand` is between drive and bone: motions then say
-    where the drive goes. `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. Raises InputError
-    for anything that does not fit together.
+    coefficient means (`Coulomb`, ... or one's own), `adhesion` what attracts without a voltage (`Dugdale`,
+    `Capillary`, or one's own). A `hand` is between drive and bone: motions then say where the drive goes.
+    `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. Raises InputError for anything that does
+    not fit together.
     """
 
     finger: Finger
@@ -101,6 +105,7 @@ class Scene:
     coupling: Coupling = field(default="monolithic", kw_only=True)
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: RoughnessGap = field(default=0.0, kw_only=True)
+    adhesion: Adhesion = field(default=None, kw_only=True)
     friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
     hand: Hand | None = field(default=None, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
@@ -121,6 +126,7 @@ class Scene:
             _check_electrostatics,
             check_drive,
             _check_friction,
+            _check_elastic,
             _check_hand,
             _check_motion,
             _check_time,
@@ -224,8 +230,8 @@ def _check_parts(scene: Scene) -> None:
 
 def _check_electrostatics(scene: Scene) -> None:
     check_fields(scene, "electrostatics.")
-    if scene.law is None and scene.roughness_gap != 0.0:
-        allowed = "only with a law of attraction: without one it changes nothing"
+    if scene.law is None and scene.adhesion is None and scene.roughness_gap != 0.0:
+        allowed = "only with a law of attraction, or adhesion: without one it changes nothing"
         raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
@@ -289,6 +295,15 @@ def _check_friction(scene: Scene) -> None:
         _check_speeds(scene, type(law).__name__)
 
 
+def _check_elastic(scene: Scene) -> None:
+    if scene.ground.elastic is None:
+        return
+    found = isinstance(scene.voltage, (FollowForce, OpenCircuit, ChargeControl))
+    if found or any(course.gap is not None for course in scene.courses):
+        allowed = "a rigid surface, or a voltage that is given: it is not sought above an elastic surface"
+        raise InputError("surface.elastic", "an elastic surface under a voltage that is sought", allowed)
+
+
 def _check_motion(scene: Scene) -> None:
     pressed = False
     for i, course in enumerate(scene.courses):
@@ -304,7 +319,7 @@ def _check_motion(scene: Scene) -> None:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"
             )
-        if course.force == 0.0 and scene.law is None:
+        if course.force == 0.0 and scene.law is None and scene.adhesion is None:
             raise InputError(f"{key}.force", 0.0, "larger than 0 when nothing else pulls the finger down")
 
 

@@ -25,6 +25,8 @@ from evfem.scene.keys import VERSION
 from evfem.scene.motion import MOTIONS
 from evfem.scene.probes import Probe
 from evfem.scene.scene import Output, Solver
+from evfem.surface.adhesion import ADHESIONS
+from evfem.surface.elastic import ElasticLayer
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.tissue.laws import LAWS
 
@@ -153,6 +155,7 @@ def sections() -> list[Section]:
         section("finger.electrical", Electrical),
         *kinds("surface", file.SURFACES, "which kind", "kind", file.BesideSurface),
         *kinds("surface.friction_law", FRICTIONS, "which kind"),
+        section("surface.elastic", ElasticLayer),
         section("electrostatics", file.Electrostatics, *FORCE_LAWS.values()),
         *kinds("electrostatics.signal", file.SIGNALS, "which kind"),
         *kinds(
@@ -161,6 +164,7 @@ def sections() -> list[Section]:
             "how the gap depends on a node's contact pressure",
             "law",
         ),
+        *kinds("adhesion", ADHESIONS, "which law", "law"),
         section("hand", Hand),
         section("solver", Solver),
         section("solver.strategy", Strategy),
@@ -186,16 +190,19 @@ def schema() -> Schema:
         one.schema(materials=_by_region("material" if one.kind == "mesh" else "layer"), electrical=electrical)
         for one in tables["finger"]
     ]
-    friction = {"$ref": "#/definitions/friction"}
+    friction, layer = {"$ref": "#/definitions/friction"}, tables["surface.elastic"][0].schema()
+    beside: dict[str, Schema] = {"friction_law": friction}
+    beside["elastic"] = {"anyOf": [layer, {"type": "array", "minItems": 1, "items": layer}]}
     probe = {"anyOf": [_shape((list[list[float]],)), tables["output.probes.NAME"][0].schema()]}
     inner: dict[str, Schema] = {
         "version": {"const": VERSION},
         "finger": {"anyOf": fingers},
-        "surface": {"oneOf": [one.schema(friction_law=friction) for one in tables["surface"]]},
+        "surface": {"oneOf": [one.schema(**beside) for one in tables["surface"]]},
         "electrostatics": tables["electrostatics"][0].schema(
             signal={"$ref": "#/definitions/signal"},
             roughness_gap={"anyOf": [{"type": "number"}, one_of["electrostatics.roughness_gap"]]},
         ),
+        "adhesion": one_of["adhesion"],
         "hand": tables["hand"][0].schema(),
         "solver": tables["solver"][0].schema(strategy=tables["solver.strategy"][0].schema()),
         "output": tables["output"][0].schema(probes={"type": "object", "additionalProperties": probe}),

@@ -23,6 +23,8 @@ from evfem.errors import InputError
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
+from evfem.surface.adhesion import ADHESIONS
+from evfem.surface.elastic import ElasticLayer, ElasticStack
 from evfem.surface.friction import KINDS, Coulomb
 from evfem.surface.relief import Relief
 from evfem.surface.surfaces import Display, Profile
@@ -44,6 +46,12 @@ def dump(scene: Scene) -> str:
         surface["points"] = [list(row) for row in rows]
     if isinstance(scene.surface, Relief):
         surface |= scene.surface.columns
+    if (elastic := scene.ground.elastic) is not None:
+        if not isinstance(elastic, ElasticLayer | ElasticStack):
+            allowed = "ElasticLayer, ElasticStack, for a file"
+            raise InputError("surface.elastic", type(elastic).__name__, allowed)
+        layers = [_keys(layer, "surface.elastic") for layer in elastic.layers]
+        surface["elastic"] = layers[0] if isinstance(elastic, ElasticLayer) else layers
     if type(scene.friction_law) is not Coulomb:
         surface["friction_law"] = _of_kind(scene.friction_law, KINDS, "surface.friction_law")
     tables = {
@@ -51,6 +59,9 @@ def dump(scene: Scene) -> str:
         "finger": _finger(scene.finger) | ({} if scene.depth is None else {"depth": scene.depth}),
         "surface": surface,
         "electrostatics": {} if scene.law is None else _electrostatics(scene),
+        "adhesion": (
+            {} if scene.adhesion is None else _of_kind(scene.adhesion, ADHESIONS, "adhesion", "law")
+        ),
         "hand": {} if scene.hand is None else _keys(scene.hand, "hand"),
         "solver": _keys(scene.solver, "solver"),
         "output": _keys(scene.output, "output"),

@@ -47,6 +47,8 @@ def rise(part: SubstepWork, target: Target) -> float:
     tissue = np.array([body.energy(old.u + s * way) for s in PLACES])
     springs = [float(0.5 * np.sum(part.compliance * state.contact_force**2)) for state in (old, new)]
     stored = tissue + springs[0] + (springs[1] - springs[0]) * PLACES**2
+    before, between, after = part.yielded
+    stored = stored + (1.0 - PLACES) ** 2 * before + (1.0 - PLACES) * PLACES * between + PLACES**2 * after
     carried = _carried(part, target)
     given = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
     given = given - float(np.sum(body.given_forces(new.u) * way))
@@ -71,14 +73,33 @@ def _pulled(part: SubstepWork, carried: Floats) -> Floats:
     attraction, old, new = part.model.attraction, part.old, part.new
     if attraction is None or not attraction.acts(new.voltage):
         return np.zeros_like(PLACES)
-    along = (new.u - old.u)[part.model.pad.nodes] - carried
+    along = part.way - carried
     begin = part.model.equilibrium.interface.resting(old) + carried
     begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
     with part.charges_held():
-        power = part.pulls(along, FINE, (new.voltage, new.voltage), begin)
+        exact = attraction.adhesive is not None and part.model.surface.is_flat
+        one = attraction.electric if exact else attraction
+        power = np.zeros_like(FINE)
+        if one is not None:
+            power = part.pulls(along, FINE, (new.voltage, new.voltage), begin, one)
     work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(FINE)))
+    if exact:
+        work = work + _adhered(part, begin)
     fringes = float(np.sum(new.attraction * along)) - float(power[-1]) if attraction.has_fringes else 0.0
     return np.interp(PLACES, FINE, work) + fringes * PLACES
+
+
+def _adhered(part: SubstepWork, begin: Floats) -> Floats:
+    """Work of adhesion up to `FINE` above a flat surface, by its potential: its reach may be short."""
+    assert part.model.attraction is not None
+    adhesive = part.model.attraction.adhesive
+    assert adhesive is not None
+    end = part.model.equilibrium.interface.resting(part.new)
+    ends = [surface_state(part.model.surface, place).gap for place in (begin, end)]
+    gaps = np.maximum(np.outer(1.0 - FINE, ends[0]) + np.outer(FINE, ends[1]), 0.0)
+    length = 0.5 * (adhesive.weights(begin) + adhesive.weights(end))
+    energy = np.asarray(adhesive.law.potential(gaps)) @ length
+    return np.asarray(energy[0] - energy)
 
 
 def _rubbed(part: SubstepWork) -> float:
@@ -96,7 +117,7 @@ def _lifted(part: SubstepWork) -> Floats:
     touching = old.touching & new.touching
     if model.surface.is_flat or not touching.any():
         return np.zeros_like(PLACES)
-    begin, end = (model.equilibrium.interface.positions(state.u)[touching] for state in (old, new))
+    begin, end = (model.equilibrium.interface.places(state)[touching] for state in (old, new))
     normal = new.contact_force[touching, 0]
     lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in PLACES]
     return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES

@@ -35,7 +35,7 @@ LAST_STATUS = 3
 #: name of what was found at the points of all probes after each step (S, P, K)
 PROBES = "probes"
 #: arrays whose size a run that has just been set up does not know
-OF_ANY_SIZE = ("candidates", "factor_pressure", PROBES)
+OF_ANY_SIZE = ("candidates", "factor_pressure", "came_off", PROBES)
 
 
 def state_arrays(state: State) -> dict[str, Any]:
@@ -48,7 +48,9 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     at, status = carried.tangent_point, state.status
     begun = np.zeros_like(state.u)
     at_rest = (begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status))
-    nowhere = TangentPoint(*at_rest, inner=state.inner, rates=state.rates)
+    nowhere = TangentPoint(
+        *at_rest, inner=state.inner, rates=state.rates, given=state.given, strain=state.strain
+    )
     made_at = {
         f"factor_{spec.name}": np.asarray(getattr(at or nowhere, spec.name)) for spec in fields(nowhere)
     }
@@ -72,6 +74,8 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
         "sums": np.array([ledger.sums[name] for name in SUMS]),
         "internal_forces": end.forces,
         "given_forces": end.given,
+        "pull": np.array(ledger.pull),
+        "came_off": ledger.came_off,
         "energies": np.array([end.stored, end.springs, end.kinetic]),
     }
 
@@ -80,7 +84,7 @@ def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
     """The ledger from the arrays of a checkpoint."""
     sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
     end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
-    return Ledger(model, sums, end)
+    return Ledger(model, sums, end, float(arrays["pull"]), came_off=arrays["came_off"])
 
 
 def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:
@@ -163,7 +167,7 @@ class Checkpoint:
         except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
             raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
         if version != evfem.__version__:
-            given = f"{self.path}, written by evfem {version[:40]!r}"
+            given = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
             raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
             raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")

@@ -26,6 +26,8 @@ DISSIPATED = 0.05
 GAINED = 0.01
 #: share of the energy of a run that is lost in one row where other states are stable too
 SNAPPED = 0.1
+#: strain to which an elastic surface is taken as linear
+STRAINED = 0.1
 #: pressure (MPa) that no fingertip bears: pressing on one begins to hurt at 0.3 to 0.6 MPa over a square
 #: centimetre (algometers), and the crests of its ridges carry twice the mean
 BORNE = 1.0
@@ -59,6 +61,13 @@ def through(model: Model, sunk: Floats) -> Iterator[str]:
         )
 
 
+def off(found: Floats, dim: int) -> Iterator[str]:
+    """Where adhesion let go of the finger: rows (k, 2) of the step and the pull."""
+    unit = "N" if dim == 3 else "N/mm"
+    for step, pull in found:
+        yield f"in step {int(step)} the finger came off: adhesion held it up to a pull of {pull:.3g} {unit}"
+
+
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
     """A sentence for everything that the rows of a scene's run say of their own worth."""
     told = (
@@ -68,6 +77,7 @@ def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
         _gained(rows),
         _snapped(rows),
         _climbed(rows),
+        _strained(scene, rows),
     )
     return [sentence for one in told for sentence in one] if rows else []
 
@@ -103,6 +113,20 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
         yield (
             f"the skin is pressed with up to {peak[worst]:.3g} MPa under its attraction "
             f"(step {rows[worst]['step']}), and no fingertip bears {BORNE:g} MPa"
+        )
+
+
+def _strained(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
+    """An elastic surface that is strained by more than a linear one is good for."""
+    layers = getattr(scene.ground.elastic, "layers", ())
+    if not layers:
+        return
+    soft, peak = min(layers, key=lambda one: one.E), _column(rows, "peak_contact_pressure")
+    strain, worst = float(peak.max()) * (1.0 - soft.nu**2) / soft.E, int(peak.argmax())
+    if strain > STRAINED:
+        yield (
+            f"the elastic surface is strained by about {strain:.0%} in step {rows[worst]['step']} (contact "
+            f"pressure over plane modulus): it is linear, which holds to about {STRAINED:.0%}"
         )
 
 

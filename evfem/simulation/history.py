@@ -64,6 +64,7 @@ class History:
     tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x", "shown"))
     electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards", "shown"))
     electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
+    adhesive_force: Floats = field(metadata=column("N/mm", "adhesion, downwards"))
     contact_width: Floats = field(
         metadata=column("mm", "from the first to the last edge of contact", "shown", whole="mm2")
     )
@@ -71,10 +72,14 @@ class History:
         metadata=column("mm", "sum of what touches, between edges", whole="mm2")
     )
     min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
+    surface_sink: Floats = field(
+        metadata=column("mm", "largest displacement of an elastic surface into it, 0 of a rigid one")
+    )
     peak_contact_pressure: Floats = field(metadata=column("MPa", "largest contact pressure of a node"))
     mean_contact_pressure: Floats = field(metadata=column("MPa", "pressing forces over what touches"))
     external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))
-    electrostatic_work: Floats = field(metadata=column("N", "done by the attraction"))
+    electrostatic_work: Floats = field(metadata=column("N", "done by the attraction of a voltage"))
+    adhesive_work: Floats = field(metadata=column("N", "done by adhesion"))
     stored_energy: Floats = field(metadata=column("N", "in the tissue, and in the springs of a penalty"))
     friction_dissipation: Floats = field(metadata=column("N", "by friction"))
     viscous_dissipation: Floats = field(metadata=column("N", "in the tissue"))

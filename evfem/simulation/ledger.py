@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
@@ -14,27 +14,50 @@ from evfem.newton.state import State
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, SubstepWork, tells_source, unloaded
+from evfem.simulation.works import Books, SubstepWork, tells_source
+from evfem.surface.adhesion import ON
 from evfem.surface.pad import Pad, reach, surface_state
+
+
+def unloaded(state: State) -> State:
+    """The state before the first part, without its voltage and what follows from it."""
+    attraction, reaction = np.zeros_like(state.attraction), np.zeros_like(state.reaction)
+    return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
 
 
 @dataclass
 class Ledger:
-    """Running sums of a run by the history's columns, and the books at the end of its last part."""
+    """Running sums of a run by the history's columns, and the books at the end of its last part; the `pull`
+    (N/mm) on a touching finger that adhesion holds, that at which it `let_go` in this step, 0 if it did not,
+    and rows (k, 2) of the steps and pulls at which it `came_off`.
+    """
 
     model: Model
     sums: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SUMS, 0.0))
     end: Books | None = None
+    pull: float = 0.0
+    let_go: float = 0.0
+    came_off: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
     def accept(self, old: State, new: State) -> bool:
         """Adds the works of one converged part; returns whether stability was lost in it."""
-        part = SubstepWork(self.model, old if self.end else unloaded(old), new)
+        part = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
+        self._watch(old, new)
         begin = self.end or Books.nothing(old.u.shape)
         self.end = part.end()
         works = part.works(begin, self.end)
         for name, work in works.items():
             self.sums[name] += work
         return works["snap_dissipation"] > 0.0
+
+    def _watch(self, old: State, new: State) -> None:
+        """Remember the pull at which a finger that adhesion holds comes off: that of the last equilibrium."""
+        if self.model.scene.adhesion is None:
+            return
+        if old.touching.any() and not new.touching.any() and self.pull > 0.0:
+            self.let_go, self.pull = self.pull, 0.0
+        elif new.touching.any() and self.model.body.drag_rate == 0.0:
+            self.pull = max(0.0, float(new.reaction[1]))
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
         """Present sums and energy balance."""
@@ -48,10 +71,13 @@ class Ledger:
         """The forces, widths and energies of a state; costs are added by the caller."""
         model, end = self.model, self.end
         assert end is not None
-        position = model.equilibrium.interface.positions(state.u)
+        if self.let_go:
+            self.came_off, self.let_go = np.vstack([self.came_off, [step, self.let_go]]), 0.0
+        position = model.equilibrium.interface.places(state)
         contact = model.equilibrium.interface.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
+        adhesion, kept = self._adhesion(state, withheld)
         real, extent = _extent(model, state, position, contact)
         pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
         return {
@@ -66,10 +92,12 @@ class Ledger:
             "applied_tangential_force": float(state.reaction[along] @ forward),
             "normal_force": float(contact[1] + withheld.sum()),
             "tangential_force": float(0.0 - contact[along] @ forward),
-            "electrostatic_force": float(withheld.sum() - attraction[1]),
-            "electrostatic_force_x": float(attraction[0]),
+            "electrostatic_force": float((withheld - kept).sum() - attraction[1] + adhesion[1]),
+            "electrostatic_force_x": float(attraction[0] - adhesion[0]),
+            "adhesive_force": float(kept.sum() - adhesion[1]),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
+            "surface_sink": max(0.0, float(state.given[:, 1].max(initial=0.0))),
             "peak_contact_pressure": float((pressing / shares(model, position)).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
@@ -77,6 +105,16 @@ class Ledger:
             "kinetic_energy": end.kinetic,
             "field_energy": self._field_energy(state),
         }
+
+    def _adhesion(self, state: State, withheld: Floats) -> tuple[Floats, Floats]:
+        """Adhesion on the whole pad (dim,), and its part (P,) of what cores withhold."""
+        model = self.model
+        if model.attraction is None or (adhesive := model.attraction.adhesive) is None:
+            return np.zeros(state.bone.size), np.zeros_like(withheld)
+        found = model.equilibrium.adhesion_at(state)
+        own, both = adhesive.restored(ON), model.attraction.restored(state.voltage)
+        share = 0.0 if own is None or both is None else own[0] / np.where(both[0] > 0.0, both[0], np.inf)
+        return model.equilibrium.interface.tilted(state, found).sum(axis=0), np.asarray(share * withheld)
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
         """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""
@@ -133,7 +171,7 @@ def _positive(share: Floats) -> Floats:
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
     size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
-    position, withheld = interface.positions(state.u), interface.withheld(state)
+    position, withheld = interface.places(state), interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
     pulled = share if model.attraction is None else _positive(model.attraction.weights(position))
@@ -154,6 +192,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
         shear_traction=on_pad(_shear(state) / share, 0.0),
         electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
+        surface_sink=on_pad(state.given[:, 1] if state.given.size else 0.0, 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),
         von_mises=_von_mises(stress),
         cauchy_stress=stress,

@@ -10,6 +10,7 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.common.arrays import Floats
+from evfem.contact.adhesive import WithAdhesion
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
 from evfem.electrostatics.laws import Layers
@@ -21,6 +22,7 @@ from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits
+from evfem.planning.adhesion import softened
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
@@ -85,6 +87,8 @@ def make_model(scene: Scene) -> Model:
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     closing = needed.closing
     attraction = make_attraction(closing, pad, surface) if needed.has("electricity") else None
+    if scene.adhesion is not None:
+        attraction = with_adhesion(closing, pad, surface, attraction)
     solver, laws = scene.solver, scene.finger.materials
     terms = [
         make_term(space, term.form, term.on.name, isinstance(term.on, Boundary), laws.get(term.on.name))
@@ -101,9 +105,12 @@ def make_model(scene: Scene) -> Model:
         deepest = max(0.0, *(course.indentation or 0.0 for course in scene.courses))
     limits = Limits(solver.tolerance, solver.strategy, solver.threads, deepest)
     interface = make_interface(scene, mesh, pad, surface)
-    if closing.core is not None and attraction is not None:
+    if interface.bed is not None and attraction is not None:
+        interface.bed.reach = np.inf
+    cored = closing.core is not None or scene.adhesion is not None
+    if cored and attraction is not None:
         interface.restored = attraction.restored
-    if closing.core is not None or not isinstance(scene.friction_law, Coulomb):
+    if cored or not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
     factorised = FactorisedBody(body, interface, attraction, limits)
     equilibrium = Equilibrium(factorised, interface, attraction, limits)
@@ -161,6 +168,13 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
 
     harmonics = tuple(Harmonic(*one) for one in electrics.permittivities)
     return DrivenFieldAttraction(*full, harmonics=harmonics)
+
+
+def with_adhesion(closing: Closing, pad: Any, surface: Any, attraction: Attraction | None) -> WithAdhesion:
+    """The attraction of the voltage, if there is one, and the scene's adhesion as the mesh resolves it."""
+    scene, rough = closing.scene, roughness_of(closing.scene.roughness_gap)
+    law = softened(closing)
+    return WithAdhesion.of(attraction, Attraction(law, None, pad, surface, scene.direction, roughness=rough))
 
 
 def _check_quadratic(scene: Scene) -> None:

@@ -56,7 +56,7 @@ class Frame:
     `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip. `cauchy_stress`
     holds xx, yy, zz, xy of the cell means, in three dimensions yz and xz too, where `shear_traction` is a
     magnitude; `J` is the volume ratio. Tractions are nodal forces over the current shares of the pad, of the
-    full field over those of its columns.
+    full field over those of its columns. `surface_sink` is how far an elastic surface has sunk below a node.
     """
 
     step: int
@@ -67,6 +67,7 @@ class Frame:
     contact_pressure: Floats = field(metadata={"shape": ("N",)})
     shear_traction: Floats = field(metadata={"shape": ("N",)})
     electrostatic_traction: Floats = field(metadata={"shape": ("N",)})
+    surface_sink: Floats = field(metadata={"shape": ("N",)})
     contact_status: Ints = field(metadata={"shape": ("N",)})
     von_mises: Floats = field(metadata={"shape": ("E",)})
     cauchy_stress: Floats = field(metadata={"shape": ("E", "stresses")})
@@ -82,10 +83,12 @@ _SHAPES: dict[str, tuple[str, ...]] = {
     spec.name: spec.metadata["shape"] for spec in fields(Frame) if spec.metadata
 }
 #: unit of a field that is not in MPa
-FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
+FIELD_UNITS = {"displacement": "mm", "gap": "mm", "surface_sink": "mm", "contact_status": "", "J": ""}
 #: size in a shape -> its name in a data set
 DIMENSIONS = {"N": "node", "E": "cell", "dim": "axis", "stresses": "stress"}
 POINT_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape == ("N",))
+#: fields of nodes that older versions did not write: they were 0
+LATER_FIELDS = ("surface_sink",)
 CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
 
@@ -418,7 +421,8 @@ class Saved:
 def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:
     if "frames/step" not in arrays:
         return []
-    columns = {spec.name: arrays[f"frames/{spec.name}"] for spec in fields(Frame)}
+    none = {f"frames/{name}": np.zeros_like(arrays["frames/gap"]) for name in LATER_FIELDS}
+    columns = {spec.name: (none | dict(arrays))[f"frames/{spec.name}"] for spec in fields(Frame)}
     size: dict[str, int] = {"N": len(mesh.points), "E": len(mesh.cells), "dim": mesh.dim}
     size["stresses"] = 6 if mesh.dim == 3 else 4
     count = len(columns["step"])

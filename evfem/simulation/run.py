@@ -50,7 +50,7 @@ from evfem.simulation.checkpoint import (
     state_of,
     usable,
 )
-from evfem.simulation.doubtful import advice, deepest, doubtful, outside, through, unheld
+from evfem.simulation.doubtful import advice, deepest, doubtful, off, outside, through, unheld
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
@@ -259,7 +259,8 @@ class Run:
         row = self.rows[rows_before - 1]
         start |= {name: row[name] for name in START if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
-        start["loose"] = float(row["normal_force"] <= least and row["electrostatic_force"] == 0.0)
+        pulled = row["electrostatic_force"] != 0.0 or row["adhesive_force"] != 0.0
+        start["loose"] = float(row["normal_force"] <= least and not pulled)
         return start if self.scene.hand is None else start | self._driven(rows_before)
 
     def _driven(self, rows_before: int) -> dict[str, float]:
@@ -408,7 +409,8 @@ class Run:
         about = provenance(self.scene, self.model.mesh, solver)
         if (core := self.model.closing.core) is not None:
             about["core"] = core.told
-        about["warnings"] = [*through(self.model, self.sunk), *doubtful(self.scene, self.rows)]
+        said = (*through(self.model, self.sunk), *off(self.ledger.came_off, self.model.mesh.dim))
+        about["warnings"] = [*said, *doubtful(self.scene, self.rows)]
         probes = None if self.probes is None else self.probes.histories(self.probed)
         return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes)
 
@@ -432,5 +434,4 @@ class Run:
         self.model.equilibrium.body.resume(self.state, reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
-        self.rows = list(saved.rows)
-        self.probed = list(arrays.get(PROBES, ()))
+        self.rows, self.probed = list(saved.rows), list(arrays.get(PROBES, ()))

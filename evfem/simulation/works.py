@@ -16,9 +16,10 @@ The history has
   turn: their shear force changes while they stick and stays while they slip;
 - ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
-- ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
-  with a hand that of its spring (and ``kinetic_energy``, ``viscous_dissipation`` and the work of the
-  drive have its mass and damper);
+  ``adhesive_work`` likewise;
+- ``stored_energy`` :math:`\psi` of the tissue, with penalties of the springs of the interface, of an elastic
+  surface (`evfem.contact.bed`), relative to which ways then are, and with a hand of its spring
+  (``kinetic_energy``, ``viscous_dissipation`` and the work of the drive have its mass and damper);
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
@@ -69,7 +70,7 @@ Under another law these columns are 0. Kaczmarek's is the work of a source with 
 eps_0 V ln[(g + D)/(g + s)]/(D - s), but leaves a closed gap a voltage across no thickness: with a leak no
 displacement is both that of the law and that of layers that conduct.
 
-The first part begins without any load: voltage and user's forms count as raised within it.
+The first part begins without any load: voltage, adhesion and user's forms count as raised within it.
 """
 
 from __future__ import annotations
@@ -83,45 +84,20 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.quadrature import ENDS, FINE_SHARE, FINE_WAY, LEGENDRE, PART, SEEN, SHARE, SLIDE, WAY
+from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging, Flow
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
 from evfem.simulation.history import SUMS
 from evfem.simulation.model import Model
+from evfem.surface.adhesion import ON
 
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5
 #: share of the work of the internal forces, all counted positive, that is the solver's tolerance
 NOISE = 1e-7
-
-
-def _gauss(points: int) -> tuple[Floats, Floats]:
-    """Places and weights on (0, 1)."""
-    x, weight = np.polynomial.legendre.leggauss(points)
-    return 0.5 + 0.5 * x, 0.5 * weight
-
-
-def _along(ends: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Places and weights (with their derivative), eight between `ends`, dense where attraction changes."""
-    at, weight = _gauss(8)
-    begin, length = np.array(ends[:-1])[:, None], np.diff(ends)[:, None]
-    at, weight = (begin + length * at).ravel(), (length * weight).ravel()
-    return at**2 * (3.0 - 2.0 * at), 6.0 * at * (1.0 - at) * weight
-
-
-#: where the attraction is taken on the way, and where it is if that does not resolve it: the layers below a
-#: thin insulator's nodes are thinner than their ways by orders
-WAY, SHARE = _along((0.0, 1.0))
-FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, *np.linspace(1 / 8, 7 / 8, 7), 15 / 16, 63 / 64, 1.0))
-#: an integrand is resolved if its highest Legendre coefficients are below this fraction of the largest
-SEEN = 1e-3
-#: its two ends
-ENDS = np.array([0.0, 1.0])
-#: Legendre coefficients (8,) over the way from the values at the places `WAY`
-_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * WAY - 1.0, WAY.size - 1))
-#: and where the friction coefficient is
-SLIDE, PART = _gauss(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,26 +125,21 @@ def tells_source(model: Model) -> bool:
     return bool(getattr(attraction.law, "of_a_field", False))
 
 
-def unloaded(state: State) -> State:
-    """The state before the first part, without its voltage and what follows from it."""
-    attraction, reaction = np.zeros_like(state.attraction), np.zeros_like(state.reaction)
-    return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
-
-
 @dataclass(frozen=True, eq=False)
 class SubstepWork:
-    """One accepted part of a run of `model`, from `old` to `new`."""
+    """One accepted part of a run of `model`, from `old` to `new`; the `first` begins without any load."""
 
     model: Model
     old: State
     new: State
+    first: bool = False
 
     def end(self) -> Books:
         """Energies at the end of the part, its loads held."""
         body, new = self.model.body, self.new
         given = body.given_forces(new.u)
         kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
-        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2))
+        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2) + self.yielded[-1])
         if (hand := self.model.scene.hand) is not None:
             springs, kinetic = springs + hand.stored(new), kinetic + hand.kinetic(new)
         stored = body.energy(new.u) + (0.0 if body.dynamics is None else body.dynamics.branch_energy(new.u))
@@ -181,12 +152,13 @@ class SubstepWork:
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
         given -= _mean_work(begin.given, end.given, moved)
         given += (turned := self._turned())
-        pulled, friction = self.electrostatic(), self.friction()
+        (electrostatic, adhesive), friction = self.pulled(), self.friction()
+        pulled = electrostatic + adhesive
         viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
         lost = _mean_work(begin.forces, end.forces, moved) - viscous
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
         lost -= self._contact() + friction
-        lost += turned + pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        lost += turned + pulled - _mean_work(old.attraction, new.attraction, self.way) + self._sunk()
         if (hand := self.model.scene.hand) is not None:
             more, damped = hand.given(old, new), hand.dissipation(old, new, self._seconds)
             given, viscous, lost = given + more, viscous + damped, lost + more - damped
@@ -198,7 +170,7 @@ class SubstepWork:
         if tells_source(self.model):
             flow, stretched = self._flow(), self._stretching()
         source = (flow.source_work, flow.leakage, stretched)
-        added = (given, pulled, friction, viscous, *snapped, *source)
+        added = (given, electrostatic, adhesive, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
 
     def _turned(self) -> float:
@@ -211,36 +183,56 @@ class SubstepWork:
         begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > 0.0))
         return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
 
-    def electrostatic(self) -> float:
-        """Work of the attraction W_e, N mm per mm of depth."""
-        model, old, new = self.model, self.old, self.new
-        moved = (new.u - old.u)[model.pad.nodes]
-        trapezoidal = _mean_work(old.attraction, new.attraction, moved)
-        if model.attraction is not None and model.attraction.charging is not None:
-            return self._work_of_charged(model.attraction.charging, moved)
-        if model.attraction is None or (old.voltage == 0.0 and new.voltage == 0.0):
+    def pulled(self) -> tuple[float, float]:
+        """Works of the attraction by a voltage W_e and of adhesion, N mm per mm of depth."""
+        attraction, states = self.model.attraction, (self.old, self.new)
+        equilibrium = self.model.equilibrium
+        untilted = equilibrium.interface.untilted
+        before, after = (untilted(state, state.attraction) for state in states)
+        if attraction is None:
+            return 0.0, 0.0
+        voltages = (self.old.voltage, self.new.voltage)
+        if (adhesive := attraction.adhesive) is None:
+            return self._work_of(attraction, before, after, voltages), 0.0
+        on = (0.0 if self.first else ON, ON)
+        held, holds = (equilibrium.adhesion_at(*each) for each in zip(states, on, strict=True))
+        work = self._work_of(adhesive, held, holds, on)
+        if attraction.electric is None:
+            return 0.0, work
+        return self._work_of(attraction.electric, before - held, after - holds, voltages), work
+
+    def _work_of(
+        self, attraction: Attraction, before: Floats, after: Floats, voltages: tuple[float, float]
+    ) -> float:
+        """Work of an attraction by its forces (P, dim) and voltages at both ends."""
+        model, old, new, moved = self.model, self.old, self.new, self.way
+        trapezoidal = _mean_work(before, after, moved)
+        if attraction.charging is not None:
+            return self._work_of_charged(attraction.charging, moved)
+        if not any(voltages):
             return trapezoidal
-        if model.attraction.has_energy:
+        if attraction.has_energy:
             begin, end = (model.equilibrium.interface.resting(state) for state in (old, new))
-            own: Any = model.attraction
-            return trapezoidal + own.beyond_trapezoidal(begin, end, (old.voltage, new.voltage))
+            own: Any = attraction
+            return trapezoidal + own.beyond_trapezoidal(begin, end, voltages)
         open_ = ~(old.touching | new.touching)
         # trapezoidal only on the way with the bone, and only where that is not stopped by the surface
         along = moved - np.where(open_[:, None], new.bone - old.bone, 0.0)
-        if not (along[:, 1].any() or model.attraction.direction == "normal"):
+        if not (along[:, 1].any() or attraction.direction == "normal"):
             return trapezoidal
-        voltages = (old.voltage, new.voltage)
-        ends = _mean_work(old.attraction, new.attraction, along)
-        if model.attraction.has_fringes:
+        ends = _mean_work(before, after, along)
+        if attraction.has_fringes:
             ends = float(np.mean(self.pulls(along, ENDS, voltages)))
-        return trapezoidal + self._on_the_way(along, voltages) - ends
+        return trapezoidal + self._on_the_way(along, voltages, attraction) - ends
 
-    def _on_the_way(self, along: Floats, voltages: tuple[float, float]) -> float:
-        """Work of the attraction along `along` (P, dim) of the straight way between two voltages."""
-        values = self.pulls(along, WAY, voltages)
-        size = np.abs(_LEGENDRE @ values)
+    def _on_the_way(
+        self, along: Floats, voltages: tuple[float, float], attraction: Attraction | None = None
+    ) -> float:
+        """Work of an attraction along `along` (P, dim) of the straight way between two voltages."""
+        values = self.pulls(along, WAY, voltages, attraction=attraction)
+        size = np.abs(LEGENDRE @ values)
         if size[-2:].max() > SEEN * size.max():
-            return float(FINE_SHARE @ self.pulls(along, FINE_WAY, voltages))
+            return float(FINE_SHARE @ self.pulls(along, FINE_WAY, voltages, attraction=attraction))
         return float(SHARE @ values)
 
     def _work_of_charged(self, charging: Charging, moved: Floats) -> float:
@@ -296,13 +288,18 @@ class SubstepWork:
         return work
 
     def pulls(
-        self, along: Floats, ways: Floats, voltages: tuple[float, float], begin: Floats | None = None
+        self,
+        along: Floats,
+        ways: Floats,
+        voltages: tuple[float, float],
+        begin: Floats | None = None,
+        attraction: Attraction | None = None,
     ) -> Floats:
-        """Attraction, where there are fringes that of the columns, times the way `along` (P, dim) at the
-        parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
-        growing evenly: (w,) in N mm per mm of depth.
+        """Power of all attraction, or of one, in N mm per mm of depth (w,), on the way `along` (P, dim) at
+        the parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
+        growing evenly; of what has fringes that of the columns.
         """
-        attraction, old, new = self.model.attraction, self.old, self.new
+        attraction, old, new = attraction or self.model.attraction, self.old, self.new
         assert attraction is not None
         begin = self.model.equilibrium.interface.resting(old) if begin is None else begin
         end = self.model.equilibrium.interface.resting(new)
@@ -325,7 +322,13 @@ class SubstepWork:
         part, places = (self.old, self.new), begin + way[..., None] * (end - begin)
         resists = self.model.equilibrium.interface.resistance
         limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
-        return float(PART @ np.sum(limit * length, axis=1))
+        return float(PART @ np.sum(limit * self._stretched(length), axis=1))
+
+    def _stretched(self, length: Floats) -> Floats:
+        """Ways (P,) along an elastic surface, as long as it is stretched."""
+        if not self.new.strain.size:
+            return length
+        return np.asarray(length * (1.0 - 0.5 * (self.old.strain + self.new.strain)[:, 0]))
 
     @property
     def _seconds(self) -> float:
@@ -335,8 +338,36 @@ class SubstepWork:
     @cached_property
     def places(self) -> tuple[Floats, Floats]:
         """x[, z] of the pad nodes (P, d) before and after."""
-        begin, end = (self.model.equilibrium.interface.places(state) for state in (self.old, self.new))
+        begin, end = (self.model.equilibrium.interface.on_display(state) for state in (self.old, self.new))
         return begin, end
+
+    @cached_property
+    def way(self) -> Floats:
+        """How far the pad's nodes have moved relative to the surface (P, dim) in mm."""
+        moved = (self.new.u - self.old.u)[self.model.pad.nodes]
+        return moved if not self.new.given.size else moved + self.new.given - self.old.given
+
+    @cached_property
+    def yielded(self) -> Floats:
+        """Energy of an elastic surface before, between (forces of one end, places of the other) and after."""
+        (old, new), forces = (self.old, self.new), self._on_surface
+        if not new.given.size:
+            return np.zeros(3)
+        found = [[0.5 * float(np.sum(force * state.given)) for state in (old, new)] for force in forces]
+        return np.array([found[0][0], found[0][1] + found[1][0], found[1][1]])
+
+    @property
+    def _on_surface(self) -> tuple[Floats, Floats]:
+        """Forces between finger and surface (P, dim) before and after."""
+        contact = self.model.equilibrium.interface.contact_forces
+        before, after = (contact(state) + state.attraction for state in (self.old, self.new))
+        return before, after
+
+    def _sunk(self) -> float:
+        """Trapezoidal work of the forces on what an elastic surface gives way by."""
+        if not self.new.given.size:
+            return 0.0
+        return _mean_work(*self._on_surface, self.new.given - self.old.given)
 
     @cached_property
     def compliance(self) -> Floats:
@@ -372,7 +403,7 @@ class SubstepWork:
         """Trapezoidal work of the contact forces, N mm per mm of depth."""
         equilibrium = self.model.equilibrium
         before, after = (equilibrium.interface.contact_forces(state) for state in (self.old, self.new))
-        return _mean_work(before, after, (self.new.u - self.old.u)[self.model.pad.nodes])
+        return _mean_work(before, after, self.way)
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
         """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
@@ -397,7 +428,7 @@ class SubstepWork:
         if model.attraction is not None:
             at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
             work += float(np.sum((at[1] - at[0]) * along))
-        less = self._coefficient(model.equilibrium.interface.places(carried))
+        less = self._coefficient(model.equilibrium.interface.on_display(carried))
         less = less - self._coefficient(self.places[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 

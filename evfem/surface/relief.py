@@ -23,6 +23,7 @@ from evfem.surface.surfaces import (
     HIGHEST,
     NEAREST,
     Friction,
+    GivesWay,
     Insulator,
     RigidSurface,
     Shift,
@@ -56,6 +57,7 @@ class Relief(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
 
     def __init__(
         self,
@@ -65,9 +67,9 @@ class Relief(RigidSurface):
         friction: Any = 0.3,
         y: float | None = None,
         insulator: Any = None,
-        **others: Any,
+        elastic: Any = None,
     ) -> None:
-        set_frozen(self, friction=friction, y=y, insulator=insulator, **others)
+        set_frozen(self, friction=friction, y=y, insulator=insulator, elastic=elastic)
         super().__post_init__()
         for name, given in (("x", x), ("z", z)):
             grid = numbers(f"surface.{name}", given, HEIGHTS)

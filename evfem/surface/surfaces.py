@@ -1,10 +1,11 @@
-"""Rigid counter-surfaces: height, slope and curvature of the outline, friction coefficient, insulator.
+"""Counter-surfaces, rigid or elastic: height, slope and curvature of the outline, friction, insulator.
 
 A surface is a function height(x) in mm; the finger is above it. The methods give the UNSHIFTED
 profile: the scene adds `y` (mm), and where `y` is None chooses it so that the smallest vertical
 gap of the undeformed finger is 0. `friction` is a number, or a table [[x, mu], ...]: linear
 between its rows, constant beyond them; at a repeated x the later row holds from that x on.
-`insulator` is the layer between the surface and the electrode under it (None: no electrode). x may
+`insulator` is the layer between the surface and the electrode under it (None: no electrode).
+`elastic` says how the surface gives way (`evfem.surface.elastic`; None: it is rigid). x may
 be any array, real or complex (for `tensor.complex_step`); the results have its shape.
 
 On a finger in three dimensions a surface is the same across the direction of its `angle`, and x above is
@@ -28,6 +29,8 @@ from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read
 from evfem.common.views import changed
 from evfem.electrostatics.laws import FILM, Layer
 from evfem.errors import InputError, quoted
+from evfem.protocols import Elastic
+from evfem.surface.elastic import ELASTIC, elastic_of
 from evfem.surface.ways import ANGLE, FrictionMap, OneWay, Steps, direction
 from evfem.tensor import Array
 
@@ -66,14 +69,16 @@ Shift = Annotated[
     "shift of the profile; without it the finger just touches at the start",
 ]
 Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None", Layer, type(None))]
+GivesWay = Annotated[Elastic | None, {"check": lambda key, given: elastic_of(given, key), "allowed": ELASTIC}]
 
 
 class RigidSurface(OneWay, Checked):
-    """Base of surfaces; subclasses are frozen dataclasses with the fields `friction`, `y`, `insulator`."""
+    """Base of surfaces; subclasses are frozen dataclasses with these fields."""
 
     friction: float | Rows | FrictionMap
     y: float | None
     insulator: Layer | None
+    elastic: Elastic | None
     is_flat = False
     _table = "surface."
 
@@ -212,6 +217,7 @@ class Flat(_Level):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
 
 
 @dataclass(frozen=True)
@@ -230,6 +236,7 @@ class Display(_Level):
     friction: Friction = 0.3
     y: Shift = None
     electrodes: Rows | None = None
+    elastic: GivesWay = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -264,6 +271,7 @@ class Sinusoid(RigidSurface):
     ] = None
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
     angle: Angle = 0.0
 
     def __post_init__(self) -> None:
@@ -312,6 +320,7 @@ class Profile(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
     angle: Angle = 0.0
 
     def __init__(
@@ -321,9 +330,10 @@ class Profile(RigidSurface):
         friction: Any = 0.3,
         y: float | None = None,
         insulator: Layer | None = None,
-        **others: Any,
+        elastic: Elastic | None = None,
+        angle: float = 0.0,
     ) -> None:
-        set_frozen(self, friction=friction, y=y, insulator=insulator, **others)
+        set_frozen(self, friction=friction, y=y, insulator=insulator, elastic=elastic, angle=angle)
         super().__post_init__()
         set_frozen(self, x=numbers("surface.x", x, "a list of positions in mm"))
         set_frozen(self, samples=numbers("surface.height", height, "a list of heights in mm"))
@@ -336,11 +346,12 @@ class Profile(RigidSurface):
         friction: Any = 0.3,
         y: float | None = None,
         insulator: Layer | None = None,
-        **others: Any,
+        elastic: Elastic | None = None,
+        angle: float = 0.0,
     ) -> Profile:
         """The profile in a file with the header `x,height` and one point (mm) in each further line."""
         x, height = read_columns(Path(path), ["x", "height"], "surface.file")
-        return cls(x, height, friction, y, insulator, **others)
+        return cls(x, height, friction, y, insulator, elastic, angle)
 
     def __repr__(self) -> str:
         x, low, high = self.x, self.samples.min(), self.samples.max()

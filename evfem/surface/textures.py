@@ -35,6 +35,7 @@ from evfem.surface.surfaces import (
     Angle,
     Flat,
     Friction,
+    GivesWay,
     Insulator,
     Profile,
     RigidSurface,
@@ -87,6 +88,7 @@ class Grating(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
     angle: Angle = 0.0
 
     def __post_init__(self) -> None:
@@ -155,6 +157,7 @@ class SelfAffine(RigidSurface):
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None
+    elastic: GivesWay = None
     angle: Angle = 0.0
 
     def __post_init__(self) -> None:

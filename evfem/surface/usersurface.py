@@ -41,9 +41,8 @@ def completed(surface: Surface) -> CompleteSurface:
             "a surface of evfem, for instance Flat, Display or Grating, or an object with a method height(x)"
         )
         raise InputError("surface", quoted(surface), allowed)
-    plain = Flat(
-        getattr(surface, "friction", 0.0), getattr(surface, "y", None), getattr(surface, "insulator", None)
-    )
+    keys = ("friction", "y", "insulator", "elastic")
+    plain = Flat(**{"friction": 0.0} | {key: getattr(surface, key) for key in keys if hasattr(surface, key)})
     return OwnSurface(surface, plain, plain.y)
 
 
@@ -65,6 +64,11 @@ class OwnSurface(OneWay):
     def insulator(self) -> Any:
         """Layer over the electrode, or None."""
         return self.plain.insulator
+
+    @property
+    def elastic(self) -> Any:
+        """How the surface gives way, or None."""
+        return self.plain.elastic
 
     @property
     def friction(self) -> Any:

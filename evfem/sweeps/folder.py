@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import evfem
 from evfem.common.manifest import Manifest
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.common.tables import csv_text
@@ -99,17 +100,22 @@ class SweepFolder:
     def _refuse_another(self, keys: Collection[str], plan: str, points: Sequence[Path]) -> None:
         """InputError where the folder has points of another sweep; one that grew is no other."""
         others = sum(file.stem not in keys for file in points)
-        if others and self._last() != plan:
-            given = f"{self.path}, with {others} points of another sweep or version"
+        last, version = self._last()
+        if others and last != plan:
+            other = "another sweep"
+            if version not in (None, evfem.__version__):
+                other = f"evfem {version!r}, not of {evfem.__version__!r}"
+            given = f"{self.path}, with {others} points of {other}"
             raise InputError(
                 "--out", given, "another folder, --resume to keep them, --overwrite to remove them"
             )
 
-    def _last(self) -> str | None:
-        """Fingerprint of the sweep that was started last in the folder."""
+    def _last(self) -> tuple[str | None, str | None]:
+        """Fingerprint of the sweep that was started last in the folder, and the version that did."""
         with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
-            return json.loads((self.path / PROVENANCE).read_text(encoding="utf-8"))["digest"]
-        return None
+            told = json.loads((self.path / PROVENANCE).read_text(encoding="utf-8"))
+            return told["digest"], str(told["versions"]["evfem"])[:40]
+        return None, None
 
     def write(self, key: str, answer: Answer) -> None:
         """Keep a point, in one step."""

@@ -115,6 +115,7 @@ def test_lines_have_markers_of_their_own_and_axes_may_be_logarithmic():
     ax = sweep(table(GRID), GAP, OUT, by=LAW, log="xy")
     assert [line.get_marker() for line in ax.get_lines()] == ["o", "s"]
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["0.1", "0.3", "0.5"]
     assert sweep(table(GRID), GAP, OUT, log="y").get_xscale() == "linear"
     for rows, log, rule in (
         (GRID, "z", '"", "x", "y" or "xy"'),

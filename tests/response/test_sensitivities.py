@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import evfem as ev
+from evfem.response.parameters import parameter_of
 
 TISSUE = "finger.materials.tissue."
 THICKNESS = "electrostatics.insulator_thickness"
@@ -174,58 +175,106 @@ def differenced(scene, apply, value, step, columns=FORCES):
     return sum(w * np.array([run[name] for name in columns]) for w, run in zip(weights, runs, strict=True))
 
 
+def changed(scene, key, value):
+    """The scene with another number."""
+    one = parameter_of(scene, key)
+    return one.applied(scene, value - one.value)
+
+
+def soft(**finger):
+    """The block without viscosity but with what relaxes otherwise."""
+    scene = block()
+    return replace(scene, finger=replace(scene.finger, viscosity=0.0, **finger))
+
+
+def solid():
+    """A finger in three dimensions, slid obliquely and back."""
+    x, y, z = (np.linspace(*ends) for ends in ((-2.0, 2.0, 5), (0.0, 1.0, 4), (-2.0, 2.0, 4)))
+    ids = np.arange(80).reshape(5, 4, 4)
+    points = []
+    for a in x:
+        for b in y:
+            for c in z:
+                low = (a**2 + 0.8 * c**2) / 12
+                points.append([a, low + (2.0 - low) * b, c])
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    cells = [
+        [ids[i + a, j + b, k + c] for a, b, c in corners]
+        for i in range(4)
+        for j in range(3)
+        for k in range(3)
+    ]
+    sets = {"pad": ids[:, 0].ravel(), "bone": ids[:, -1].ravel()}
+    mesh = ev.Mesh(np.array(points), np.array(cells), "hexahedron", np.zeros(36, int), {"tissue": 0}, sets)
+    skin = ev.Electrical(stratum_corneum_thickness=0.3)
+    finger = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(E=0.05, nu=0.45)}, electrical=skin)
+    slides = (
+        ev.Slide(0.5, steps=3, angle=30.0, hold="force"),
+        ev.Slide(-0.2, steps=1, angle=30.0, hold="force"),
+    )
+    motion = (ev.Press(indentation=0.25, steps=2), *slides)
+    solver = ev.Solver(tolerance=1e-12, core="off")
+    surface = ev.Display(ev.Layer(0.01, 3.0), friction=0.3, y=0.0)
+    return ev.Scene(finger, surface, ev.StrongTroxel(), 100.0, motion, solver=solver)
+
+
+LAYERED = {"insulator": ev.Layer(0.01, 3.0)}
+ROUGH = ev.PowerRoughness(gap=0.002, pressure=0.01, exponent=0.3, open_gap=0.004)
 CASES = {
-    "own law": (
-        block(law=Own(0.017, 0.1)),
-        TISSUE + "bulk",
-        lambda s, v: block(law=Own(0.017, v)),
-        0.1,
-    ),
-    "indentation": (
-        block(),
-        "motion.0.indentation",
-        lambda s, v: replace(s, motion=(replace(s.motion[0], indentation=v), *s.motion[1:])),
-        0.3,
-    ),
-    "distance": (
-        block(),
-        "motion.1.distance",
-        lambda s, v: replace(s, motion=(s.motion[0], replace(s.motion[1], distance=v), *s.motion[2:])),
-        0.8,
-    ),
+    "own law": (lambda: block(law=Own(0.017, 0.1)), TISSUE + "bulk"),
+    "indentation": (block, "motion.0.indentation"),
+    "distance": (block, "motion.1.distance"),
     "table of friction": (
-        block(surface=ev.Display(ev.Layer(0.01, 3.0), friction=[[-9.0, 0.2], [9.0, 0.4]], y=0.0)),
+        lambda: block(surface=ev.Display(ev.Layer(0.01, 3.0), friction=[[-9.0, 0.2], [9.0, 0.4]], y=0.0)),
         "surface.friction.1.1",
-        lambda s, v: replace(s, surface=replace(s.surface, friction=[[-9.0, 0.2], [9.0, v]])),
-        0.4,
     ),
-    "core": (
-        block(solver=replace(block().solver, core="auto")),
-        THICKNESS,
-        lambda s, v: replace(s, surface=replace(s.surface, insulator=ev.Layer(v, 3.0))),
-        0.01,
-    ),
+    "core": (lambda: block(solver=replace(block().solver, core="auto")), THICKNESS),
     "profile of voltages": (
-        block(voltage=ev.VoltageProfile([0.0, 0.4, 0.8], [100.0, 150.0, 80.0])),
+        lambda: block(voltage=ev.VoltageProfile([0.0, 0.4, 0.8], [100.0, 150.0, 80.0])),
         "electrostatics.voltage_profile.1.1",
-        lambda s, v: replace(s, voltage=ev.VoltageProfile([0.0, 0.4, 0.8], [100.0, v, 80.0])),
-        150.0,
     ),
+    "branch": (lambda: soft(relaxation=((0.3, 0.1), (0.2, 0.01))), "finger.relaxation.0.1"),
+    "bulk": (lambda: soft(relaxation=((0.3, 0.1),), bulk_relaxation=True), TISSUE + "nu"),
+    "hand": (lambda: block(hand=ev.Hand(stiffness=0.02, damping=1e-3)), "hand.stiffness"),
+    "charges": (lambda: block(drive=ev.Drive(resolved=True, gap_conductivity=1e-9)), TISSUE + "E"),
+    "rough faces": (lambda: block(roughness_gap=ROUGH), "electrostatics.roughness_gap.gap"),
+    "penalty": (
+        lambda: block(
+            solver=replace(block().solver, contact="penalty", penalty_normal=10.0, penalty_tangential=10.0)
+        ),
+        "surface.friction",
+    ),
+    "rate": (lambda: block(friction_law=ev.RateFriction(speed=1.0, ratio=0.7)), "surface.friction_law.ratio"),
+    "ageing": (lambda: block(friction_law=ev.AgeingFriction(0.5, 0.3)), "surface.friction_law.time"),
+    "sines": (
+        lambda: block(surface=ev.Sinusoid(terms=[[0.05, 0.5, 0.3]], **LAYERED)),
+        "surface.terms.0.0",
+    ),
+    "normal": (lambda: block(direction="normal"), "electrostatics.voltage"),
+    "inertia": (lambda: block(solver=replace(block().solver, dynamics="inertial")), TISSUE + "E"),
+    "jump of friction": (
+        lambda: block(
+            surface=ev.Display(ev.Layer(0.01, 3.0), [[-9.0, 0.2], [0.3, 0.2], [0.3, 0.5], [9.0, 0.5]], 0.0)
+        ),
+        "surface.friction.2.1",
+    ),
+    "solid": (solid, "surface.friction"),
 }
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_are_those_of_differences_of_runs(case):
-    scene, key, apply, value = CASES[case]
-    found = ev.sensitivities(scene, key)
-    size = 2e-4 * value
-    runs = differenced(scene, apply, value, size)
-    there = found.valid_to[key] > 4 * size
-    holds = np.cumprod(there).astype(bool)
-    assert holds[5]
-    for name, row in zip(FORCES, runs, strict=True):
-        scale = np.abs(row).max()
-        assert found[name, key][holds] == pytest.approx(row[holds], rel=1e-6, abs=1e-8 * scale)
+    make, key = CASES[case]
+    scene, columns = make(), (*FORCES, "electrostatic_force", "friction_dissipation")
+    found = ev.sensitivities(scene, key, columns)
+    value = found.parameters[key]
+    size = 2e-4 * min(value, 0.5 - value if key.endswith("nu") else value)
+    runs = differenced(scene, lambda s, v: changed(s, key, v), value, size, columns)
+    holds = np.cumprod(found.valid_to[key] > 4 * size).astype(bool)
+    assert holds[:5].all()
+    for name, row in zip(columns, runs, strict=True):
+        scale = max(np.abs(row).max(), 1e-3 * np.abs(found.result[name]).max() / value)
+        assert found[name, key][holds] == pytest.approx(row[holds], rel=1e-6, abs=1e-6 * scale)
 
 
 @pytest.mark.parametrize(
@@ -242,3 +291,19 @@ def test_derivatives_are_those_of_differences_of_runs(case):
 def test_what_is_no_parameter_is_refused_in_a_sentence(key, said):
     with pytest.raises(ev.InputError, match=said.replace("(", r"\(").replace(")", r"\)")):
         ev.sensitivities(block(), [key])
+
+
+@pytest.mark.parametrize("hold", ["indentation", "force"])
+def test_the_ridged_finger_is_homogeneous_in_all_its_moduli_and_the_squared_voltage(hold):
+    """Ridges, five layers, a core of the attraction, partial slip."""
+    pad = ev.FingerPad(resolution="coarse")
+    motion = (ev.Press(indentation=0.2, steps=2), ev.Slide(0.1, steps=2, hold=hold))
+    scene = ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 500.0, motion, solver=ev.Solver(tolerance=1e-11))
+    keys = [f"finger.materials.{name}.E" for name in pad.materials]
+    columns = ["normal_force", "tangential_force", "electrostatic_force", "applied_force"]
+    found = ev.sensitivities(scene, [*keys, "electrostatics.voltage"], columns)
+    for name in columns:
+        total = sum(found.parameters[key] * found[name, key] for key in keys)
+        total += 250.0 * found[name, "electrostatics.voltage"]
+        value = found.result[name]
+        assert total == pytest.approx(value, abs=1e-9 * np.abs(value).max())

@@ -5,6 +5,7 @@ Dask.
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -165,10 +166,15 @@ def test_points_of_another_sweep_are_kept_unless_told_otherwise(plan, tmp_path, 
     plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.1, 0.15]\n"))
     assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1"]) == 2
     assert capsys.readouterr().err == (
-        f"evfem: --out: given {out}, with 2 points of another sweep or version; "
+        f"evfem: --out: given {out}, with 2 points of another sweep; "
         "allowed: another folder, --resume to keep them, --overwrite to remove them\n"
     )
     assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
+    now = ev.__version__
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ev, "__version__", "9.9.9")
+        with pytest.raises(InputError, match=rf"points of evfem '{re.escape(now)}', not of '9\.9\.9';"):
+            ev.sweep(plan, out, workers=1)
     with pytest.raises(InputError, match="resume and overwrite"):
         ev.sweep(plan, out, workers=1, resume=True, overwrite=True)
     # told to keep them, the folder has both, and the one started last goes on by itself

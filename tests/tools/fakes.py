@@ -54,6 +54,7 @@ def fake_frame(mesh, step):
         contact_pressure=pressure,
         shear_traction=0.3 * pressure,
         electrostatic_traction=np.where(pad, 1e-3, 0.0),
+        surface_sink=np.zeros(len(mesh.points)),
         contact_status=np.where(pad & (np.abs(x) < 0.9), 2, 0),
         von_mises=values,
         cauchy_stress=np.outer(values, [1.0, 2.0, 3.0, 4.0]),

@@ -1,0 +1,89 @@
+"""Attraction by a voltage and by adhesion together: the sum of both, each of its own law.
+
+The solver sees one attraction. Adhesion is always on: its law takes the strength `ON` in the place of a
+voltage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.contact.attraction import Attraction
+from evfem.surface.adhesion import ON
+
+
+@dataclass(frozen=True, eq=False)
+class WithAdhesion(Attraction):
+    """The attraction `of_voltage` (None: none) and that `of_adhesion`; law and charges are the voltage's."""
+
+    of_voltage: Attraction | None = None
+    of_adhesion: Attraction | None = None
+
+    @classmethod
+    def of(cls, electric: Attraction | None, adhesive: Attraction) -> WithAdhesion:
+        """Both, on the same pad."""
+        a, law, layers, charging = adhesive, None, None, None
+        if electric is not None:
+            law, layers, charging = electric.law, electric.layers, electric.charging
+        common = (a.pad, a.surface, a.direction, True, a.roughness)
+        return cls(law, layers, *common, charging, electric, adhesive)
+
+    @property
+    def electric(self) -> Attraction | None:
+        """That of the voltage, None without one."""
+        return self.of_voltage
+
+    @property
+    def adhesive(self) -> Attraction | None:
+        """That of adhesion."""
+        return self.of_adhesion
+
+    def acts(self, voltage: float) -> bool:
+        """Always."""
+        return True
+
+    def _parts(self, voltage: float) -> Iterator[tuple[Attraction, float]]:
+        """What attracts at a voltage (V), and the voltage that it takes."""
+        if self.of_voltage is not None and self.of_voltage.acts(voltage):
+            yield self.of_voltage, voltage
+        assert self.of_adhesion is not None
+        yield self.of_adhesion, ON
+
+    def forces_along(
+        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        assert self.of_adhesion is not None
+        on = np.full(voltages.shape, ON)
+        found = self.of_adhesion.forces_along(positions, on, touching, pressing)
+        if self.of_voltage is None:
+            return found
+        return found + self.of_voltage.forces_along(positions, voltages, touching, pressing)
+
+    def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
+        found = [one for part, at in self._parts(voltage) if (one := part.restored(at)) is not None]
+        if not found:
+            return None
+        withheld, left = np.sum(found, axis=0)
+        return withheld, left
+
+    def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
+        each = (part.gain_on_pressing(position, at, touching, pressing) for part, at in self._parts(voltage))
+        return np.asarray(sum(each))
+
+    def negative_stiffness(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        each = (
+            part.negative_stiffness(position, at, touching, pressing) for part, at in self._parts(voltage)
+        )
+        return np.asarray(sum(each))
+
+    def stiffness(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Any:
+        return sum(part.stiffness(position, at, touching, pressing) for part, at in self._parts(voltage))

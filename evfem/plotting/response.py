@@ -1,0 +1,56 @@
+"""Which parameters a number of a run depends on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from evfem.errors import InputError
+from evfem.plotting.figures import BLUE, VERMILION, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: height in inches of a bar, and of what is beside the bars
+BAR, REST = 0.32, 1.1
+
+
+def tornado(found: Any, column: str = "tangential_force", step: int = -1, ax: Axes | None = None) -> Axes:
+    """Bars of how much of a column each parameter makes at a step, the longest one on top.
+
+    Parameters
+    ----------
+    found
+        What `evfem.sensitivities` found: relative derivatives; or `evfem.uncertainty`: the change for one
+        standard deviation.
+    column
+        A column of the history.
+    step
+        Number of the step from 0; -1: the last one.
+    ax
+        Axes to draw in; None: new ones.
+
+    Returns
+    -------
+    Axes
+        The axes of the bars.
+
+    Raises
+    ------
+    InputError
+        A column or a step without derivatives.
+    """
+    effects, label = found.effects(column, step)
+    known = {key: value for key, value in effects.items() if np.isfinite(value)}
+    if not known:
+        raise InputError("column", f"{column}, which has no derivative at that step", "one that has")
+    order = sorted(known, key=lambda key: abs(known[key]))
+    ax = axes_or_new(ax, REST + BAR * len(order))
+    colours = [BLUE if known[key] >= 0.0 else VERMILION for key in order]
+    ax.barh(range(len(order)), [known[key] for key in order], color=colours)
+    ax.set_yticks(range(len(order)), order)
+    ax.axvline(0.0, color="black", linewidth=0.8)
+    ax.set_xlabel(label)
+    ax.grid(alpha=0.3, axis="x")
+    return ax

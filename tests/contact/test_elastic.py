@@ -1,0 +1,109 @@
+"""Compliances of elastic layers: point loads, limits, and that they are those of a linear elastic body."""
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.contact.bed import slopes
+from evfem.surface.elastic import transfer
+
+#: u_z E*/P, u_x E*/Q, u_z mu/Q at x/H, by quadrature of the inverse transform to 10 digits
+POINT_LOADS = {
+    0.48: {
+        0.25: (0.3466233634, 1.3198680378, -0.0152213913),
+        0.5: (0.0090662310, 0.9171833599, -0.0352840248),
+        1.0: (-0.1268455189, 0.5803676135, -0.0514322000),
+    },
+    0.3: {
+        0.25: (0.5751694162, 1.1621555909, 0.0647179472),
+        0.5: (0.2109414236, 0.7560535797, 0.0344974209),
+        1.0: (0.0033346229, 0.4189356387, -0.0014188533),
+        2.0: (-0.0097406223, 0.1727123742, -0.0094425959),
+    },
+}
+
+
+@pytest.mark.parametrize("nu", POINT_LOADS)
+def test_point_loads_on_a_layer(nu):
+    E, H = 0.37, 2.0
+    layer, modulus, mu = ev.ElasticLayer(E, nu, H), E / (1.0 - nu**2), 0.5 * E / (1.0 + nu)
+    for place, expected in POINT_LOADS[nu].items():
+        found = layer.compliance([0.0, place * H], [1e-6, 1e-6])
+        numbers = found[1, 0] * modulus, found[3, 2] * modulus, found[1, 2] * mu
+        np.testing.assert_allclose(numbers, expected, atol=2e-10)
+
+
+def test_the_compliance_of_a_coated_layer_over_the_wavenumber():
+    """Coating E 1.0, nu 0.3, 0.2 thick on a half-plane of E 0.08, nu 0.48: Mn, Mt, N of the coating."""
+    stack, mu, nu = (ev.ElasticLayer(1.0, 0.3, 0.2), ev.ElasticLayer(0.08, 0.48, 500.0)), 1.0 / 2.6, 0.3
+    k = np.array([0.1, 0.5, 1.0]) / 0.2
+    normal, tangent, cross = transfer(stack, k)
+    np.testing.assert_allclose(
+        normal * mu * k / (1 - nu), [10.5188941044, 8.3965660153, 4.1954567260], rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        tangent * mu * k / (1 - nu), [3.5133092488, 1.6639539980, 1.5815872923], rtol=1e-9
+    )
+    np.testing.assert_allclose(2.0 * cross * mu * k, [0.9440368276, 2.7667253209, 2.2317101973], rtol=1e-9)
+
+
+def test_a_thick_layer_is_a_half_plane_near_by():
+    """Means of -ln over strips of length 1: own 1.5, others by the closed form."""
+    E, nu = 1.0, 0.3
+    found = ev.ElasticLayer(E, nu, 1e3).compliance([0.0, 1.0, 2.0, 10.0], np.ones(4))[0, :4]
+    means = np.array([1.5, 0.1137056389, -0.6711665768, -2.301750087])
+    np.testing.assert_allclose((found - found[0]) * 0.5 * np.pi * E / (1 - nu**2), means - 1.5, atol=1e-4)
+
+
+def test_a_thin_layer_is_a_bed_of_springs_and_shears():
+    """Strips much longer than it is thick: H / (lambda + 2 mu) and H / mu per length."""
+    E, nu, H, long = 1.0, 0.3, 1e-3, 1.0
+    own = ev.ElasticLayer(E, nu, H).compliance([0.0], [long])
+    mu = 0.5 * E / (1.0 + nu)
+    assert own[0, 0] == pytest.approx(H / long * (1.0 - 2.0 * nu) / (2.0 * mu * (1.0 - nu)), rel=2e-3)
+    assert own[1, 1] == pytest.approx(H / long / mu, rel=2e-3)
+
+
+def test_layers_of_one_material_are_one_layer():
+    x, lengths = np.linspace(-1.0, 1.0, 7), np.full(7, 0.3)
+    one = ev.ElasticLayer(0.2, 0.48, 2.0).compliance(x, lengths)
+    parts = [ev.ElasticLayer(0.2, 0.48, 0.5), ev.ElasticLayer(0.2, 0.48, 1.5)]
+    np.testing.assert_allclose(ev.ElasticStack(parts).compliance(x, lengths), one, atol=1e-9 * one.max())
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+@pytest.mark.parametrize("thickness", [0.02, 0.5, 20.0])
+def test_the_compliance_is_symmetric_and_positive(nu, thickness):
+    """Strips side by side, of lengths from 0.02 to 0.2 mm, without and with gaps."""
+    lengths = np.random.default_rng(1).uniform(0.02, 0.2, 40)
+    x = np.cumsum(lengths) - 0.5 * lengths
+    for places in (x, 1.5 * x):
+        found = ev.ElasticLayer(0.2, nu, thickness).compliance(places, lengths)
+        np.testing.assert_array_equal(found, found.T)
+        assert np.linalg.eigvalsh(found).min() > 0.0
+
+
+def test_the_slope_of_the_compliance_is_its_derivative():
+    class Own:
+        def compliance(self, x, lengths):
+            return ev.ElasticLayer(0.2, 0.4, 1.0).compliance(x, lengths)
+
+    x, lengths = np.array([-0.3, 0.02, 0.4, 1.7]), np.array([0.1, 0.2, 0.15, 0.1])
+    exact = ev.ElasticLayer(0.2, 0.4, 1.0).compliance_slope(x, lengths)
+    np.testing.assert_allclose(slopes(Own(), x, lengths), exact, atol=1e-4 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ev.ElasticLayer(-1.0, 0.3, 1.0), r"surface\.elastic\.E"),
+        (lambda: ev.ElasticLayer(1.0, 0.6, 1.0), r"surface\.elastic\.nu"),
+        (lambda: ev.ElasticStack([]), "1 to 20"),
+        (lambda: ev.Flat(elastic=1.0), "ElasticLayer, ElasticStack, or an object"),
+        (lambda: ev.Flat(elastic=ev.ElasticLayer), "ElasticLayer, ElasticStack, or an object"),
+        (lambda: ev.ElasticLayer(1.0, 0.3, 1.0).compliance([0.0], [0.0]), "a length in mm above 0"),
+    ],
+)
+def test_what_no_surface_can_be_is_refused(make, message):
+    with pytest.raises(ev.InputError, match=message):
+        make()

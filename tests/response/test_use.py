@@ -1,0 +1,110 @@
+"""What is made of derivatives: uncertainty, design, pictures, a command."""
+
+import csv
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.cli import main
+
+SCENE = """
+version = 1
+[finger]
+ridges = false
+resolution = "coarse"
+[surface]
+kind = "flat"
+friction = 0.3
+[[motion]]
+kind = "press"
+indentation = 0.2
+steps = 1
+[[motion]]
+kind = "slide"
+distance = 2.0
+steps = 2
+"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A finger pressed, and slid to full slip."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path / "scene.toml"
+
+
+def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
+    sd = {"finger.materials.hypodermis.E": 0.004, "surface.friction": 0.03}
+    found = ev.uncertainty(path, sd, ["tangential_force", "substeps"])
+    parts = [found.contribution["tangential_force", key] for key in sd]
+    assert found.sd["tangential_force"] == pytest.approx(np.hypot(*parts))
+    assert parts[1][-1] == pytest.approx(0.1 * found.result.tangential_force[-1], rel=0.02)
+    assert set(found.sd) == {"tangential_force"}
+    key, column, by_derivative, by_run = found.checked
+    assert (key, column) == ("finger.materials.hypodermis.E", "tangential_force") or key == "surface.friction"
+    assert by_run == pytest.approx(by_derivative, rel=0.05)
+    assert f"{key} larger by its sd" in repr(found)
+    drawn = ev.plotting.tornado(found, "tangential_force")
+    assert [label.get_text() for label in drawn.get_yticklabels()][-1] == key
+    band = ev.plotting.forces(found.result, sd=found.sd).collections[0].get_paths()[0].vertices
+    assert np.ptp(band[:, 1]) > found.result.tangential_force.max()
+    with pytest.raises(ev.InputError, match="unknown key"):
+        ev.plotting.tornado(found, "substeps")
+
+
+@pytest.mark.parametrize(
+    ("sd", "said"),
+    [({}, "standard deviation"), ({"surface.friction": 0.0}, "larger than 0"), ({"surface.mu": 1.0}, "mu")],
+)
+def test_uncertainties_that_cannot_be_are_refused(path, sd, said):
+    with pytest.raises(ev.InputError, match=said):
+        ev.uncertainty(path, sd)
+
+
+def test_a_design_finds_the_friction_of_a_force(path):
+    """In full slip the tangential force is the coefficient times the normal force."""
+    wanted = 0.008
+
+    def missed(run):
+        return float(1e6 * (run.tangential_force[-1] - wanted) ** 2)
+
+    found = ev.design(path, missed, ["surface.friction"], {"surface.friction": (0.1, 0.9)})
+    assert found.result.tangential_force[-1] == pytest.approx(wanted, rel=1e-5)
+    assert found.parameters["surface.friction"] == pytest.approx(found.scene.surface.friction)
+    assert found.objective < 1e-8
+    assert found.runs < 12
+    least = ev.design(path, "-tangential_force.last", "surface.friction", [(0.1, 0.35)])
+    assert least.parameters["surface.friction"] == pytest.approx(0.35)
+    assert least.gradient["surface.friction"] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("objective", "bounds", "said"),
+    [
+        (3.0, [(0.1, 0.9)], "a function of a result"),
+        ("tangential_force.sum", [(0.1, 0.9)], "COLUMN.STATISTIC"),
+        ("tangential_force.last", [(0.4, 0.9)], "around 0.3"),
+        ("tangential_force.last", [], "a pair"),
+    ],
+)
+def test_designs_that_cannot_be_are_refused(path, objective, bounds, said):
+    with pytest.raises(ev.InputError, match=said):
+        ev.design(path, objective, ["surface.friction"], bounds)
+
+
+def test_the_command_writes_a_table_and_a_picture(path, capsys):
+    out = path.parent / "out"
+    assert (
+        main(["sensitivities", str(path), "--by", "surface.friction", "motion.1.distance", "--out", str(out)])
+        == 0
+    )
+    with open(out / "sensitivities.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["step"] for row in rows] == ["1", "2", "3"]
+    pressed = ev.simulate(path).normal_force[-1]
+    assert float(rows[-1]["tangential_force by surface.friction"]) == pytest.approx(pressed, rel=0.02)
+    assert float(rows[0]["valid_to surface.friction"]) > 0.0
+    assert (out / "sensitivities.png").stat().st_size > 5000
+    assert "tangential_force" in capsys.readouterr().out
+    assert main(["sensitivities", str(path), "--by", "surface.y", "--out", str(out)]) == 2

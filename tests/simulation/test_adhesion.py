@@ -1,0 +1,162 @@
+"""Adhesion: its laws, the contact of Johnson, Kendall and Roberts in the plane, books, friction, pull-off."""
+
+import numpy as np
+import pytest
+from simulation.test_core import SCALE, WORK, block
+
+import evfem as ev
+from evfem.surface.adhesion import Softened
+
+PAD = ev.FingerPad(ridges=False, resolution="coarse")
+MOIST = ev.Dugdale(stress=0.01, reach=0.01)
+LAWS = (MOIST, ev.Capillary(surface_tension=0.0728, contact_angle=30.0, film=0.005))
+
+
+class Exponential:
+    """One's own law: p = w/d exp(-g/d)."""
+
+    work, length = 1e-4, 0.02
+
+    def traction(self, gap):
+        return self.work / self.length * np.exp(-gap / self.length)
+
+    def potential(self, gap):
+        return -self.work * np.exp(-gap / self.length)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_is_the_derivative_of_its_potential(law):
+    assert -law.potential(0.0) == pytest.approx(law.stress * law.reach, rel=1e-14)
+    gaps = np.linspace(0.0, 1.2, 500) * law.reach
+    step = 1e-6 * law.reach
+    slope = (law.potential(gaps + step) - law.potential(gaps - step)) / (2.0 * step)
+    np.testing.assert_allclose(slope, law.traction(gaps), atol=1e-6 * law.stress)
+    assert law.traction(0.94 * law.reach) == law.stress
+    assert law.traction(1.06 * law.reach) == 0.0
+
+
+def test_a_meniscus_of_water_works_twice_its_tension():
+    """2 gamma cos(theta) = 0.1456 J/m2."""
+    water = ev.Capillary(surface_tension=0.0728, contact_angle=0.0, film=0.003)
+    assert -1e3 * water.potential(0.0) == pytest.approx(0.1456, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", [*LAWS, Exponential(), ev.Dugdale(0.001, 0.1)])
+@pytest.mark.parametrize("steepest", [1e-3, 0.05, 0.5, 5.0])
+@pytest.mark.parametrize("closed", [0.0, 0.003])
+def test_a_softened_law_has_the_same_work_and_no_steeper_slope(law, steepest, closed):
+    soft = Softened(law, closed, steepest)
+    for gap in (closed, 5.0):
+        work = soft.potential(5.0) - soft.potential(gap)
+        assert work == pytest.approx(law.potential(5.0) - law.potential(gap), rel=1e-9, abs=1e-15)
+    gaps = closed + np.geomspace(1e-6, 3.0, 3000)
+    traction = soft.traction(gaps)
+    assert (np.diff(traction) <= 1e-15).all()
+    assert (-np.diff(traction) <= steepest * np.diff(gaps) * (1.0 + 1e-6) + 1e-12).all()
+    middle = 0.5 * (gaps[1:] + gaps[:-1])
+    slope = np.diff(soft.potential(gaps)) / np.diff(gaps)
+    np.testing.assert_allclose(slope, soft.traction(middle), atol=2e-3 * float(law.traction(0.0)))
+
+
+def bonded(distance, motion, **more):
+    law = {"block": ev.LinearElastic(E=0.1, nu=0.3)}
+    finger = ev.MeshedFinger(block(distance), law)
+    reach = 2e-4
+    adhesion = ev.Dugdale(stress=WORK / reach, reach=reach)
+    return ev.simulate(ev.Scene(finger, ev.Flat(friction=0.0), motion=motion, adhesion=adhesion, **more))
+
+
+@pytest.mark.parametrize("way", [[0.02], [0.03, 0.02]])
+def test_the_width_is_that_of_johnson_kendall_and_roberts(way):
+    """P = C (a^2 - sqrt(a A^3)) at half width a, with A = 1 mm, pressed from below or over-pressed."""
+    result = bonded(0.1, [ev.Press(indentation=depth, steps=3) for depth in way])
+    wide = np.linspace(1.0, 2.0, 1001)
+    of_theory = np.interp(result.applied_force[-1] / SCALE, wide**2 - np.sqrt(wide), wide)
+    assert 0.5 * result.contact_width[-1] == pytest.approx(of_theory, abs=0.15)
+
+
+def test_the_pull_off_comes_to_that_of_johnson_kendall_and_roberts():
+    """0.472470 C at a rate of about the square root of the nodes' distance or better."""
+    motion = [ev.Press(indentation=0.0, steps=1), ev.Press(indentation=-0.03, steps=30)]
+    found = [bonded(distance, motion) for distance in (0.2, 0.1, 0.05)]
+    errors = [abs(-one.applied_force.min() / SCALE / 0.472470 - 1.0) for one in found]
+    assert errors[1] < 0.03
+    assert errors[2] < 0.7 * errors[0]
+    assert found[1].contact_width[-1] == 0.0
+    (said,) = [one for one in found[1].warnings if "came off" in one]
+    held = found[1].applied_force[found[1].contact_width > 0.0][-1]
+    assert float(said.split("pull of ")[1].split()[0]) == pytest.approx(-held, rel=0.05)
+
+
+def test_a_load_beyond_the_pull_off_ends_in_the_sentence_that_says_so():
+    motion = [ev.Press(indentation=0.0, steps=1), ev.Press(force=0.0, steps=1)]
+    rows = bonded(0.2, motion)
+    assert rows.applied_force[-1] == pytest.approx(0.0, abs=1e-9)
+    assert rows.contact_width[-1] == pytest.approx(2.0, abs=0.5)
+
+
+SCENES = {
+    "alone": {},
+    "slope": {"surface": ev.Sinusoid(friction=0.2, insulator=ev.FILM)},
+    "voltage": {"law": ev.StrongTroxel(), "voltage": 700.0},
+    "Maxwell": {"law": ev.StrongTroxel(), "voltage": 700.0, "direction": "normal"},
+    "soft": {"surface": ev.Display(friction=0.3, elastic=ev.ElasticLayer(0.3, 0.48, 2.0))},
+    "own": {"adhesion": Exponential()},
+    "rough": {"law": ev.StrongTroxel(), "voltage": 100.0, "roughness_gap": 0.002},
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_forces_and_works_balance(name):
+    more = {"surface": ev.Display(friction=0.3), "adhesion": MOIST} | SCENES[name]
+    motion = [ev.Press(force=0.03, steps=3), ev.Slide(0.4, steps=3)]
+    result = ev.simulate(ev.Scene(PAD, motion=motion, **more))
+    pulled = result.electrostatic_force + result.adhesive_force
+    np.testing.assert_allclose(result.applied_force, result.normal_force - pulled, atol=1e-8)
+    works = result.external_work + result.electrostatic_work + result.adhesive_work
+    spent = ("stored_energy", "friction_dissipation", "integrator_dissipation", "snap_dissipation")
+    np.testing.assert_allclose(works, sum(result[one] for one in spent), atol=1e-7 * works.max())
+    assert (result.adhesive_force > 0.0).all()
+
+
+def test_friction_sees_adhesion_as_a_load():
+    """In full slip on a flat surface: mu times the normal force, which is load and adhesion."""
+    motion = [ev.Press(force=0.03, steps=3), ev.Slide(3.0, steps=6, hold="force")]
+    result = ev.simulate(ev.Scene(PAD, ev.Flat(friction=0.1), motion=motion, adhesion=MOIST))
+    assert result.tangential_force[-1] == pytest.approx(0.1 * result.normal_force[-1], rel=1e-7)
+    assert result.normal_force[-1] == pytest.approx(0.03 + result.adhesive_force[-1], rel=1e-6)
+    covered = MOIST.stress * result.real_contact_width[-1]
+    assert result.adhesive_force[-1] == pytest.approx(covered, rel=0.15)
+
+
+def test_a_scene_with_adhesion_is_written_and_read():
+    for law in LAWS:
+        scene = ev.Scene(PAD, ev.Flat(), motion=[ev.Press(force=0.05)], adhesion=law)
+        assert ev.scenefile.loads(ev.scenefile.dump(scene)) == scene
+    with pytest.raises(ev.InputError, match="adhesion"):
+        ev.scenefile.dump(ev.Scene(PAD, ev.Flat(), motion=[ev.Press(force=0.05)], adhesion=Exponential()))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ev.Dugdale(stress=-1.0, reach=0.01), r"adhesion\.stress"),
+        (lambda: ev.Capillary(0.07, 90.0, 0.01), r"adhesion\.contact_angle"),
+        (lambda: ev.Scene(PAD, ev.Flat(), motion=[ev.Press(force=0.1)], adhesion=0.1), "Dugdale, Capillary"),
+        (
+            lambda: ev.Scene(
+                PAD,
+                ev.Display(),
+                ev.StrongTroxel(),
+                10.0,
+                [ev.Press(force=0.1)],
+                adhesion=MOIST,
+                field="full",
+            ),
+            "full with adhesion",
+        ),
+    ],
+)
+def test_what_is_no_adhesion_is_refused(make, message):
+    with pytest.raises(ev.InputError, match=message):
+        make()

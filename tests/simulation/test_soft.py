@@ -1,0 +1,225 @@
+"""A finger on an elastic surface: two elastic bodies in contact, limits, books, and a run that goes on."""
+
+import numpy as np
+import pytest
+from tools.builders import balance, pad_state
+from tools.meshes import both_sides, contact_block, graded, parabola
+
+import evfem as ev
+from evfem.reference import BondedLayer, CattaneoMindlin, HertzLine, plane_modulus
+
+SOFT = ev.ElasticLayer(E=0.2, nu=0.48, thickness=2.0)
+PAD = ev.FingerPad(ridges=False, resolution="coarse")
+
+
+def press(mesh, law, surface, *motion, **solver):
+    finger = ev.MeshedFinger(mesh, {"tissue": law})
+    return ev.simulate(ev.Scene(finger, surface, motion=motion, solver=ev.Solver(**solver)))
+
+
+def test_two_layers_under_a_cylinder_are_one_softer_layer():
+    """A finger of E 0.08 and a surface of E 0.2 MPa, both 2 mm thick with nu 0.48, R = 10: as one layer with
+    E1 E2/(E1 + E2), of load .0071945671 N/mm at a half width of 1 mm. Loads and depths go with 1/R.
+    """
+    radius, k, nu = 1e4, 0.01, 0.48
+    layer = BondedLayer(1.0, 2.0, radius, 0.08 * 0.2 / 0.28, nu)
+    assert layer.load * radius / 10.0 == pytest.approx(0.0071945671, rel=1e-7)
+    terms = [[1.0 / (radius * k**2), k, np.pi / 2]]
+    cylinder = ev.Sinusoid(0.0, terms, elastic=ev.ElasticLayer(0.2, nu, 2.0))
+    mesh = contact_block(
+        both_sides(graded(1.25, 1 / 32, 14.0, 1.3)), 2.0 * np.linspace(0.0, 1.0, 13) ** 1.3, pad=4.0
+    )
+    result = press(
+        mesh, ev.LinearElastic(0.08, nu), cylinder, ev.Press(indentation=layer.indentation, steps=1)
+    )
+    assert result.normal_force[-1] == pytest.approx(layer.load, rel=2e-3)
+    assert result.contact_width[-1] == pytest.approx(2.0, rel=0.01)
+    assert pad_state(result)[2]["contact_pressure"].max() == pytest.approx(
+        float(layer.pressure(0.0)), rel=2e-3
+    )
+
+
+@pytest.mark.parametrize(("E", "nu", "modulus"), [(0.2, 0.48, 0.0742500743), (1.0, 0.3, 0.0949667616)])
+def test_two_elastic_bodies_of_hertz(E, nu, modulus):
+    """Half-planes of E 0.08, nu 0.48 and another one; the layers are sixty half widths thick."""
+    radius = 1e3
+    x = both_sides(graded(1.125, 1 / 40, 60.0, 1.5))
+    mesh = contact_block(x, graded(0.1, 1 / 40, 60.0, 1.5), pad=1.125, lower=parabola(radius))
+    both = 1.0 / (1.0 / plane_modulus(0.08, 0.48) + 1.0 / plane_modulus(E, nu))
+    assert both == pytest.approx(modulus, rel=1e-8)
+    hertz = HertzLine.from_half_width(1.0, radius, both)
+    motion = (ev.Press(indentation=1e-5, steps=1), ev.Press(force=hertz.load, steps=1))
+    surface = ev.Flat(friction=0.0, elastic=ev.ElasticLayer(E, nu, 60.0))
+    result = press(mesh, ev.LinearElastic(0.08, 0.48), surface, *motion)
+    x, _, field = pad_state(result)
+    assert field["contact_pressure"].max() == pytest.approx(hertz.peak_pressure, rel=0.005)
+    assert result.contact_width[-1] == pytest.approx(2.0 * hertz.half_width, rel=0.01)
+    inside = np.abs(x) < 0.9
+    error = np.abs(field["contact_pressure"] - hertz.pressure(x))[inside].max()
+    assert error < 0.006 * hertz.peak_pressure
+
+
+def test_two_elastic_bodies_of_cattaneo_and_mindlin():
+    """Bodies of one material do not couple normal and shear forces: c/a = sqrt(1 - Q/(mu P))."""
+    half_width, radius, mu, nu = 0.1, 20.0, 0.3, 0.499
+    x = both_sides(graded(1.125 * half_width, half_width / 32, 40.0, 1.5))
+    y = graded(0.1 * half_width, half_width / 32, 40.0, 1.5)
+    mesh = contact_block(x, y, pad=1.125 * half_width, lower=parabola(radius, flat=3.0))
+    hertz = HertzLine.from_half_width(half_width, radius, modulus=0.5)
+    slide = ev.Slide(distance=1.05 * half_width**2 / radius, steps=3, hold="force")
+    surface = ev.Flat(friction=mu, elastic=ev.ElasticLayer(1.0 - nu**2, nu, 40.0))
+    motion = (ev.Press(indentation=5e-4, steps=1), ev.Press(force=hertz.load, steps=1), slide)
+    result = press(mesh, ev.NeoHookean(E=1.0 - nu**2, nu=nu), surface, *motion)
+    for k in (2, 3, 4):
+        mindlin = CattaneoMindlin(hertz, mu, result.tangential_force[k])
+        _, length, field = pad_state(result, k)
+        stick = length[field["contact_status"] == 1].sum() / 2.0
+        assert stick == pytest.approx(mindlin.stick_half_width, rel=0.04)
+
+
+def test_a_hard_surface_is_the_rigid_one():
+    motion = [ev.Press(indentation=0.6, steps=2), ev.Slide(1.0, steps=4)]
+    rigid, hard = (
+        ev.simulate(ev.Scene(PAD, ev.Flat(elastic=elastic), motion=motion))
+        for elastic in (None, ev.ElasticLayer(1e12, 0.3, 1.0))
+    )
+    for name in ("normal_force", "tangential_force", "contact_width"):
+        np.testing.assert_allclose(hard[name], rigid[name], rtol=1e-10, atol=1e-14)
+    assert rigid.surface_sink.tolist() == [0.0] * 6
+    assert 0.0 < hard.surface_sink[-1] < 1e-10
+
+
+def test_a_bed_of_springs_is_a_penalty():
+    """Springs below each node are a penalty normal to a flat surface without friction."""
+
+    class Winkler:
+        def compliance(self, x, lengths):
+            own = np.diag(1.0 / (5.0 * np.asarray(lengths)))
+            return np.block([[own, 0.0 * own], [0.0 * own, own]])
+
+    motion = [ev.Press(indentation=0.4, steps=8)]
+    soft = ev.simulate(ev.Scene(PAD, ev.Flat(friction=0.0, elastic=Winkler()), motion=motion))
+    solver = ev.Solver(contact="penalty", penalty_normal=5.0)
+    penalty = ev.simulate(ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, solver=solver))
+    # the lengths of a penalty are those of the last step
+    np.testing.assert_allclose(soft.normal_force, penalty.normal_force, rtol=2e-4)
+
+
+SCENES = {
+    "press": ([ev.Press(indentation=0.6, steps=3)], {}),
+    "slide": ([ev.Press(force=0.05, steps=2), ev.Slide(1.0, steps=5, hold="force")], {}),
+    "attracted": (
+        [ev.Press(force=0.05, steps=2), ev.Slide(0.6, steps=3)],
+        {"law": ev.StrongTroxel(), "voltage": 1000.0},
+    ),
+    "Maxwell": (
+        [ev.Press(force=0.05, steps=2), ev.Slide(0.6, steps=3)],
+        {"law": ev.StrongTroxel(), "voltage": 1000.0, "direction": "normal"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_works_and_energies_balance(name):
+    motion, more = SCENES[name]
+    surface = ev.Display(friction=0.3, elastic=SOFT)
+    result = ev.simulate(ev.Scene(PAD, surface, motion=motion, **more))
+    np.testing.assert_allclose(balance(result), 0.0, atol=1e-6 * result.stored_energy.max())
+    np.testing.assert_allclose(
+        result.applied_force, result.normal_force - result.electrostatic_force, atol=1e-8
+    )
+    shear = result.tangential_force - result.electrostatic_force_x
+    np.testing.assert_allclose(result.applied_tangential_force, shear, atol=1e-8)
+
+
+def test_what_a_press_loses_by_its_steps_falls_with_their_square():
+    lost = [
+        ev.simulate(
+            ev.Scene(PAD, ev.Flat(elastic=SOFT), motion=[ev.Press(indentation=0.6, steps=steps)])
+        ).integrator_dissipation[-1]
+        for steps in (4, 8)
+    ]
+    assert lost[0] / lost[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_steady_sliding_loses_nothing_but_friction():
+    """The last steps of a long slide, whose contact moves along as it is."""
+    motion = [ev.Press(indentation=0.4, steps=2), ev.Slide(3.0, steps=6)]
+    result = ev.simulate(ev.Scene(PAD, ev.Flat(friction=0.3, elastic=SOFT), motion=motion))
+    rubbed, lost = (np.diff(result[name])[-1] for name in ("friction_dissipation", "integrator_dissipation"))
+    assert rubbed == pytest.approx(0.5 * result.applied_tangential_force[-1], rel=1e-7)
+    assert abs(lost) < 1e-8 * rubbed
+
+
+def test_a_frictionless_surface_does_not_hold_back():
+    """Its slopes push the finger to both sides alike, also where the finger is not symmetric."""
+    finger = ev.FingerPad(resolution="coarse", ridge_phase=0.2)
+    surface = ev.Flat(friction=0.0, elastic=SOFT)
+    result = ev.simulate(ev.Scene(finger, surface, motion=[ev.Press(indentation=0.6, steps=2)]))
+    assert abs(result.tangential_force[-1]) < 1e-8 * result.normal_force[-1]
+
+
+def test_a_mirrored_slide_is_the_slide_mirrored():
+    found = [
+        ev.simulate(
+            ev.Scene(
+                PAD,
+                ev.Flat(elastic=SOFT),
+                motion=[ev.Press(indentation=0.5, steps=2), ev.Slide(way, steps=3)],
+            )
+        )
+        for way in (0.6, -0.6)
+    ]
+    np.testing.assert_allclose(found[0].normal_force, found[1].normal_force, rtol=1e-7)
+    np.testing.assert_allclose(found[0].tangential_force, -found[1].tangential_force, atol=1e-9)
+
+
+def test_a_resumed_run_repeats_itself(tmp_path):
+    class Stop:
+        def __init__(self, after):
+            self.after, self.saved = after, None
+
+        def step(self, row, frame, checkpoint):
+            if row["step"] == self.after:
+                self.saved = checkpoint()
+                raise ev.StopRun("enough")
+
+    motion = [ev.Press(force=0.05, steps=2), ev.Slide(0.8, steps=4)]
+    surface = ev.Display(elastic=SOFT)
+    scene = ev.Scene(PAD, surface, ev.StrongTroxel(), 800.0, motion)
+    whole, stop = ev.simulate(scene), Stop(3)
+    part = ev.simulate(scene, observers=[stop])
+    saved = ev.result.Saved(stop.saved, part.rows)
+    again = ev.simulate(scene, resume=saved)
+    for name in ("applied_force", "tangential_force", "surface_sink", "stored_energy"):
+        assert again[name].tolist() == whole[name].tolist()
+
+
+def test_a_result_keeps_how_the_surface_has_sunk(tmp_path):
+    result = ev.simulate(ev.Scene(PAD, ev.Flat(elastic=SOFT), motion=[ev.Press(indentation=0.5, steps=1)]))
+    result.save(tmp_path / "soft.npz")
+    sunk = ev.result.load(tmp_path / "soft.npz").frames[-1].surface_sink
+    assert sunk.max() == pytest.approx(result.surface_sink[-1])
+    assert sunk.min() < 0.0  # it bulges beside the contact
+
+
+@pytest.mark.parametrize(
+    ("surface", "more", "message"),
+    [
+        (ev.Display(elastic=SOFT), {"law": ev.StrongTroxel(), "voltage": 100.0, "field": "full"}, "elastic"),
+        (ev.Display(elastic=SOFT), {"finger": ev.Fingertip(resolution="coarse")}, "in the plane"),
+    ],
+)
+def test_what_goes_with_no_elastic_surface_is_refused(surface, more, message):
+    finger = more.pop("finger", PAD)
+    with pytest.raises(ev.InputError, match=message):
+        ev.plan(ev.Scene(finger, surface, motion=[ev.Press(indentation=0.1)], **more))
+
+
+def test_a_surface_that_is_strained_too_much_is_told():
+    scene = ev.Scene(
+        PAD, ev.Flat(elastic=ev.ElasticLayer(0.05, 0.48, 5.0)), motion=[ev.Press(force=0.05, steps=2)]
+    )
+    with pytest.warns(UserWarning, match=r"strained by about \d+%"):
+        result = ev.simulate(scene)
+    assert any("strained by about" in one for one in result.warnings)
