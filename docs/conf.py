@@ -1,5 +1,7 @@
 """How the site is built: `sphinx-build -W docs build/docs`, then open `build/docs/index.html`."""
 
+from importlib.util import find_spec
+
 from sphinx.ext.napoleon import Config, NumpyDocstring
 
 import evfem
@@ -17,6 +19,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",  # equations without a network
 ]
+extensions += ["sphinx_copybutton"] * (find_spec("sphinx_copybutton") is not None)
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 
@@ -32,6 +35,8 @@ html_theme = "furo"
 html_title = f"evfem {release}"
 html_static_path = ["_static"]
 html_css_files = ["site.css", "gallery.css"]
+html_js_files = ["zoom.js"]
+copybutton_selector = "div:not(.highlight-text) > div.highlight > pre"  # what is printed is not copied
 html_show_copyright = False
 html_copy_source = False
 

@@ -1,14 +1,17 @@
-"""Renews the tables of the page on performance, and two rows of README, from runs of the studies:
+"""Renews what the pages show of runs of the studies: the tables of the page on performance, two rows
+of README, the page on the paper, the pictures, and the times that the command says beforehand:
 
-    evfem study peers --out FOLDER
-    evfem study work_precision --out FOLDER
+    evfem study all peers --out FOLDER
     python docs/measured.py FOLDER
 
-What has no file in FOLDER stays as it is. The studies' pictures are copied to docs/pictures.
+What has no file in FOLDER stays as it is. Files of studies with numbers of the paper are kept in
+docs/results, from which the page on the paper is written; pictures are copied to docs/pictures.
+`python docs/measured.py --times FOLDER` takes the times alone, also those of runs with --quick.
 """
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shutil
@@ -17,10 +20,13 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from evfem.studies import NAMES, paper
 from evfem.studies.common import markdown
 
 DOCS = Path(__file__).parent
 PAGE, README = DOCS / "performance.md", DOCS.parent / "README.md"
+RESULTS, PAPER = DOCS / "results", DOCS / "paper.md"
+TIMES = DOCS.parent / "studies" / "seconds.csv"
 #: a table between its marks
 BLOCK = re.compile(r"(<!-- measured: ([\w-]+) -->\n\n).*?(\n<!-- end -->)", re.S)
 PACKAGES = {"evfem": "evfem", "fenicsx": "FEniCSx", "felupe": "FElupe", "getfem": "GetFEM"}
@@ -182,21 +188,49 @@ def rows_of_readme(text: str, found: Found) -> str:
     return re.sub(r"with version \S+ on\n\d{4}-\d\d-\d\d", f"with version {version} on\n{date}", text)
 
 
-def main(folder: Path) -> None:
-    """Renew both pages from the files of a folder."""
-    files = {study: folder / f"{study}.json" for study in BLOCKS}
-    found = {study: json.loads(file.read_text()) for study, file in files.items() if file.exists()}
-    if quick := [study for study, one in found.items() if one["provenance"].get("quick")]:
-        sys.exit(f"{', '.join(quick)} in {folder}: run with --quick; the pages take whole runs alone")
-    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8"), found), encoding="utf-8")
-    if "peers" in found:
-        README.write_text(
-            rows_of_readme(README.read_text(encoding="utf-8"), found["peers"]), encoding="utf-8"
-        )
-    for study in found:
+def page_on_the_paper() -> str:
+    """The page on the paper, from the files in docs/results."""
+    return paper.page(paper.sections(RESULTS), "pictures/")
+
+
+def times(found: dict[str, Found], text: str) -> str:
+    """The csv of the studies' seconds, with those of the runs that were found."""
+    took = {row["study"]: row for row in csv.DictReader(text.splitlines())}
+    for study, one in found.items():
+        seconds = one["provenance"].get("seconds")
+        row = took.setdefault(study, {"study": study, "whole": "", "quick": ""})
+        if seconds is not None:
+            row["quick" if one["provenance"]["quick"] else "whole"] = f"{float(f'{max(seconds, 0.1):.2g}'):g}"
+    rows = [",".join(took[name].values()) for name in NAMES if name in took]
+    return "\n".join(["study,whole,quick", *rows]) + "\n"
+
+
+def keep(folder: Path, found: dict[str, Found]) -> None:
+    """Copy pictures, and files with numbers of the paper; write the page on the paper."""
+    for study, one in found.items():
         shutil.copy(folder / f"{study}.png", DOCS / "pictures" / f"{study}.png")
+        if one["paper"]:
+            shutil.copy(folder / f"{study}.json", RESULTS / f"{study}.json")
+    PAPER.write_text(page_on_the_paper(), encoding="utf-8")
+
+
+def main(folder: Path, times_alone: bool = False) -> None:
+    """Renew the pages from the files of a folder."""
+    files = {study: folder / f"{study}.json" for study in NAMES}
+    found = {study: json.loads(file.read_text()) for study, file in files.items() if file.exists()}
+    quick = [study for study, one in found.items() if one["provenance"].get("quick")]
+    if quick and not times_alone:
+        sys.exit(f"{', '.join(quick)} in {folder}: run with --quick; the pages take whole runs alone")
+    TIMES.write_text(times(found, TIMES.read_text(encoding="utf-8")), encoding="utf-8")
+    if not times_alone:
+        blocks = {study: one for study, one in found.items() if study in BLOCKS}
+        PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8"), blocks), encoding="utf-8")
+        if "peers" in found:
+            text = rows_of_readme(README.read_text(encoding="utf-8"), found["peers"])
+            README.write_text(text, encoding="utf-8")
+        keep(folder, found)
     print(f"renewed from {', '.join(found) or 'nothing'}")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[-1]), "--times" in sys.argv)

@@ -1,4 +1,4 @@
-"""Writes what stands in the documentation about keys, columns and importers from the
+"""Writes what stands in the documentation about keys, columns, importers and public names from the
 package itself: `python docs/tables.py` after a change of one. A test compares.
 """
 
@@ -6,6 +6,7 @@ import re
 import textwrap
 from pathlib import Path
 
+import evfem
 from evfem.common.checks import Key, keys_of
 from evfem.scene import schema as scenes
 from evfem.scene.schema import Entry, Section
@@ -16,6 +17,7 @@ from evfem.textures.importers import IMPORTERS
 
 DOCS = Path(__file__).parent
 WIDTH = 99
+ROOM = 66  # columns of a row for what a name is
 HEAD = """\
 # Keys of scenes and sweeps
 
@@ -26,6 +28,7 @@ Each key with type, unit, default and what is allowed, as the reader of the file
 ([how](../commandline.md#keys-in-an-editor)); `evfem init` writes a scene to begin with.
 """
 OPTIONS = re.compile("(<!-- importers -->)\n.*?(<!-- end -->)", re.S)
+PUBLIC = re.compile("(<!-- public names -->)\n.*?(<!-- end -->)", re.S)
 TABLE = re.compile(r"(?<=^## Columns of the history\n\n)(.*?\n\n)\|.*?\n\n", re.M | re.S)
 
 
@@ -88,6 +91,45 @@ def importers(text: str) -> str:
     return OPTIONS.sub(lambda found: found[1] + "\n\n" + "\n".join(lines) + "\n\n" + found[2], text)
 
 
+def public_names(text: str) -> str:
+    """The first page of the reference with a table of the public names for each page that has some."""
+    parts, places = [], _places()
+    for page, own in places.items():
+        heading = (DOCS / "reference" / f"{page}.md").read_text(encoding="utf-8").splitlines()[0]
+        rows = [f"| `ev.{name}` | {_summary(getattr(evfem, name))} |" for name in sorted(own)]
+        lines = [
+            f"### [{heading.removeprefix('# ')}]({page}.md)",
+            "",
+            "| name | what it is |",
+            "|---|---|",
+            *rows,
+        ]
+        parts.append("\n".join(lines))
+    return PUBLIC.sub(lambda found: f"{found[1]}\n\n" + "\n\n".join(parts) + f"\n\n{found[2]}", text)
+
+
+def _places() -> dict[str, list[str]]:
+    """Page of the reference -> public names whose module it shows."""
+    places: dict[str, list[str]] = {}
+    homes = evfem._HOME | evfem._MODULES
+    for path in sorted((DOCS / "reference").glob("*.md")):
+        shown = re.findall(r"automodule:: evfem\.([\w.]+)", path.read_text(encoding="utf-8"))
+        if own := [name for name, home in homes.items() if home in shown]:
+            places[path.stem] = own
+    return places
+
+
+def _summary(thing: object) -> str:
+    """The beginning of a docstring, or the value of what has none of its own, as far as a row has room."""
+    if isinstance(thing, float) or type(thing).__module__.startswith("evfem."):
+        return f"`{thing!r}`"
+    first = re.split(r"(?<=\w|\))[.:;] ", " ".join((thing.__doc__ or "").split()))[0].rstrip(".")
+    first = first.replace("|", "or")
+    while len(first) > ROOM or first.count("(") > first.count(")"):
+        first = first.rpartition(", " if ", " in first else " ")[0]
+    return first
+
+
 def _told(key: Key) -> str:
     unit = f" in {key.rule['unit']}" if key.rule.get("unit") else ""
     default = "; needed" if key.required else f"; default {key.default}" if key.default is not None else ""
@@ -96,6 +138,8 @@ def _told(key: Key) -> str:
 
 def main() -> None:
     """Write the pages."""
+    reference = DOCS / "reference" / "index.md"
+    reference.write_text(public_names(reference.read_text(encoding="utf-8")), encoding="utf-8")
     (DOCS / "reference" / "keys.md").write_text(page(), encoding="utf-8")
     notation = DOCS / "notation.md"
     notation.write_text(columns(notation.read_text(encoding="utf-8")), encoding="utf-8")

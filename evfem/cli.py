@@ -330,10 +330,13 @@ def _study(given: argparse.Namespace) -> int:
             raise InputError("study", quoted(name), f"{', '.join(known.NAMES)}, all")
     sample = _sample(given)
     for name in dict.fromkeys(names):
-        print(f"study {name}", file=sys.stderr, flush=True)
+        print(f"study {name}: {known.expected(name, given.quick)}", file=sys.stderr, flush=True)
         with notices.status(name):
-            known.run(name, given.quick, given.out, sample)
+            result = known.run(name, given.quick, given.out, sample)
+        print(known.beside_the_paper(result), end="")
         print(given.out / f"{name}.json", flush=True)
+    if "all" in given.names:
+        print(*known.report(given.out), sep="\n")
     return DONE
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -11,7 +14,7 @@ from evfem.errors import InputError, quoted
 
 #: every study, in the order in which "all" runs them; it leaves out `APART`
 NAMED = """
-section321 laws fringe fingertip fingerprint fig05 fig06 fig07 fig08 fig09 fig10 fig11 fig12 fig13
+section321 laws fringe fingertip fingerprint fig03 fig05 fig06 fig07 fig08 fig09 fig10 fig11 fig12 fig13
 participants uncertainty frequency hypotheses friction_spectrum stick_slip stability work_precision peers
 campaign
 """
@@ -59,5 +62,61 @@ def run(
         raise InputError(
             "study", f"scenes, seed, workers or limit for {name}", "these options with campaign alone"
         )
-    main = import_module(f".{MODULES.get(name, name)}", __package__).main
-    return main(quick=quick, out=out) if sample is None else main(quick=quick, out=out, sample=sample)
+    from .common import BEGIN
+
+    drawn = {} if sample is None else {"sample": sample}
+    token = BEGIN.set(time.perf_counter())
+    try:
+        return module(name).main(quick=quick, out=out, **drawn)  # type: ignore[no-any-return]
+    finally:
+        BEGIN.reset(token)
+
+
+def module(name: str) -> Any:
+    """The module that runs a study."""
+    return import_module(f".{MODULES.get(name, name)}", __package__)
+
+
+def beside_the_paper(result: Mapping[str, Any]) -> str:
+    """A line for each number that the paper prints, beside the study's, and why they differ."""
+    from .printed import rows_of, told
+
+    rows = rows_of(result)
+    return f"{told(rows)}\n" if rows else ""
+
+
+def report(folder: Path) -> list[Path]:
+    """Write paper.md and paper.html from the studies' files in the folder."""
+    from .paper import write
+
+    return write(folder)
+
+
+def title(name: str) -> str:
+    """What a study is about: the first sentence of its module."""
+    return " ".join((module(name).__doc__ or name).split("\n\n")[0].split()).removesuffix(".")
+
+
+def expected(name: str, quick: bool = False) -> str:
+    """How long a study takes, in words; how long it took is in seconds.csv.
+
+    >>> expected("fig09")
+    'a few seconds'
+    """
+    with (Path(__file__).parent / "seconds.csv").open(newline="", encoding="utf-8") as file:
+        took = {row["study"]: row["quick" if quick else "whole"] for row in csv.DictReader(file)}
+    if not took.get(name):
+        return "not measured how long"
+    seconds = float(took[name])
+    return (
+        "a few seconds"
+        if seconds < 10.0
+        else f"about {seconds:.0f} s"
+        if seconds < 100.0
+        else minutes(seconds)
+    )
+
+
+def minutes(seconds: float) -> str:
+    """A time of minutes or hours in words."""
+    return f"about {seconds / 60.0:.0f} min" if seconds < 5400.0 else f"about {seconds / 3600.0:.0f} h"

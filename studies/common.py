@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -23,10 +25,14 @@ from evfem.electrostatics.encoding import AreaLaw
 from evfem.finger.layers import TABLE_2
 from evfem.simulation.provenance import origin
 
+from .printed import Printed, numbers_of
+
 Argument, Answer = TypeVar("Argument"), TypeVar("Answer")
 LAWS: dict[str, Any] = {"strong_troxel": ev.StrongTroxel(), "kaczmarek": ev.Kaczmarek()}
 #: hover cases of the measurements: voltage in V, air gap in mm
 CASES = {"HVHD": (2000.0, 0.50), "HVLD": (2000.0, 0.25), "LVLD": (1414.0, 0.25)}
+#: when the study that runs was begun
+BEGIN: ContextVar[float | None] = ContextVar("BEGIN", default=None)
 
 
 @dataclass(frozen=True)
@@ -43,12 +49,13 @@ class Series:
 class Study:
     """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw it.
 
-    `tables` by their titles are lists of lines of Markdown, kept among the assumptions.
+    `paper` has what the paper prints, by the keys of `numbers`. `tables` by their titles are lists of
+    lines of Markdown. Both are kept among the assumptions.
     """
 
     name: str
     numbers: dict[str, float]
-    paper: dict[str, float]
+    paper: dict[str, Printed]
     assumptions: dict[str, Any]
     series: list[Series]
     draw: Callable[[], Any]
@@ -61,13 +68,15 @@ class Study:
 
         The picture of a `quick` study says so.
         """
-        said = {"tables": self.tables} if self.tables else {}
+        printed = {key: one.described() for key, one in self.paper.items()}
+        said = {"tables": self.tables, "printed": printed}
         made = {"eps_0_F_per_m": ev.eps_0, "quick": quick, "parameters": self.parameters}
+        made |= {"seconds": since_begin()}
         result = {
             "study": self.name,
             "numbers": {key: float(value) for key, value in self.numbers.items()},
-            "paper": self.paper,
-            "assumptions": self.assumptions | said,
+            "paper": numbers_of(self.paper),
+            "assumptions": self.assumptions | {key: value for key, value in said.items() if value},
             "provenance": origin() | made,
         }
         if out is not None:
@@ -93,6 +102,12 @@ class Study:
         for title, lines in self.tables.items():
             blocks += [f"## {title}", "\n".join(lines)]
         return "\n\n".join(blocks) + "\n"
+
+
+def since_begin() -> float | None:
+    """Seconds since `studies.run` began the study; None if something else has called it."""
+    begun = BEGIN.get()
+    return None if begun is None else round(time.perf_counter() - begun, 2)
 
 
 def make_folder(out: str | Path) -> Path:

@@ -24,12 +24,28 @@ from evfem import data
 from .common import CASES, Series, Study, by_participant, median_interval, paper_display, participants
 from .measured import comparison, participant_forces
 from .plots import COLOURS, LABELS, Figure, draw_box, new_figure
+from .printed import CUT, Printed
 
-PRINTED = {"mean": (1.81, 2.95, 1.31), "median": (1.85, 2.73, 1.37), "sd": (0.547, 1.07, 0.558)}
+MEASURED = {
+    "mean": ("mean", ("1.81", "2.95", "1.31")),
+    "median": ("median", ("1.85", "2.73", "1.37")),
+    "sd": ("standard deviation", ("0.547", "1.07", "0.558")),
+}
 PAPER = {
-    f"measured.{name}_mN.{case}": value
-    for name, values in PRINTED.items()
-    for case, value in zip(CASES, values, strict=True)
+    f"measured.{name}_mN.{case}": Printed(digits, f"measured {what}, {case}", "mN", "section 3.1", CUT)
+    for name, (what, values) in MEASURED.items()
+    for case, digits in zip(CASES, values, strict=True)
+}
+WIDTH_WHY = (
+    "no single width meets the medians at both gaps: a cross-section is curved in one direction alone, and "
+    "its force falls faster with the gap than that of an ellipsoid, which falls faster than the measured "
+    "one"
+)
+PAPER |= {
+    f"verdict.fe.mm_of_width_for_median.{case}": Printed(
+        "8 to 10", f"width that gives the median, {case}", "mm", "section 3.2.4", WIDTH_WHY
+    )
+    for case in CASES
 }
 WIDTHS = (8, 10)  # mm out of the plane
 MODELS = {"fe": ("finite elements, ridges", True), "fe_smooth": ("finite elements, smooth", False)}

@@ -20,12 +20,14 @@ from evfem.electrostatics.encoding import AreaLaw, Encoding, fit_area_to_frictio
 
 from .common import LAWS, Series, Study, area_law, table2_layers
 from .plots import COLOURS, LABELS, Figure, law_line, not_shown, panels
+from .printed import Printed
 
 PAPER = {
-    "kaczmarek.area_mm2_at_1N": 125.359,
-    "strong_troxel.area_mm2_at_1N": 0.446,
-    "gross.area_mm2_at_1N": 107.626,
-    "ridge.area_mm2_at_1N": 63.000,
+    "kaczmarek.area_mm2_at_1N": Printed("125.359", "k of (16a), taken from the paper", "mm2", "caption"),
+    "strong_troxel.area_mm2_at_1N": Printed("0.446", "k of (16b), from that of (16a)", "mm2", "caption"),
+    "strong_troxel.exponent": Printed("0.489", "m of (16b), from that of (16a)", "", "caption"),
+    "gross.area_mm2_at_1N": Printed("107.626", "Adams' gross area, taken from the paper", "mm2", "caption"),
+    "ridge.area_mm2_at_1N": Printed("63.000", "Adams' ridge area, taken from the paper", "mm2", "caption"),
 }
 ASSUMPTIONS = {
     "measured points": "Meyer et al., Adams: only plotted in the paper; neither shown nor fitted again",
@@ -51,6 +53,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         "normal_force_at_0.25N_N": _force_for(display["kaczmarek"], meyer.value("F_e"), voltage),
         "kaczmarek.area_mm2_at_1N": areas["kaczmarek"](1.0),
         "strong_troxel.area_mm2_at_1N": refit.k,
+        "strong_troxel.exponent": refit.m,
         "gross.area_mm2_at_1N": areas["gross"](1.0),
         "ridge.area_mm2_at_1N": areas["ridge"](1.0),
         "paper_k_ratio": areas["kaczmarek"].k / areas["strong_troxel"].k,

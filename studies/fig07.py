@@ -18,10 +18,20 @@ from evfem.electrostatics.forces import plate_force
 from evfem.electrostatics.laws import Layer, Layers
 
 from .common import LAWS, Series, Study
-from .plots import COLOURS, LABELS, Figure, law_line, new_figure, not_shown, panel_letter
+from .plots import COLOURS, LABELS, Figure, law_line, new_figure, not_shown, note, panel_letter
+from .printed import Printed
 
-PAPER = {"kaczmarek.min_N": 0.05, "kaczmarek.max_N": 0.35}
-PAPER |= {"strong_troxel.min_N": 10.0, "strong_troxel.max_N": 600.0}
+PLACE = "section 3.2.2"
+READ = "a round number read off the logarithmic plot"
+SAME = (
+    "0.05 to 0.35 N is what Meyer et al. measured; the ends of (5) over the plotted permittivities are these"
+)
+PAPER = {
+    "kaczmarek.min_N": Printed("0.05", "least force by (5)", "N", PLACE, SAME),
+    "kaczmarek.max_N": Printed("0.35", "largest force by (5)", "N", PLACE, SAME),
+    "strong_troxel.min_N": Printed("10", "least force by (3)", "N", PLACE, READ),
+    "strong_troxel.max_N": Printed("600", "largest force by (3)", "N", PLACE, READ),
+}
 ASSUMPTIONS = {
     "contact area": "100 mm2, as the paper assumes",
     "voltage": "140 V is the effective voltage across skin and insulator",
@@ -61,12 +71,15 @@ def _draw(
     figure = new_figure(3.6)
     _draw_surfaces(figure, eps_sc, eps_i, force)
     ax = figure.add_subplot(1, 2, 2)
-    ax.axhspan(*band, color=COLOURS["measured"], alpha=0.3, label="measured range", linewidth=0)
+    ax.axhspan(*band, color=COLOURS["measured"], alpha=0.3, linewidth=0)
+    ax.text(1.05e3, 0.245, "measured range", fontsize="small", color=COLOURS["measured"])
     for (law, e), y in lines.items():
-        width = {1.0: 1.0, 3.0: 1.6, 10.0: 2.4}[e]
-        law_line(ax, law, eps_sc, y, linewidth=width, label=f"{LABELS[law]}, $\\varepsilon^i$ = {e:g}")
-    ax.set(xscale="log", yscale="log", xlabel="$\\varepsilon^{sc}$", ylabel="$F_e$ (N)", ylim=(1e-2, 3e4))
-    ax.legend(fontsize="x-small", ncols=2, loc="upper left")
+        law_line(ax, law, eps_sc, y, linewidth={1.0: 1.0, 3.0: 1.6, 10.0: 2.4}[e])
+        name = f"{LABELS[law]}, " if e == LINES[-1] else ""
+        label = f"{name}$\\varepsilon^i$ = {e:g}"
+        note(ax, label, (eps_sc[-1], y[-1]), (-4, 4), ha="right", color=COLOURS[law])
+    ax.set(xscale="log", yscale="log", xlabel="$\\varepsilon^{sc}$", ylabel="$F_e$ (N)", ylim=(1e-2, 2e3))
+    ax.margins(x=0.0)
     panel_letter(ax, "b")
     not_shown(figure, "Measured points of Meyer et al.")
     return figure

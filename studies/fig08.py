@@ -19,8 +19,28 @@ from evfem.electrostatics.forces import plate_force
 
 from .common import LAWS, Series, Study, table2_layers
 from .plots import COLOURS, LABELS, Figure, law_line, not_shown, panels
+from .printed import Printed
 
 THICKNESS = (0.1, 0.2, 0.3, 0.4, 0.5)  # mm
+INSULATOR_WHY = (
+    "the caption takes all but the thickness from Table 2, whose insulator of 0.09 mm is that of the "
+    "paper's own plate; the screen of Meyer et al. has 0.001 mm"
+)
+SPAN = (
+    "the range computed for skin of 0.1 to 0.5 mm is as wide as the measured one and lies lower by a "
+    "factor of 0.6; the area is assumed"
+)
+PAPER = {
+    f"kaczmarek.N_at_140V.dsc_{d}mm{key}": Printed(
+        "0.05 to 0.35", f"force by (5), d_sc {d} mm, d_i {insulator} mm", "N", "section 3.2.2", why
+    )
+    for d, key, insulator, why in (
+        (0.1, "", 0.001, ""),
+        (0.2, "", 0.001, ""),
+        (0.5, "", 0.001, SPAN),
+        (0.2, ".table2_insulator", 0.09, INSULATOR_WHY),
+    )
+}
 ASSUMPTIONS = {
     "contact area": "100 mm2, as the paper assumes",
     "insulator": "0.001 mm (the display measured) with Table 2's permittivity 3.35, not Table 2's 0.09 mm",
@@ -40,6 +60,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         return plate_force(LAWS[law], meyer.value("A"), 0.0, u, layers[d])
 
     numbers = {f"{law}.N_at_140V.dsc_{d}mm": force(law, d, reference) for law in LAWS for d in THICKNESS}
+    numbers["kaczmarek.N_at_140V.dsc_0.2mm.table2_insulator"] = plate_force(
+        LAWS["kaczmarek"], meyer.value("A"), 0.0, reference, table2_layers(0.2)
+    )
     low, high = meyer.value("F_e_min"), meyer.value("F_e_max")
     for law in LAWS:
         values = np.array([force(law, d, reference) for d in THICKNESS])
@@ -52,7 +75,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     parameters = {"A_mm2": meyer.value("A"), "d_i_mm": meyer.value("d_i")}
     parameters |= {name: table.value(name) for name in ("eps_sc", "eps_i")}
     picture = partial(_draw, voltage, curves, (low, high))
-    return Study("fig08", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
+    return Study("fig08", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 
 def _draw(voltage: Any, curves: dict[Any, Any], band: tuple[float, float]) -> Figure:

@@ -16,21 +16,52 @@ from typing import Any
 
 import numpy as np
 
-from .common import Series, Study, side_by_side
-from .plots import COLOURS, Axes, Figure, new_figure, note, panel_letter
-from .rendered import ASSUMPTIONS, QUICK_STEP, QUICK_TEXTURE, STEP, TEXTURE, Case, Outcome, render
+from evfem import data
 
+from .common import Series, Study, side_by_side
+from .plots import COLOURS, Axes, Figure, new_figure
+from .printed import Printed
+from .rendered import (
+    AFTER,
+    ASSUMPTIONS,
+    BEFORE,
+    QUICK_STEP,
+    QUICK_TEXTURE,
+    STEP,
+    TEXTURE,
+    Case,
+    Outcome,
+    display_encoding,
+    render,
+)
+
+STEP_PLACE, WAVE_PLACE = "section 3.3.1", "section 3.3.2"
+OPEN = "load, speed, viscosity, steps and ridges of the paper's runs are not printed"
+THIN = "the printed voltage needs 0.20 mm of stratum corneum in (20a), where Table 2 has 0.38 mm"
+INSTANT = (
+    "the paper prints the voltage of one instant, here it is the largest: while all nodes slip forward the "
+    "mean apparent friction over a period is at least 0.0997 (work of friction on the profile), for which "
+    "a display of 0.072 needs more than 2460 V"
+)
+LOW = "1911.12 V render 0.089, less than the texture's own friction: they are the voltage of one instant"
 PAPER = {
-    "transition.voltage_max_V": 1776.73,
-    "transition.pearson": 0.9995,
-    "sinusoid.mu_min": 0.072,
-    "sinusoid.pearson": 0.988,
-    "sinusoid.voltage_max_V": 1911.12,
+    "transition.voltage_max_V": Printed("1776.73", "largest voltage by (20a), step", "V", STEP_PLACE),
+    "closed_form.voltage_V.dsc_0.38mm": Printed(
+        "1776.73", "the same with Table 2's skin", "V", STEP_PLACE, THIN
+    ),
+    "transition.pearson": Printed(
+        "0.9995", "correlation, step", "", STEP_PLACE, f"{OPEN}; the pad without ridges correlates better"
+    ),
+    "sinusoid.mu_min": Printed("0.072", "smallest apparent friction, texture", "", WAVE_PLACE, OPEN),
+    "sinusoid.pearson": Printed("0.988", "correlation, texture", "", WAVE_PLACE, OPEN),
+    "sinusoid.voltage_max_V": Printed(
+        "1911.12", "largest voltage by (20a), texture", "V", "Fig. 13", INSTANT
+    ),
+    "closed_form.voltage_V.texture": Printed(
+        "1911.12", "(20a) for friction 0.1 on a display of 0.072", "V", WAVE_PLACE, LOW
+    ),
 }
 INSIGHTS = {
-    "1911.12 V": "that is (20a) for an apparent friction of 0.0887 on 0.072, below the texture's 0.1: one "
-    "instant, not the largest voltage; while all nodes slip forward the mean over a period is 0.0997 or more "
-    "(work of friction on the profile), which makes the largest voltage on 0.072 more than 2460 V",
     "out of reach": "steps where the display's force is not as wished within 1e-6: while part of the contact "
     "sticks, where the voltage hardly acts on it, and at the smallest friction, where the wish is below the "
     "display's own",
@@ -79,6 +110,16 @@ def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
     return numbers
 
 
+def _closed_numbers() -> dict[str, float]:
+    """What (20a) says without a simulation: step with Table 2's skin, and the texture's own friction."""
+    skin = float(data.load("table2").value("d_sc"))
+    step, texture = display_encoding(BEFORE, skin), display_encoding(PAPER["sinusoid.mu_min"].value)
+    return {
+        "closed_form.voltage_V.dsc_0.38mm": float(step.voltage_for_friction(AFTER)),
+        "closed_form.voltage_V.texture": float(texture.voltage_for_friction(TEXTURE.friction)),
+    }
+
+
 def _where_possible(outcome: Outcome) -> tuple[float, float]:
     """Relative L2 error of the exact encoding over the steps it can serve, and the others' share.
 
@@ -123,7 +164,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Both references on both pads, open loop and exact; the figure."""
     cases = _cases(quick)
     outcomes = dict(zip(cases, side_by_side(render, list(cases.values()), 1 if quick else 2), strict=True))
-    numbers: dict[str, float] = {}
+    numbers = _closed_numbers()
     for key, outcome in outcomes.items():
         name = key.split(".")[-1]
         numbers |= _main_numbers(key.removesuffix(name), name, outcome)
@@ -162,12 +203,11 @@ TITLE = {
 def draw(outcomes: Mapping[str, Outcome], numbers: Mapping[str, float]) -> Figure:
     """Voltage, force and residual over the position, a column for each reference and pad."""
     keys = [key for key in TITLE if key in outcomes]
-    figure = new_figure(7.5, 3.1 * len(keys) if len(keys) > 2 else 7.5)
+    figure = new_figure(6.6, max(2.5 * len(keys), 7.5))
     axes = figure.subplots(3, len(keys), squeeze=False, sharex="col", height_ratios=(1.0, 1.3, 1.0))
     for column, key in zip(axes.T, keys, strict=True):
         letter, title = TITLE[key]
-        panel_letter(column[0], letter)
-        column[0].set_title(title, fontsize="medium")
+        column[0].set_title(f"[{letter}] {title}", loc="left", fontsize="medium")
         _draw_voltage(column[0], outcomes[key], key)
         _draw_force(column[1], outcomes[key], numbers, key)
         _draw_residual(column[2], outcomes[key])
@@ -183,12 +223,12 @@ def _draw_voltage(ax: Axes, outcome: Outcome, key: str) -> None:
     for kind, found in outcome.rendered.items():
         if kind != "thick":
             ax.plot(outcome.position, found.voltage, color=COLOUR[kind], linewidth=1.1)
-    ax.margins(y=0.12)
     printed = PAPER[f"{key.split('.')[-1]}.voltage_max_V"]
-    ax.axhline(printed, color=COLOURS["neutral"], linewidth=0.8, linestyle=":")
-    box = {"facecolor": "white", "alpha": 0.75, "linewidth": 0.0, "pad": 0.5}
-    style = {"fontsize": "x-small", "color": COLOURS["neutral"], "bbox": box}
-    note(ax, f"paper {printed:g} V", (0.02, printed), (0, 2), xycoords=("axes fraction", "data"), **style)
+    ax.axhline(printed.value, color=COLOURS["neutral"], linewidth=0.8, linestyle=":")
+    ax.set_ylim(0.0, 1.3 * max(ax.get_ylim()[1], printed.value))
+    ax.text(
+        0.03, 0.97, f"dotted: paper, {printed.digits} V", transform=ax.transAxes, va="top", fontsize="x-small"
+    )
     ax.grid(alpha=0.3)
 
 
@@ -198,13 +238,13 @@ def _draw_force(ax: Axes, outcome: Outcome, numbers: Mapping[str, float], key: s
     for kind, found in outcome.rendered.items():
         style = "--" if kind == "exact" else "-"
         ax.plot(x, found.force, style, color=COLOUR[kind], linewidth=1.1, label=LABEL[kind])
-    text = f"(20a): r = {numbers[f'{key}.pearson']:.4f} (paper {PAPER[f'{name}.pearson']:g})"
+    text = f"(20a): r = {numbers[f'{key}.pearson']:.4f} (paper {PAPER[f'{name}.pearson'].digits})"
     text += f"\nrelative L2 error {numbers[f'{key}.relative_l2']:.3f}"
     if name == "sinusoid":
-        own, level = PAPER["sinusoid.mu_min"], outcome.friction * outcome.case.force
-        text += f"\nsmallest apparent friction {numbers[f'{key}.mu_min']:.3f} (paper {own:g})"
+        own, level = PAPER["sinusoid.mu_min"].digits, outcome.friction * outcome.case.force
+        text += f"\nsmallest friction {numbers[f'{key}.mu_min']:.3f} (paper {own})"
         ax.axhline(level, color=COLOURS["neutral"], linewidth=0.8, linestyle=":")
-        ax.set_ylim(top=ax.get_ylim()[1] * 1.25)
+        ax.set_ylim(top=ax.get_ylim()[1] * 1.3)
         ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top", fontsize="x-small")
     else:
         ax.text(0.97, 0.05, text, transform=ax.transAxes, ha="right", fontsize="x-small")

@@ -24,8 +24,17 @@ from evfem.plotting import side_by_side
 from . import rendered
 from .common import Series, Study, make_folder
 from .plots import Figure
+from .printed import Printed
 
-PAPER = {"voltage_V": 1911.12}
+PAPER = {
+    "voltage_V": Printed(
+        "1911.12",
+        "voltage of the instant shown",
+        "V",
+        "caption",
+        "the instant shown here is that of the largest voltage",
+    )
+}
 NEAR = 1.0  # mm from the contact
 #: half width of the close-ups, depth below and height above the contact that they show (mm)
 HALF, BELOW, ABOVE = 1.6, 0.25, 1.2
@@ -132,7 +141,9 @@ def draw(found: dict[str, Instant], numbers: dict[str, float]) -> Figure:
     )
     place = f"bone at x = {numbers['position_mm']:.2f} mm"
     panels[2].set_title(place, fontsize="medium")
-    panels[3].set_title(f"{numbers['voltage_V']:.0f} V (paper {PAPER['voltage_V']:g} V)", fontsize="medium")
+    panels[3].set_title(
+        f"{numbers['voltage_V']:.0f} V (paper {PAPER['voltage_V'].digits} V)", fontsize="medium"
+    )
     for ax, letter in zip((panels[0], panels[2], panels[3]), "abc", strict=True):
         ax.annotate(f"[{letter}]", (0.0, 1.02), xycoords="axes fraction", ha="left", va="bottom")
     return panels.figure

@@ -16,6 +16,8 @@ from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.estimate import rendering
 
+from .common import table2_layers
+
 #: where friction rises, from what to what, how far the finger slides (mm)
 JUMP, BEFORE, AFTER, PATH = 5.0, 0.5, 0.6, 10.0
 #: stratum corneum (mm) that gives the paper's voltage; k' of (20a) in mm2/N
@@ -135,10 +137,9 @@ def display_friction(case: Case, felt: rendering.ApparentFriction, full_slip: fl
     return lowest, max(lowest, LEAST_SHARE * case.friction)
 
 
-def display_encoding(friction: float) -> Encoding:
-    """(20a) with the stratum corneum and the area law that give the paper's voltage."""
-    skin, film = ev.Layer(SKIN, 1650.0), ev.Layer(0.09, 3.35)
-    return Encoding(ev.Kaczmarek(), ev.Layers.of(skin, film), AREA, friction)
+def display_encoding(friction: float, skin: float = SKIN) -> Encoding:
+    """(20a) with the stratum corneum (mm) and the area law that give the paper's voltage."""
+    return Encoding(ev.Kaczmarek(), table2_layers(skin), AREA, friction)
 
 
 def render(case: Case) -> Outcome:

@@ -21,9 +21,24 @@ from evfem.electrostatics.laws import Layer, Layers
 
 from .common import LAWS, Series, Study
 from .plots import COLOURS, LABELS, Figure, law_line, new_figure, note
+from .printed import CUT, Printed
 
 ACCEPTED_UM = 300.0  # palmar stratum corneum, section 3.2.1
-PAPER = {"effective_thickness_um": 2.74, "thickness_strong_troxel_mm": 5.48, "thickness_kaczmarek_um": 76.2}
+MIL = 0.0254  # mm
+PLACE = "section 3.2.1"
+MISPRINT = (
+    "(22) is misprinted: with d_i = d_i3, as the text has it, it gives twice the number printed beside it; "
+    "with d_i = d_i2 it agrees with (21)"
+)
+PAPER = {
+    "effective_thickness_um": Printed("2.74", "d_sc/eps_sc by (21)", "um", PLACE, CUT),
+    "effective_thickness_mil": Printed("0.108", "the same", "mil", PLACE),
+    "closed_form_22_with_d_i3_um": Printed("2.74", "d_sc/eps_sc by (22)", "um", PLACE, MISPRINT),
+    "thickness_strong_troxel_mm": Printed(
+        "5.48", "stratum corneum by (21)", "mm", PLACE, "2000 times the 2.74 um whose digits are cut off"
+    ),
+    "thickness_kaczmarek_um": Printed("76.2", "stratum corneum by (23)", "um", PLACE),
+}
 ASSUMPTIONS = {
     "area, friction": "the same in both experiments",
     "closed form (22)": "with d_i = d_i3 it gives 5.49 um; with d_i = d_i2 it agrees with (21), solved here",
@@ -44,6 +59,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     }
     numbers = {
         "effective_thickness_um": 1e3 * reduced,
+        "effective_thickness_mil": reduced / MIL,
         "thickness_strong_troxel_mm": found["strong_troxel"],
         "thickness_kaczmarek_um": 1e3 * found["kaczmarek"],
         "closed_form_22_with_d_i2_um": 1e3 * films[0].thickness / films[0].eps_r * _printed_factor(*voltages),

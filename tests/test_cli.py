@@ -529,9 +529,10 @@ def test_mesh_writes_the_mesh_the_scene_computes_on(tmp_path, element, kind, end
 
 def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path):
     status, out, err = run_process(tmp_path, "study", "section321", "--quick", "--out", "here")
-    assert (status, err) == (0, "study section321\n")
+    assert (status, err) == (0, "study section321: a few seconds\n")
     assert files(tmp_path / "here") == ["section321.csv", "section321.json", "section321.png"]
-    assert out == "here/section321.json\n"
+    assert "76.2 um      here 76.17     as printed" in out
+    assert out.splitlines()[-1] == "here/section321.json"
     written = json.loads((tmp_path / "here" / "section321.json").read_text())
     assert written["study"] == "section321"
     assert set(written) == {"study", "numbers", "paper", "assumptions", "provenance"}
@@ -550,7 +551,7 @@ def test_all_means_every_study_but_those_that_stand_apart(monkeypatch, tmp_path)
 
     ran = []
     monkeypatch.setattr(studies, "NAMES", ("laws", "peers", "fig05", "campaign"))
-    monkeypatch.setattr(studies, "run", lambda *words: ran.append(words))
+    monkeypatch.setattr(studies, "run", lambda *words: ran.append(words) or {"assumptions": {}})
     assert cli.main(["study", "fig05", "all", "--out", str(tmp_path)]) == 0
     assert ran == [("fig05", False, tmp_path, None), ("laws", False, tmp_path, None)]
 
@@ -561,7 +562,7 @@ def test_scenes_of_a_campaign_are_chosen_by_options_that_others_refuse(monkeypat
     from evfem import studies
 
     ran = []
-    monkeypatch.setattr(study, "main", lambda quick, out, sample: ran.append(sample))
+    monkeypatch.setattr(study, "main", lambda quick, out, sample: ran.append(sample) or {"assumptions": {}})
     assert cli.main(["study", "campaign", "--scenes", "7", "--seed", "3", "--out", str(tmp_path)]) == 0
     assert ran == [studies.Sample(scenes=7, seed=3)]
     for words in (["laws", "--seed", "3"], ["campaign", "--scenes", "0"], ["campaign", "--seed", "-1"]):

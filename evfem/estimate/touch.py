@@ -7,7 +7,7 @@ rigid surface; a friction profile lies on a level one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -87,10 +87,28 @@ def _file_name(name: str) -> str:
     return "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name)[:60] or "texture"
 
 
+def from_texture(result: Result) -> Result:
+    """A slide of `touch_scene` for pictures: its frames stand where the texture's x is that of the curve.
+
+    The surface below them is then that of their gaps.
+    """
+    before = _run_in(result)
+    frames = [
+        replace(one, position=one.position - before, displacement=one.displacement - [before, 0.0])
+        for one in result.frames
+    ]
+    return replace(result, frames=frames, provenance=result.provenance | {"parameters": ""})
+
+
+def _run_in(result: Result) -> float:
+    """Position (mm) of the bone where the second slide begins."""
+    return float(result.position[result.motion_index < 2][-1])
+
+
 def friction_of(result: Result) -> FrictionCurve:
     """The apparent friction of the second slide of `touch_scene`."""
     last = result.motion_index == 2
     if not last.any():
         raise InputError("result", "no second slide", "the result of a scene of touch_scene")
-    x = result.position[last] - result.position[~last][-1]
+    x = result.position[last] - _run_in(result)
     return FrictionCurve(x, result.applied_tangential_force[last] / result.applied_force[last], "model")

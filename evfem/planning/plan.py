@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
@@ -42,6 +43,8 @@ from evfem.tissue.userforms import Trial, tried
 
 #: columns of a printed plan, at most
 WIDTH = 79
+#: the two laws of the literature, each beside the other
+OTHER_LAW: dict[type, type[StrongTroxel | Kaczmarek]] = {StrongTroxel: Kaczmarek, Kaczmarek: StrongTroxel}
 
 
 @dataclass(frozen=True)
@@ -260,7 +263,7 @@ def _electricity(closing: Closing) -> Term:
     )
     how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
     traction, core = touching_traction(scene), closing.found
-    pull = "" if traction is None else f", up to {traction:.2g} MPa where it touches"
+    pull = "" if traction is None else f", up to {traction:.2g} MPa where it touches{_other_law(scene)}"
     cored = "" if core is None else f"; {core}"
     return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")
 
@@ -268,6 +271,14 @@ def _electricity(closing: Closing) -> Term:
 def _adhesion(closing: Closing) -> tuple[Term, ...]:
     """The adhesion of a scene that has any."""
     return () if closing.scene.adhesion is None else (Term("adhesion", True, told(closing)),)
+
+
+def _other_law(scene: Scene) -> str:
+    """What the other one of the two laws of the literature says, and where to read which to take."""
+    if (other := OTHER_LAW.get(type(scene.law))) is None:
+        return ""
+    traction = touching_traction(scene, other(gap_eps_r=scene.electrics.gap_eps_r))
+    return f" ({other.__name__} {traction:.2g} MPa: see docs/howto/which-law.md)"
 
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:

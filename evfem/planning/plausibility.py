@@ -19,6 +19,7 @@ from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import path_depth
+from evfem.protocols import ForceLaw
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
 from evfem.tissue.laws import NeoHookean
@@ -177,17 +178,17 @@ def _breakdown(scene: Scene) -> Iterator[str]:
             )
 
 
-def touching_traction(scene: Scene) -> float | None:
-    """Attraction (MPa) of touching skin at the largest voltage by the law's closed form, as far as that is
-    known: not under a charge, or a friction force that sets the voltage. Rough faces are as far apart as
-    under `PRESSED`.
+def touching_traction(scene: Scene, law: ForceLaw | None = None) -> float | None:
+    """Attraction (MPa) of touching skin at the largest voltage by the closed form of the scene's law, or of
+    another, as far as that is known: not under a charge, or a friction force that sets the voltage. Rough
+    faces are as far apart as under `PRESSED`.
     """
     if not scene.electrics.acts or isinstance(scene.voltage, (FollowForce, ChargeControl)):
         return None
-    law, layers = scene.electrics.attraction
+    own, layers = scene.electrics.attraction
     rough = roughness_of(scene.roughness_gap)
     gap = 0.0 if rough is None else float(rough.separation(PRESSED))
-    return float(np.max(law.traction(gap, scene.electrics.largest_voltage, layers)))
+    return float(np.max((law or own).traction(gap, scene.electrics.largest_voltage, layers)))
 
 
 def _unbearable(scene: Scene) -> Iterator[str]:

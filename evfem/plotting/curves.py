@@ -40,6 +40,7 @@ from evfem.plotting.labels import (
     column_text,
     kind_of,
     named,
+    on_lines,
     quantity_label,
     units_of,
     values_of,
@@ -72,7 +73,7 @@ TRACTIONS = {
 }
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
 #: width of a letter of a motion's name in inches, and height of its line in points
-LETTER, HIGH = 0.085, 12.0
+LETTER, HIGH = 0.085, 13.0
 OVER = ("step", "position", "position_z", "time", "indentation", "voltage", "applied_force")
 #: so many frequencies are lines from 0, more are a curve; points: a line in front of another is thinner
 FEW, THICK = 100, 4.0
@@ -198,16 +199,18 @@ def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
-    """A thin line where a motion ends, its name above; names that would collide stand in rows."""
-    ends = [*np.flatnonzero(np.diff(result.motion_index)).tolist(), len(result.step) - 1]
+    """A thin line where a motion ends, its name above, once for neighbours of one name; names that would
+    collide stand in rows.
+    """
+    for last in np.flatnonzero(np.diff(result.motion_index)):
+        ax.axvline(result.step[last] + 0.5, color="0.6", linewidth=0.8)
+    ends = [*np.flatnonzero(result.motion[1:] != result.motion[:-1]).tolist(), len(result.step) - 1]
     letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
     rows: list[float] = []  # where the last name of each row ends
     start = 0
     for end in ends:
         if end < 0:
             return
-        if end < len(result.step) - 1:
-            ax.axvline(result.step[end] + 0.5, color="0.6", linewidth=0.8)
         middle = 0.5 * (result.step[start] + result.step[end])
         half = 0.5 * letter * (len(result.motion[end]) + 1)
         row = next((row for row, last in enumerate(rows) if last <= middle - half), len(rows))
@@ -219,6 +222,7 @@ def _mark_motions(ax: Axes, result: Result) -> None:
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
             ha="center",
+            va="bottom",
         )
         start = end + 1
 
@@ -240,7 +244,7 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
         texts = {column_text(name, result.units[name]): y for name, y in drawn.items()}
         label = column_label if len(drawn) == 1 else axis_label
         lines = [(x, y, look) for y, look in styled(texts)]
-        curves(ax, lines, "", label(next(iter(drawn)), result.units))
+        curves(ax, lines, "", on_lines(label(next(iter(drawn)), result.units)))
     _marked(panels[0], over, result).set_xlabel("")
     panels[-1].set_xlabel(column_label(over, result.units))
     return panels

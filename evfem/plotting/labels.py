@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -33,6 +34,8 @@ TEXTS = {
     "seconds": "computing time",
     "min_gap": "smallest gap",
 }
+#: letters beside a panel of two inches
+LINE = 20
 #: fields of a frame: name where the underscores alone do not make one
 FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
 FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
@@ -96,6 +99,15 @@ def axis_label(name: str, units: Units = UNITS) -> str:
     ('force per depth (N/mm)', 'force (N)')
     """
     return with_unit(*kind_of(name, units))
+
+
+def on_lines(label: str) -> str:
+    """A label beside a low panel, on lines that are no longer than the panel is high.
+
+    >>> on_lines("electrostatic force (N/mm)").split(chr(10)), on_lines("voltage (V)")
+    (['electrostatic force', '(N/mm)'], 'voltage (V)')
+    """
+    return textwrap.fill(label, LINE, break_long_words=False, break_on_hyphens=False)
 
 
 def field_label(field: str) -> str:

@@ -24,7 +24,7 @@ from evfem.plotting.fields import Scale, Window, check_field, scale_of
 from evfem.plotting.figures import BLACK, BLUE, GREEN, VERMILION, WIDTH, add_colorbar
 from evfem.plotting.finger import Near, View, figure_height, label_bar, told
 from evfem.plotting.footprint import SkinView
-from evfem.plotting.labels import field_label
+from evfem.plotting.labels import field_label, on_lines
 from evfem.simulation.result import POINT_FIELDS, Result
 
 if TYPE_CHECKING:
@@ -162,6 +162,7 @@ class Reel:
         above, below = self.figure.subplots(2, 1, height_ratios=(self._share(), 1.0))
         column = abscissa(result)
         forces(result, column, ax=below)
+        below.set_ylabel(on_lines(below.get_ylabel()))
         below.get_legend().remove()  # beside the axes, where no mark passes
         self.figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize="small")
         bar = None
@@ -172,6 +173,7 @@ class Reel:
             if bar is None:
                 bar = add_colorbar(mapped, above, field_label(field), self.scale.extend)
                 label_bar(bar, field)
+                self.figure.align_ylabels([above, below])
             at = getattr(result, column)[result.step == view.frame.step]
             marks = [below.axvline(x, color="0.3", linewidth=1.0) for x in at]
             self.figure.canvas.draw()

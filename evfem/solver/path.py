@@ -2,7 +2,7 @@ r"""The error of a path: how much the steps decide where friction and time make 
 
 Friction is counted from the last accepted state and viscosity goes by backward Euler, so a step of length h
 errs by :math:`c h^2` locally: one part from a to b ends elsewhere than two halves do, and their difference
-:math:`c h^2 - 2 c (h/2)^2 = c h^2 / 2` is the error of the two halves [1]_, which are kept. With inertia, of
+:math:`c h^2 - 2 c (h/2)^2 = c h^2 / 2` is the error of the two halves, which are kept. With inertia, of
 second order in time, that is more than the error. The part that would just be allowed is
 :math:`\sqrt{e_{allowed} / e}` times as long. Iterations of the one part begin at the end of the two, so that
 asking costs little. The first part of a scene is a short one: from nothing, one part and two end alike where
@@ -11,7 +11,7 @@ in both every node slips, and neither sees the nodes that stick on a finer way.
 The error is that of the forces on the bone, as a share of the largest, and of where the bone is,
 as a share of how far it is from its rest. Errors of earlier parts fade where all slips.
 
-.. [1] Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, 2nd ed., section II.4.
+Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, 2nd ed., section II.4.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def answer(state: State) -> dict[str, Any]:
         "frequency": _short(frequency),
         "wish": _short(wished),
         "given": _short(given),
-        "numbers": _numbers(found),
+        "numbers": _numbers(found) | {"laws": _ratio_of_laws(state)},
         "bands": [[None if value != value else round(value, 6) for value in band] for band in found.bands],
         "notes": [*notes, *_warnings(found)],
         "texture": repr(state.texture),
@@ -130,6 +130,12 @@ def _numbers(found: Rendering) -> dict[str, float | None]:
         "spectrum_error": found.spectrum_error,
     }
     return {name: None if value != value else value for name, value in told.items()}
+
+
+def _ratio_of_laws(state: State) -> float:
+    """How many times as hard as Kaczmarek's law Strong and Troxel's attracts touching skin."""
+    layers = state.device.encoding.layers
+    return float(layers.thickness / layers.reduced)
 
 
 def _warnings(found: Rendering) -> list[str]:

@@ -53,7 +53,9 @@ def run(text: str, exact: bool, send: Callable[[dict[str, Any]], None]) -> None:
 @contextmanager
 def _place() -> Iterator[None]:
     if not _PLACES.acquire(blocking=False):
-        raise InputError("run", f"more than {MOST_RUNS} at once", "to wait until one of them has ended")
+        raise InputError(
+            "run", f"one more beside {MOST_RUNS}", f"{MOST_RUNS} at a time: wait until one has ended"
+        )
     try:
         yield
     finally:
@@ -90,7 +92,7 @@ def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, 
     """The friction curve, then the exact voltage or the pictures."""
     from evfem.estimate.display import exact_voltage
     from evfem.estimate.rendering import record
-    from evfem.estimate.touch import friction_of, touch_scene
+    from evfem.estimate.touch import friction_of, from_texture, touch_scene
 
     steps = sum(one.steps for one in touch_scene(state.texture, state.touch).motion)
     every = 0 if exact else max(steps // PICTURES, 1)
@@ -106,8 +108,9 @@ def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, 
         }
         yield {"exact": {name: column.tolist() for name, column in columns.items()}}
     else:
-        yield {"picture": _picture(reference.result)}
-        yield {"animation": _animation(reference.result)}
+        shown = from_texture(reference.result)
+        yield {"picture": _picture(shown)}
+        yield {"animation": _animation(shown)}
 
 
 def _picture(result: Any) -> str:

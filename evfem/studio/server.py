@@ -3,6 +3,7 @@
 Only this machine is served: the socket is bound to 127.0.0.1, a request must name it (`Host`), and one that a
 page of another origin sends (`Origin`, `Sec-Fetch-Site`) is refused, so that a site that is open in the same
 browser can neither read nor start anything. The page loads nothing from elsewhere, and its policy forbids it.
+Tried and left: Starlette with uvicorn takes 45 of these lines away and brings 7 packages; NiceGUI brings 49.
 """
 
 from __future__ import annotations

@@ -47,6 +47,7 @@ TEXTS = [
     *(f"docs/{p}" for p in PAGES),
 ]
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
+FENCED = re.compile(r"^```\w+\n(.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FORMS = "docs/howto/form.md"
 #: pages with so much to compute that `.ci/run` alone runs them
@@ -90,7 +91,7 @@ def run(page, wanted, capsys):
 
 def understood(text):
     """The command knows all words of its lines."""
-    for line in text.splitlines():
+    for line in text.replace("\\\n", " ").splitlines():
         if line.startswith("evfem "):
             cli.parser().parse_args(shlex.split(line, comments=True)[1:])
 
@@ -154,6 +155,13 @@ def test_files_in_sentences_exist(name):
 def test_lines_fit_a_screen(name):
     widest = 88 if name == "README.md" else 99
     assert [line for line in read(name).splitlines() if len(line) > widest] == []
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_blocks_fit_the_page_beside_its_contents(name):
+    """86 columns of code, without a bar to scroll."""
+    lines = [line for found in FENCED.findall(read(name)) for line in found.splitlines()]
+    assert [line for line in lines if len(line) > 86] == []
 
 
 def resolved(dotted):

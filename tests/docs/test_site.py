@@ -1,4 +1,6 @@
-"""The pages of the site in a real browser (evfem[browser,docs]): nothing is wider than the window."""
+"""The pages of the site in a real browser (evfem[browser,docs]): nothing is wider than the window, and
+pictures grow on a click.
+"""
 
 import shutil
 import subprocess
@@ -57,3 +59,14 @@ def test_no_page_scrolls_sideways(site, driver):
             if there > shown or shown < width - 20:
                 wide.append((page, width, there, shown))
     assert wide == []
+
+
+def test_a_picture_grows_on_a_click_and_shrinks_on_another(site, driver):
+    driver.set_window_size(1366, 900)
+    driver.get((site / "index.html").as_uri())
+    width = "return document.querySelector(arguments[0])?.getBoundingClientRect().width"
+    before = driver.execute_script(width, "article img")
+    driver.execute_script("document.querySelector('article img').click()")
+    assert driver.execute_script(width, "dialog[open] img") > before
+    driver.execute_script("document.querySelector('dialog[open]').click()")
+    assert driver.execute_script("return document.querySelector('dialog[open]')") is None

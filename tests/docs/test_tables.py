@@ -3,6 +3,7 @@
 import runpy
 from pathlib import Path
 
+import evfem
 from evfem.scene import schema
 from evfem.simulation.history import MEANINGS
 from evfem.simulation.result import COLUMNS, UNITS
@@ -35,3 +36,9 @@ def test_an_entry_says_type_unit_default_range_and_meaning():
     assert TABLES["entry"](width) == (
         "- `ridge_width`: number in mm; default `0.5`; 0.3 to 0.8 mm.\n  The pitch, from crest to crest."
     )
+
+
+def test_the_reference_has_every_public_name_on_the_page_of_its_module():
+    text = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
+    assert TABLES["public_names"](text) == text
+    assert [name for name in evfem.__all__ if text.count(f"| `ev.{name}` |") != 1] == []

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+import evfem as ev
 from evfem.errors import InputError
-from evfem.estimate.touch import Touch, friction_of, touch_scene
+from evfem.estimate.touch import Touch, friction_of, from_texture, touch_scene
+from evfem.plotting.fields import height_of
 from evfem.textures.library import reference
 from evfem.textures.texture import Texture
 
@@ -45,3 +47,15 @@ def test_friction_is_that_of_the_second_slide_from_its_beginning():
     curve = friction_of(Slid())
     assert curve.x.tolist() == [0.5, 1.0]
     assert curve.friction.tolist() == pytest.approx([0.3, 0.4])
+
+
+def test_pictures_of_a_slide_stand_where_its_curve_does():
+    """The last frame is at the curve's last x, and the texture below it at its own heights."""
+    touch = Touch(ridged=False, load=0.02, length=0.5)
+    result = ev.simulate(touch_scene(WAVE, touch, every=4))
+    shown, curve = from_texture(result), friction_of(result)
+    assert shown.frames[-1].position == pytest.approx(curve.x[-1])
+    assert curve.x[-1] == pytest.approx(0.5)
+    x = np.linspace(-0.5, 1.5, 9)  # below the finger
+    height = height_of(shown, shown.frames[-1])(x)
+    np.testing.assert_allclose(height - height[2], 0.01 * np.sin(np.pi * x), atol=3e-4)

@@ -136,7 +136,7 @@ def test_a_history_has_a_panel_for_each_kind_of_column():
     for ax in panels:
         for label, line in lines_of(ax).items():
             assert_line(line, result.position, getattr(result, label.replace(" ", "_")))
-    labels = ["force per depth (N/mm)", "voltage (V)", "width (mm)"]
+    labels = ["force per depth\n(N/mm)", "voltage (V)", "width (mm)"]
     assert [ax.get_ylabel() for ax in panels] == labels
     assert panels[-1].get_xlabel() == "position of the bone (mm)"
     for wrong in ("voltage", [], ["motion"], ["force"]):
@@ -230,6 +230,7 @@ def test_a_total_is_drawn_in_newtons_and_square_millimetres():
     panels = history(result.total, ["contact_width", "stored_energy", "min_gap"])
     labels = ["contact area (mm²)", "stored energy (mJ)", "smallest gap (mm)"]
     assert [ax.get_ylabel() for ax in panels] == labels
+
     assert energies(result.total).get_ylabel() == "energy (mJ)"
     assert signal(result.total)[1].get_ylabel() == "friction force (N)"
     load = f"load {10.0 * result.applied_force[-1]:.3g} N,"
@@ -270,3 +271,17 @@ def test_a_line_for_each_point_of_each_probe_over_its_steps():
         probes(result, "cauchy_stress_xw")
     with pytest.raises(InputError, match="a run without probes"):
         probes(fake_result())
+
+
+def test_no_label_of_a_panel_is_cut_or_reaches_into_the_next():
+    result = whole()
+    columns = ["applied_tangential_force", "electrostatic_force", "real_contact_width"]
+    columns += ["peak_contact_pressure", "viscous_dissipation", "indentation", "electrostatic_work"]
+    for name in columns:
+        panels = history(result, [name, "voltage"])
+        figure = panels.figure
+        figure.draw_without_rendering()
+        for ax in panels:
+            label, axes = ax.yaxis.label.get_window_extent(), ax.get_window_extent()
+            assert label.x0 >= 0.0, name
+            assert axes.y0 - 2.0 <= label.y0 < label.y1 <= axes.y1 + 2.0, name

@@ -232,6 +232,26 @@ def test_an_element_that_locks_in_incompressible_tissue_is_doubted(element, nu, 
 # -- attractions that no finger bears --------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("insulator", "ratio"), [(ev.FILM, 17.345), (ev.TOUCHSCREEN, 782.9)])
+def test_a_plan_tells_what_the_other_law_says(insulator, ratio):
+    """In contact the two are D/s apart: 0.47 / (0.38/1650 + 0.09/3.35) or 0.381 / (0.38/1650 + 0.001/3.9)."""
+    told = {}
+    for law in (ev.StrongTroxel(), ev.Kaczmarek()):
+        scene = ev.Scene(
+            ev.FingerPad(resolution="coarse"), ev.Display(insulator), law, 100.0, [ev.Press(force=0.05)]
+        )
+        (reason,) = [term.reason for term in plan(scene).terms if term.name == "electricity"]
+        own, name, other = re.search(
+            r"up to (\S+) MPa where it touches \((\w+) (\S+) MPa: see", reason
+        ).groups()
+        told[type(law).__name__] = float(own)
+        told[f"other {name}"] = float(other)
+        assert (Path(__file__).parents[2] / "docs/howto/which-law.md").exists()
+    assert told["StrongTroxel"] / told["Kaczmarek"] == pytest.approx(ratio, rel=0.05)  # two digits
+    assert told["other StrongTroxel"] == told["StrongTroxel"]
+    assert told["other Kaczmarek"] == told["Kaczmarek"]
+
+
 def test_an_attraction_beyond_the_load_is_told_by_plan_run_and_sweep(tmp_path, capsys):
     """Strong and Troxel's law on a touchscreen: eps_0 U^2 / (2 s^2) at 140 V is 0.37 MPa, and the load 0.05
     N/mm; Kaczmarek's law has a thousandth of it.

@@ -191,8 +191,12 @@ def test_the_model_is_run_and_cancelled(page):
 def test_the_model_is_run_to_its_end_and_shown(page):
     page.set("length", 2)
     page.set("ridged", "")
+    focus = "return document.activeElement.id"
     page.click("#run")
+    page.until(lambda: page.data("run") == "running")
+    assert page.js(focus) == "cancel"
     page.until(lambda: page.data("run") == "done")
+    assert page.js(focus) == "run"
     assert "model" in page.text("numbers")
     for name in ("picture", "animation"):
         assert page.js("return document.getElementById(arguments[0]).naturalWidth", name) > 300
@@ -210,7 +214,8 @@ def test_the_exact_voltage_is_found_for_this_display_only(page):
     page.until(lambda: page.data("run") == "done")
     page.settled()
     assert page.text("numbers").count("model") == 2
-    assert any(f"Error of the force{said} %" in page.text("numbers") for said in ("0.0", "below 0.1"))
+    force = "Friction force, error on the display"
+    assert any(f"{force}{said} %" in page.text("numbers") for said in ("0.0", "below 0.1"))
     found = page.js("return exact.voltage")
     signal = read_signal(page.saved("csv"))
     assert signal.voltage.max() == pytest.approx(max(found), rel=0.01)

@@ -74,6 +74,8 @@ def test_the_page_itself_is_answered(server):
     status, _, body = ask(server, "POST", "/answer", "{}", Origin=f"http://{ADDRESS}:{port}")
     assert status == 200
     assert json.loads(body)["source"] == "estimate"
+    # D/s of the film below 0.38 mm of stratum corneum: 0.47 / (0.38/1650 + 0.09/3.35)
+    assert json.loads(body)["numbers"]["laws"] == pytest.approx(17.3457, abs=1e-3)
 
 
 def test_the_page_offers_the_laws_and_insulators_that_there_are(server, monkeypatch):
@@ -176,7 +178,7 @@ def test_a_run_whose_process_goes_slowly_has_a_result(monkeypatch):
 
 def test_no_more_than_two_runs_at_once(monkeypatch):
     monkeypatch.setattr(runs, "_PLACES", threading.BoundedSemaphore(1))
-    with runs._place(), pytest.raises(InputError, match="at once"), runs._place():
+    with runs._place(), pytest.raises(InputError, match="at a time: wait"), runs._place():
         pass
     with runs._place():
         pass

@@ -56,7 +56,7 @@ function whole() {
 async function post(path, body, signal) {
   const answer = await fetch(path, {method: "POST", body, signal});
   if (!answer.ok) {
-    let said = `the server said ${answer.status}`;
+    let said = `the studio's server answered with status ${answer.status}`;
     try { said = (await answer.json()).error; } catch { /* not of ours */ }
     throw new Error(said);
   }
@@ -64,8 +64,10 @@ async function post(path, body, signal) {
 }
 
 function wrong(error) {
-  get("error").textContent = error.message === "Failed to fetch" ? "the studio is closed" : error.message;
+  const closed = "the studio's server does not answer; start it again: evfem studio";
+  get("error").textContent = error.message === "Failed to fetch" ? closed : error.message;
   get("error").hidden = false;
+  get("error").scrollIntoView({block: "nearest"});
 }
 
 // One question at a time, then the newest: 200 quick moves ask a few times, and the last picture is the last move's.
@@ -111,15 +113,17 @@ function numbers(found) {
   const n = found.numbers, percent = (v) => v === null ? "none" : v > 0 && v < 0.001 ? "below 0.1 %" : `${(100 * v).toFixed(v < 0.1 ? 1 : 0)} %`;
   const told = {
     "Voltage, rms": `${n.rms.toFixed(0)} V`, "Voltage, peak": `${n.peak.toFixed(0)} V`,
-    "Voltage from": found.encoding, "Friction from": found.source,
-    "Friction, mean": n.mean.toFixed(3), "Its range": n.range.toFixed(4),
-    "Its error": found.band === null ? "none known" : `+- ${found.band.toFixed(4)}`,
-    "Cannot be rendered": percent(n.lost), "Error of the force": percent(n.force_error),
-    "Error of the spectrum": percent(n.spectrum_error),
+    "Voltage by": found.encoding, "Friction by": found.source,
+    "Friction, mean": n.mean.toFixed(3), "Friction, highest less lowest": n.range.toFixed(4),
+    "Friction, error of the estimate": found.band === null ? "no estimate" : `+- ${found.band.toFixed(4)}`,
+    "Slide that cannot be rendered": percent(n.lost), "Friction force, error on the display": percent(n.force_error),
+    "Friction spectrum, error on the display": percent(n.spectrum_error),
   };
   for (const [low, high, error, share] of found.bands) {
-    if (share > 0.01) told[`Error, ${low} to ${high} Hz`] = percent(error);
+    if (share > 0.01) told[`Spectrum, error ${low} to ${high} Hz`] = percent(error);
   }
+  get("hint").textContent = `On this insulator strong_troxel attracts touching skin ${n.laws.toFixed(0)} times as hard as `
+    + "kaczmarek; docs/howto/which-law.md says which to take.";
   get("numbers").replaceChildren(...Object.entries(told).map(([key, value]) => {
     const pair = document.createElement("div"), name = document.createElement("dt"), said = document.createElement("dd");
     name.textContent = key;
@@ -129,13 +133,23 @@ function numbers(found) {
   }));
 }
 
+// What the end of a run is called, and what it means.
+const MESSAGES = {
+  starting: "the model starts",
+  done: "done: the friction is now the model's",
+  cancelled: "cancelled: what was shown stays",
+  ended: "the run broke off: what was shown stays",
+  "without a result": "the model found no result: what was shown stays",
+};
+
 // -- the model ------------------------------------------------------------------------------------------------
 
 async function run(encoding) {
-  const now = state(), text = JSON.stringify(now);
+  const now = state(), text = JSON.stringify(now), starter = document.activeElement;
   running = new AbortController();
   const mine = running;
   showRunning(true, "starting");
+  if (starter.disabled) get("cancel").focus();
   let ended = "done";
   try {
     const answer = await post(`run?encoding=${encoding}`, text, mine.signal);
@@ -152,7 +166,9 @@ async function run(encoding) {
     ended = error.name === "AbortError" ? "cancelled" : "ended";
     if (error.name !== "AbortError") wrong(error);
   }
+  const left = [get("cancel"), document.body].includes(document.activeElement);
   if (running === mine) showRunning(false, ended);
+  if (left && !starter.disabled) starter.focus();
 }
 
 function told(line, now) {
@@ -188,7 +204,7 @@ function showRunning(on, said) {
   get("cancel").hidden = !on;
   get("progress").hidden = !on;
   if (on) get("progress").value = 0;
-  get("said").textContent = said;
+  get("said").textContent = MESSAGES[said] || said;
   document.body.dataset.run = on ? "running" : said;
 }
 
