@@ -46,7 +46,7 @@ def slid(surface, angle, **other):
 
 def balance(result):
     """How far the energies are from balance, relative to the stored one."""
-    given = result.external_work + result.electrostatic_work
+    given = result.external_work + result.electrostatic_work + result.adhesive_work
     kept = result.stored_energy + result.kinetic_energy + result.friction_dissipation
     lost = result.viscous_dissipation + result.integrator_dissipation + result.snap_dissipation
     return np.abs(given - kept - lost).max() / result.stored_energy.max()
@@ -81,6 +81,12 @@ TWINS = {
     "rough": (
         *(replace(each, insulator=THIN) for each in (eggs(0.0, 90.0), eggs(90.0, 0.0), eggs(180.0, 90.0))),
         {"law": ev.StrongTroxel(), "voltage": 150.0, "roughness_gap": ROUGH, "solver": ITSELF},
+    ),
+    "adhesion": (
+        eggs(0.0, 90.0),
+        eggs(90.0, 0.0),
+        eggs(180.0, 90.0),
+        {"law": None, "voltage": 0.0, "adhesion": ev.Dugdale(stress=0.005, reach=0.05)},
     ),
     "hand": (eggs(0.0, 90.0), eggs(90.0, 0.0), eggs(180.0, 90.0), {"hand": ev.Hand(0.1, 1e-3, 1e-6)}),
 }
