@@ -252,7 +252,7 @@ class Interface:
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])
         slip = np.where(known.status >= FORWARD, way, 0.0)
-        moving = self._slipping(old, state, c, known.friction, slip)
+        moving = self.slipping(old, state, c, known.friction, slip)
         if self.dim == 2:
             found = self._oscillating.linearised(law, moving, c, known.status, shear)
         else:  # the direction of a slip turns: the law by the speed of the iterate
@@ -274,7 +274,7 @@ class Interface:
             friction_slope=series * known.friction_slope * by_place,
         )
 
-    def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
+    def slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
         """Data of a law of friction at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         length = self.tributary(state)[nodes]
@@ -323,7 +323,7 @@ class Interface:
         mu = self.friction(old, np.arange(x.size), x)
         if self.law is None:
             return np.asarray(mu * normal)
-        nodal = self._slipping(old, new, np.arange(x.size), mu, slip)
+        nodal = self.slipping(old, new, np.arange(x.size), mu, slip)
         return replace(nodal, normal=normal, length=self.tributary_at(part, x)).bound(self.law)
 
     def limit(self, old: State, state: State, x: Floats, way: Floats) -> Floats:
@@ -331,7 +331,7 @@ class Interface:
         mu = self.friction(old, np.arange(x.size), x)
         if self.law is None:
             return np.asarray(mu * state.contact_force[:, 0])
-        return self._slipping(old, state, np.arange(x.size), mu, way).bound(self.law)
+        return self.slipping(old, state, np.arange(x.size), mu, way).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
         """Origin of the slip (P,): the last accepted x, or the jump of friction that holds a node."""
@@ -391,7 +391,7 @@ class Interface:
         limit = (mu := self.friction(old, nodes, x)) * normal
         if self.law is not None:
             moving = np.where(status == STICK, 0.0, way)
-            limit = self._slipping(old, state, nodes, mu, moving).bound(self.law)
+            limit = self.slipping(old, state, nodes, mu, moving).bound(self.law)
         sticks = (way <= short) & (size <= limit + weak)
         # a slip is known to `short`, and its direction accordingly
         against = sizes(shear + (limit / np.maximum(way, 1e-300))[:, None] * slip)
@@ -405,7 +405,7 @@ class Interface:
         """Shear forces (P,) that hold pad nodes with the coefficients mu (P,)."""
         if self.law is None:
             return np.asarray(mu * state.contact_force[:, 0])
-        return self._slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
+        return self.slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
 
 
 class PenaltyInterface(Interface):

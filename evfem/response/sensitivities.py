@@ -362,7 +362,8 @@ def sensitivities(
     Raises
     ------
     InputError
-        A parameter that the scene does not have, that is 0, or that changes the mesh's cells.
+        A parameter that the scene does not have, that is 0, or that changes the mesh's cells; an elastic
+        surface.
     NotConverged
         A step has no solution.
 
@@ -379,6 +380,8 @@ def sensitivities(
         from evfem.scene.file import scene_at
 
         scene = scene_at(scene)
+    if scene.ground.elastic is not None:
+        raise InputError("surface.elastic", "an elastic surface", "a rigid one: derivatives know no other")
     given = (
         [parameters] if isinstance(parameters, str) or hasattr(parameters, "applied") else list(parameters)
     )
