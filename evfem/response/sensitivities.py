@@ -93,6 +93,8 @@ class _Differentiated:
 
     def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
         self.run = Run(scene, None)
+        if self.run.model.equilibrium.interface.bed is not None:
+            raise InputError("surface.elastic", "an elastic surface", "a rigid one, to be differentiated")
         self.ledger = self.run.ledger = _Followed(self.run.model)
         self.ledger.told = self._accepted
         self.centre = Beside.of(scene, None, 0.0)
