@@ -97,12 +97,14 @@ from evfem.surface.friction import AgeingFriction as AgeingFriction
 from evfem.surface.friction import Coulomb as Coulomb
 from evfem.surface.friction import LoadIndexFriction as LoadIndexFriction
 from evfem.surface.friction import RateFriction as RateFriction
+from evfem.surface.relief import Relief as Relief
 from evfem.surface.surfaces import Display as Display
 from evfem.surface.surfaces import Flat as Flat
 from evfem.surface.surfaces import Profile as Profile
 from evfem.surface.surfaces import Sinusoid as Sinusoid
 from evfem.surface.textures import Grating as Grating
 from evfem.surface.textures import SelfAffine as SelfAffine
+from evfem.surface.ways import FrictionMap as FrictionMap
 from evfem.sweeps.check import check as check
 from evfem.sweeps.file import Sweep as Sweep
 from evfem.sweeps.run import sweep as sweep

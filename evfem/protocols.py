@@ -103,8 +103,9 @@ class Surface(Protocol):
 
     Optional attributes: `friction`, a number or a table [[x, coefficient], ...] (without it 0);
     `y`, the height (mm) at which the profile lies (without it or None: first touch); `insulator`,
-    a `Layer`; `elastic`, an `Elastic`. Optional methods of x: `slope` and `curvature`, which are derived
-    otherwise; `friction_coefficient`, instead of `friction`.
+    a `Layer`; `elastic`, an `Elastic`; `angle` (degrees), the direction of x on the display below a finger
+    in three dimensions. Optional methods of x: `slope` and `curvature`, which are derived otherwise;
+    `friction_coefficient`, instead of `friction`.
     """
 
     def height(self, x: Any) -> Any:
@@ -154,6 +155,10 @@ class CompleteSurface(Surface, Protocol):
         """Whether the friction coefficient is positive anywhere."""
 
     @property
+    def crosses(self) -> bool:
+        """Whether it varies otherwise than along x, so that a finger in the plane cannot have it."""
+
+    @property
     def friction_jumps(self) -> Any:
         """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on."""
 
@@ -168,6 +173,20 @@ class CompleteSurface(Surface, Protocol):
 
     def friction_slope(self, x: Any) -> Any:
         """Derivative of the friction coefficient (1/mm), jumps left out."""
+
+    def relief(self, place: Any) -> Any:
+        """Heights (...) in mm, slopes (..., d) and curvatures (..., d, d) in 1/mm at places (..., d): x, and
+        in space x and z.
+        """
+
+    def friction_at(self, place: Any) -> Any:
+        """Friction coefficients (...) at places (..., d)."""
+
+    def friction_gradient(self, place: Any) -> Any:
+        """Their derivatives (..., d), jumps left out."""
+
+    def friction_steps(self, short: float) -> Any:
+        """Their jumps, and ramps shorter than `short` (mm), as `evfem.surface.ways.Steps`."""
 
     def shifted(self, y: float) -> Any:
         """The same surface at the height `y` (mm)."""

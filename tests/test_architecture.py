@@ -45,7 +45,10 @@ ROOMS = {
         {"numpy", "scipy", "skfem"},
         "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
     ),
-    "surface": ({"numpy", "scipy"}, "friction adhesion elastic surfaces textures usersurface pad skin"),
+    "surface": (
+        {"numpy", "scipy"},
+        "ways friction adhesion elastic surfaces relief textures usersurface pad skin",
+    ),
     "contact": (
         {"numpy", "scipy"},
         "charging attraction adhesive bed fullfield drivenfield signorini slipping solve follower condensed "

@@ -90,6 +90,19 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
     return array.astype(float)
 
 
+def gridded(key: str, x: Floats, z: Floats, value: Floats) -> tuple[Floats, Floats, Floats]:
+    """Increasing x, increasing z and values (rows z, columns x) of rows x, z, value in any order; raises
+    `InputError` with `key` unless there is one row for every pair of at least two x and two z.
+    """
+    xs, zs = np.unique(x), np.unique(z)
+    order = np.lexsort((x, z))
+    full = len(xs) * len(zs) == len(x) and min(len(xs), len(zs)) > 1
+    if not full or (x[order].reshape(len(zs), -1) != xs).any():
+        given = f"{len(x)} rows of {len(xs)} x and {len(zs)} z"
+        raise InputError(key, given, "one row for every pair of at least two x and two z")
+    return xs, zs, value[order].reshape(len(zs), len(xs))
+
+
 def frame(columns: Mapping[str, Any]) -> Any:
     """Columns of equal length as a `pandas.DataFrame`, without pandas as a numpy record array."""
     if find_spec("pandas") is not None:

@@ -12,8 +12,7 @@ Trial states that penetrate count as touching, g = 0.
 
 Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
 
-In three dimensions A_j is the node's projected area (`evfem.surface.skin`), forces are in N, and the
-direction is vertical.
+In three dimensions A_j is the node's projected area (`evfem.surface.skin`), and forces are in N.
 
 Rough faces keep a separation s(p) where they touch (`evfem.electrostatics.roughness`): the law then
 has the gap g + s, with p the node's own contact pressure, its pressing force over A_j. A node that is
@@ -147,8 +146,10 @@ class Attraction:
             forces[..., 1] = -weight
             return forces
         potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
-        sideways = [self._sideways(*each) for each in zip(positions[..., 0], potential, strict=True)]
-        return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
+        forces = np.stack([self._sideways(*each) for each in zip(positions, potential, strict=True)])
+        forces[..., ::2] += weight[..., None] * frame.slope.reshape(*weight.shape, -1)
+        forces[..., 1] = -weight
+        return forces
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
         """Parts of closed nodes' attraction (P,) in MPa that a core takes away, and leaves; or None."""
@@ -169,11 +170,13 @@ class Attraction:
         """`forces_along` of the columns alone, which resolve how the attraction grows as gaps close."""
         return self.forces_along(positions, voltages, touching, pressing)
 
-    def _sideways(self, x: Floats, potential: Floats) -> Floats:
-        """Forces along x (P,) that lengthen the tributary lengths, at x (P,), by the potential (P,)."""
-        assert isinstance(self.pad, Pad)  # three dimensions have the vertical direction alone
-        of, moved, value = self.pad.length_gradient(x)
-        return np.asarray(-np.bincount(moved, potential[of] * value, x.size), dtype=float)
+    def _sideways(self, position: Floats, potential: Floats) -> Floats:
+        """Forces (P, dim) along the display that enlarge what nodes at (P, dim) stand for, by the potential
+        (P,).
+        """
+        of, moved, value = self.pad.tributary_gradient(position)
+        found = np.bincount(moved, -potential[of] * value, position.size)
+        return found.astype(float, copy=False).reshape(position.shape)
 
     def _separation(self, position: Floats, pressing: Floats | None) -> Any:
         """Separation of rough faces at nodes at (..., P, dim), in mm."""
@@ -226,26 +229,36 @@ class Attraction:
     ) -> Any:
         """Derivative of `forces` by node positions, sparse (dim P, dim P), ordered (node, component)."""
         size, dim = position.shape
-        frame = surface_state(self.surface, position)
+        frame, ways = surface_state(self.surface, position), np.arange(0, dim, 2)
         on = 1.0 if self.air_layer else touching.astype(float)
         apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
-        p = on * self.law.traction(apart, self._voltages(apart, voltage, position), self.layers)
+        voltages = self._voltages(apart, voltage, position)
+        p = on * self.law.traction(apart, voltages, self.layers)
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)
-        rows = [dim * nodes + 1, dim * nodes + 1, dim * of + 1]
-        columns = [dim * nodes + 1, dim * nodes, moved]
-        values = [-dp, dp * frame.slope, -p[of] * value]
+        up, aside = dim * nodes + 1, dim * nodes[:, None] + ways
+        blocks = [
+            (up, up, -dp),
+            (up[:, None], aside, dp[:, None] * frame.slope),
+            (dim * of + 1, moved, -p[of] * value),
+        ]
         if self.direction == "normal":
             w = p * self.pad.tributary(position)
-            rows += [2 * nodes, 2 * nodes, 2 * of, moved, moved]
-            columns += [2 * nodes + 1, 2 * nodes, moved, 2 * of + 1, 2 * of]
-            values += [
-                dp * frame.slope,
-                w * frame.curvature - dp * frame.slope**2,
-                (p * frame.slope)[of] * value,
-                -p[of] * value,
-                (p * frame.slope)[of] * value,
+            square = frame.slope[:, :, None] * frame.slope[:, None, :]
+            own = w[:, None, None] * frame.curvature - dp[:, None, None] * square
+            shared = (p[:, None] * frame.slope)[of] * value[:, None]
+            at = dim * of[:, None] + ways
+            blocks += [
+                (aside, up[:, None], dp[:, None] * frame.slope),
+                (aside[:, :, None], aside[:, None, :], own),
+                (at, moved[:, None], shared),
+                (moved, dim * of + 1, -p[of] * value),
+                (moved[:, None], at, shared),
             ]
-        triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        return sparse.csr_matrix(triplets, shape=(dim * size, dim * size))
+            potential = on * self.law.potential(apart, voltages, self.layers)
+            row, column, turned = self.pad.tributary_curvature(position, potential)
+            blocks.append((row, column, -turned))
+        whole = [np.broadcast_arrays(*block) for block in blocks]
+        rows, columns, values = (np.concatenate([each[i].ravel() for each in whole]) for i in range(3))
+        return sparse.csr_matrix((values, (rows, columns)), shape=(dim * size, dim * size))

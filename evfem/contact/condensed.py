@@ -4,7 +4,7 @@ The compliance :math:`C = S_{cc}^{-1}` (`evfem.solver`) is kept with the factori
 On a curved profile the contact force turns with the node, a follower force:
 :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes
 in every iteration but touches only the nodes near contact, so it is put into their small block alone
-(`evfem.contact.follower`).
+(`evfem.contact.follower`). On a relief over x and z it turns with both (`evfem.surface.pad.SurfaceState`).
 
 Algorithm (`LinearContactStep.solve`)::
 
@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,8 @@ from evfem.contact.signorini import (
 from evfem.contact.solve import solve_with_attraction
 from evfem.surface.pad import SurfaceState
 
+#: y, x and z of a vector (x, y, z), and the other way round
+COMPONENTS = np.array([1, 0, 2])
 #: why there is no solution where the compliance is not positive
 LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
@@ -52,7 +55,7 @@ class Candidates:
     """Data of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in N).
 
     The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
-    N/mm, statuses (c,), friction coefficients (c,) and slopes over x (c,) in 1/mm. `interface_compliance` (c,
+    N/mm, statuses (c,), friction coefficients (c,), their slopes (c, d) in 1/mm. `interface_compliance` (c,
     1 + d) in mm per N/mm: 0, or 1 / (penalty x tributary length). A law of friction gives its derivative by
     the contact force as the coefficient, `cohesion` (c,) in N/mm, and the growth with the slip,
     `slip_stiffness` (c,) in N/mm per mm. Attraction: see `AttractionStiffness`.
@@ -71,24 +74,13 @@ class Candidates:
     cohesion: Floats | None = None
     slip_stiffness: Floats | None = None
 
-    @cached_property
-    def axes(self) -> Floats:
-        r"""Rows :math:`n = (-h', 1, 0)/r`, :math:`t_1 = (1, h', 0)/r`, :math:`t_2 = (0, 0, 1)` of every node,
-        :math:`r = \sqrt{1 + h'^2}`, in the order (y, x[, z]) of their components, (c, 1 + d, 1 + d).
-        """
-        cos, sin = 1.0 / self.surface.stretch, self.surface.slope / self.surface.stretch
-        axes = np.zeros((cos.size, *2 * self.force.shape[1:]))
-        axes[:, 0, 0] = axes[:, 1, 1] = cos
-        axes[:, 0, 1], axes[:, 1, 0] = -sin, sin
-        axes[:, 2:, 2:] = 1.0
-        return axes
-
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force (y, x[, z]) per x displacement of its node, (c, 1 + d); `own` (c,)."""
-        axes = self.axes
-        rate = self.surface.curvature / self.surface.stretch**2
-        turned = rate[:, None] * (self.force[:, 1:2] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
-        return np.asarray(turned + np.einsum("ca,cak->ck", self.friction_growth(own), axes[:, 1:]))
+        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z],
+        (c, 1 + d, d); `own` (c, d) are its compliances along them.
+        """
+        turned = self.surface.turned(self.force)
+        grown = np.einsum("caj,cak->ckj", self.friction_growth(own), self.surface.axes[:, 1:])
+        return np.asarray(turned + grown)
 
     @property
     def shear_direction(self) -> Floats:
@@ -104,7 +96,7 @@ class Candidates:
         if self.cohesion is None:
             return None
         normal, along = np.maximum(self.force[near, 0], 0.0), self.shear_direction[near]
-        n = self.axes.shape[1]
+        n = self.force.shape[1]
         chord = self.friction[near] + self.cohesion[near] / np.where(normal > 0.0, normal, np.inf)
         blocks = compliance.reshape(near.size, n, near.size, n)[np.arange(near.size), 0, np.arange(near.size)]
         pressed = -blocks[:, 1:] / blocks[:, :1]
@@ -112,17 +104,24 @@ class Candidates:
         return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
 
     def friction_growth(self, own: Floats) -> Floats:
-        """That part of it which is friction: change of the shear force per x displacement, (c, d).
+        """That part of it which is friction: change of the shear force (a) per displacement of the node along
+        x[, z] (j), (c, d, d).
 
-        `own` (c,) is each node's compliance along x. Where friction falls faster than the tissue stiffens, a
-        node snaps forward: its friction stays at the present coefficient. Friction that rises along the way
-        holds in any case.
+        `own` (c, d) are each node's compliances along them. Where friction falls faster than the tissue
+        stiffens, a node snaps forward: its friction stays at the present coefficient. Friction that rises
+        along the way holds in any case.
         """
-        growth = self.shear_direction * (self.friction_slope * self.force[:, 0])[:, None]
+        way = self.shear_direction
+        growth = way[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
+        along = np.any(way, axis=1, keepdims=True)
         if self.slip_stiffness is not None:
-            growth[:, 0] -= self.slip_stiffness * self.surface.stretch
-        steep = growth[:, :1]
-        return np.where((steep < 0.0) | (steep * own[:, None] < STABLE), growth, 0.0)
+            # a node that slips is held along its slip, one that sticks either way
+            held = np.where(along[:, :, None], way[:, :, None] * way[:, None, :], np.eye(way.shape[1]))
+            growth -= self.slip_stiffness[:, None, None] * (held @ self.surface.travel)
+        steep = np.trace(growth, axis1=1, axis2=2)
+        gives = np.sum(np.where(along, way**2, 1.0 / way.shape[1]) * own, axis=1)
+        kept: Any = (steep < 0.0) | (steep * gives < STABLE)
+        return np.asarray(np.where(kept[:, None, None], growth, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +166,7 @@ class CondensedTangent:
 
     def rows(self, near: Ints) -> Ints:
         """Rows of these candidates, (y, x[, z]) node by node."""
-        return np.asarray((self.dim * near[:, None] + np.array([1, 0, 2])[: self.dim]).ravel())
+        return np.asarray((self.dim * near[:, None] + COMPONENTS[: self.dim]).ravel())
 
     def among(self, near: Ints) -> Floats:
         """Compliance among these candidates, in the order of `rows`; often those of the last call."""
@@ -199,13 +198,20 @@ class ExtraUnknown:
     settles it, or another `condition`.
 
     `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y, 2 z) whose
-    force shall be `force` (N/mm).
+    force shall be `force` (N/mm), or that `along` a unit vector (dim,).
     """
 
     push: Floats
     axis: int
     force: float
     condition: Condition | None = None
+    along: Floats | None = None
+
+    def part(self, components: Floats) -> Floats:
+        """What of the bone's components (dim, ...), which come last, is that of its force (...)."""
+        if self.along is None:
+            return np.asarray(components[self.axis - len(components)])
+        return np.asarray(np.tensordot(self.along, components, axes=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,9 +265,9 @@ class LinearContactStep:
             near = np.union1d(near, penetrated)
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
-        own = np.diagonal(self.seen)[0 :: self.body.dim]
-        # the shear of closed nodes also follows x within the step, by the slope of their friction
-        grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim, None]
+        # the shear of closed nodes also follows its place within the step, by the slope of their friction
+        way = moved.reshape(-1, self.body.dim)[:, ::2]
+        grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), way)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
         given = None
         if self.bed is not None:
@@ -287,9 +293,14 @@ class LinearContactStep:
         found = S @ np.concatenate([solution.moved, bone]) - self.residual[axis]
         return float(unknown.force + own - found)
 
+    @cached_property
+    def _own(self) -> Floats:
+        """Each candidate's own compliance along x[, z], (c, d)."""
+        return np.diagonal(self.seen).reshape(-1, self.body.dim)[:, ::2]
+
     def _along_normal(self, moved: Floats) -> Floats:
-        normal = self.candidates.axes[:, 0]
-        return np.einsum("ck,ck->c", normal[:, :2], moved.reshape(-1, self.body.dim)[:, 1::-1])
+        normal, dim = self.candidates.surface.axes[:, 0], self.body.dim
+        return np.einsum("ck,ck->c", normal, moved.reshape(-1, dim)[:, COMPONENTS[:dim]])
 
     def _free_motion(self) -> Floats:
         """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1 + p)."""
@@ -302,8 +313,8 @@ class LinearContactStep:
     @cached_property
     def _present(self) -> Floats:
         """Present contact forces on the candidates (dim c,), in the laboratory frame."""
-        force = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes)
-        return np.concatenate([force[:, 1::-1], force[:, 2:]], axis=1).ravel()
+        force = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.surface.axes)
+        return force[:, COMPONENTS[: self.body.dim]].ravel()
 
     def _whole(self, near: Ints, pushed: Floats) -> Floats:
         """Forces on all candidates (dim c,), of those on the near ones in `CondensedTangent.rows`."""
@@ -322,7 +333,7 @@ class LinearContactStep:
         friction that rises with the speed for example, multiplies that and not the whole free motion.
         """
         known, rows, dim = self.candidates, self.body.rows(near), self.body.dim
-        follower = FollowerStiffness.of(known.follower_rate(np.diagonal(self.seen)[::dim])[near])
+        follower = FollowerStiffness.of(known.follower_rate(self._own)[near])
         among, own, held = self.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
@@ -342,7 +353,7 @@ class LinearContactStep:
                 raise Unstable(LOST_STABILITY) from error
             raise
         pressed = (found.force + found.attraction_drop).reshape(-1, dim)
-        force = np.einsum("ka,kab->kb", pressed, known.axes[near]).ravel()
+        force = np.einsum("ka,kab->kb", pressed, known.surface.axes[near]).ravel()
         if follower.loaded.size:
             force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
         return found, force
@@ -352,7 +363,7 @@ class LinearContactStep:
     ) -> ContactProblem:
         """Compliance of the `near` nodes in their frames, which other forces have `moved`."""
         known, (C, W), extra = self.candidates, moved, None
-        axes = known.axes[near]
+        axes = known.surface.axes[near]
         at_rest = np.column_stack([known.surface.normal_gap[near], known.slip[near]])
         if balance is not None:
             row, pivot, right = balance
@@ -389,10 +400,17 @@ class LinearContactStep:
         sides (p,), and what forces on the candidates add (p, m - dim); the bone's balance along their axes,
         or a condition.
         """
-        axis = [unknown.axis - self.body.dim for unknown in self.unknowns]
-        S, carried = self.body.schur[axis], self.body.bone_rows[axis]
-        share = -np.stack([unknown.push[axis] for unknown in self.unknowns], axis=1)
-        wanted = self.residual[axis] + np.array([unknown.force for unknown in self.unknowns])
+        dim = self.body.dim
+        S, carried, pushed, residual = (
+            np.stack([unknown.part(rows) for unknown in self.unknowns])
+            for rows in (
+                self.body.schur[-dim:],
+                self.body.bone_rows,
+                np.stack([unknown.push[-dim:] for unknown in self.unknowns], axis=1),
+                self.residual[-dim:],
+            )
+        )
+        share, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:
                 S[i], share[i], wanted[i] = condition.row, condition.share, condition.wanted
@@ -402,8 +420,8 @@ class LinearContactStep:
     def _held(self, pivot: Floats, free: Floats) -> Floats:
         """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
         dim = self.body.dim
-        axis = [unknown.axis - dim for unknown in self.unknowns]
-        floor = SMALLEST_PIVOT * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
+        S = np.stack([unknown.part(self.body.schur[-dim:]) for unknown in self.unknowns])
+        floor = SMALLEST_PIVOT * np.abs(S[:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
         return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
 

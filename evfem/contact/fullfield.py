@@ -279,7 +279,9 @@ class FieldAttraction(Attraction):
     ) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
         x, levels = self.outline(position, lines, pressing)
-        field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope, near)
+        field, forces = self._solved(
+            x, levels, surface_state(self.surface, lines @ position).slope[:, 0], near
+        )
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
@@ -290,7 +292,7 @@ class FieldAttraction(Attraction):
         start = self._above(position, lines, pressing, near)[1]
         ways = np.zeros((2, self._size, 2))
         ways[0, :, 0] = 1.0
-        ways[0, closed, 1], ways[1, ~closed, 1] = frame.slope[closed], 1.0
+        ways[0, closed, 1], ways[1, ~closed, 1] = frame.slope[closed, 0], 1.0
         triplets = []
         for axis, first in product(range(2), range(min(APART, nodes.size))):
             moved = nodes[first::APART]

@@ -54,8 +54,8 @@ def stability_ratio(step: LinearContactStep) -> StabilityRatio:
     slipping = np.flatnonzero(known.status >= FORWARD)
     opened = np.flatnonzero((known.status == OPEN) & (known.negative_stiffness > 0.0))
     ratio, normal = _shear_ratio(step)[slipping], np.maximum(known.force[slipping, 0], 0.0)
-    turning = -normal * (1.0 + ratio**2) * (surface.curvature / surface.stretch**3)[slipping]
-    slope = known.friction_slope[slipping] / surface.stretch[slipping]
+    turning = -normal * (1.0 + ratio**2) * (surface.curvature[:, 0, 0] / surface.stretch**3)[slipping]
+    slope = known.friction_slope[slipping, 0] / surface.stretch[slipping]
     falling = np.sign(ratio) * normal * slope
     faster = np.zeros(slipping.size)
     if known.slip_stiffness is not None:
@@ -93,7 +93,7 @@ def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
 
 def _compliance(step: LinearContactStep) -> Floats:
     """Compliance of the candidates (2 c, 2 c) below a bone that stands still, in their frames."""
-    axes, C = step.candidates.axes, step.among(np.arange(step.candidates.status.size))
+    axes, C = step.candidates.surface.axes, step.among(np.arange(step.candidates.status.size))
     return local(axes, local(axes, C).T).T + np.diag(_yielding(step.candidates).ravel())
 
 
@@ -110,7 +110,7 @@ def _yielding(known: Candidates) -> Floats:
 
 def _bone(step: LinearContactStep) -> ExtraUnknowns:
     """The bone's travel under a prescribed force as an extra unknown, with its equation."""
-    rows, axes = step.body.rows(np.arange(step.candidates.status.size)), step.candidates.axes
+    rows, axes = step.body.rows(np.arange(step.candidates.status.size)), step.candidates.surface.axes
     if not step.unknowns:
         none = np.zeros((0, rows.size))
         return ExtraUnknowns(none.T, none, np.zeros((0, 0)), np.zeros(0))

@@ -284,7 +284,7 @@ def electrode_charge(pad: PadState) -> Reading:
     by_gap, by_length = charging.charge_slopes(at)
     by_gap = np.where(surface.gap > CLOSED, by_gap, 0.0)
     by_position = np.zeros_like(pad.position)
-    by_position[:, 0], by_position[:, 1] = -by_gap * surface.slope, by_gap
+    by_position[:, ::2], by_position[:, 1] = -by_gap[:, None] * surface.slope, by_gap
     of, moved, value = pad.attraction.pad.tributary_gradient(pad.position)
     by_position += np.bincount(moved, by_length[of] * value, by_position.size).reshape(by_position.shape)
     return Reading(charging.electrode_charge(at), KILOVOLT * charging.capacity(at), by_position)
@@ -294,5 +294,5 @@ def smallest_gap(pad: PadState) -> Reading:
     """The smallest vertical gap of the pad (mm)."""
     least = int(np.argmin(pad.surface.gap))
     by_position = np.zeros_like(pad.position)
-    by_position[least, :2] = -pad.surface.slope[least], 1.0
+    by_position[least, ::2], by_position[least, 1] = -pad.surface.slope[least], 1.0
     return Reading(float(pad.surface.gap[least]), 0.0, by_position)

@@ -28,7 +28,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
 from evfem.common.pictures import read_grey
-from evfem.common.tables import numbers, read_columns
+from evfem.common.tables import gridded, numbers, read_columns
 from evfem.errors import InputError
 from evfem.finger.outline import Ridges, quintic
 
@@ -137,18 +137,10 @@ def read(path: Path, pixel: float, height: float, dark: str | None = None) -> He
     does. Raises `InputError`.
     """
     if path.suffix.lower() == ".csv":
-        return _from_rows(*read_columns(path, ["x", "z", "height"], "finger.ridges"))
+        return HeightMap(
+            *gridded("finger.ridges", *read_columns(path, ["x", "z", "height"], "finger.ridges"))
+        )
     return _from_image(path, pixel, height, dark)
-
-
-def _from_rows(x: Floats, z: Floats, height: Floats) -> HeightMap:
-    xs, zs = np.unique(x), np.unique(z)
-    order = np.lexsort((x, z))
-    full = len(xs) * len(zs) == len(x) and min(len(xs), len(zs)) > 1
-    if not full or (x[order].reshape(len(zs), -1) != xs).any():
-        given = f"{len(x)} rows of {len(xs)} x and {len(zs)} z"
-        raise InputError("finger.ridges", given, "one row for every pair of at least two x and two z")
-    return HeightMap(xs, zs, height[order].reshape(len(zs), len(xs)))
 
 
 def _from_image(path: Path, pixel: float, height: float, dark: str | None) -> HeightMap:

@@ -154,7 +154,7 @@ class VoltageControl:
         return voltage
 
     def missing(self, reaction: Floats) -> float:
-        """Force on the bone along x (N/mm) that the control's equation lacks at these reactions (2,)."""
+        """Force on the bone (N/mm) that the control's equation lacks at these reactions (dim,)."""
         return 0.0
 
     def lacking(self, pad: PadState) -> float:
@@ -178,8 +178,10 @@ class VoltageControl:
         """The voltage where it follows what the pad does, or nothing."""
         return ()
 
-    def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
-        """Whether the equation, or its bound, holds for a bone that moves `forward` (+1 or -1)."""
+    def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
+        """Whether the equation, or its bound, holds for a bone that moves along the display by `travel`
+        (d,).
+        """
         return True
 
     def fallback(self, old: State, found: State | None) -> VoltageControl | None:
@@ -281,13 +283,15 @@ class GivenGap(ConstrainedVoltage):
 
 @dataclass
 class FollowFriction(VoltageControl):
-    """The voltage, from 0 to `voltage` (V), makes the bone's force along x `force` (N/mm).
+    """The voltage, from 0 to `voltage` (V), makes the bone's force along a `way` in the plane of the display,
+    x or x and z of a unit vector, `force` (N/mm).
 
     Friction of a pad that sticks hardly depends on the voltage, which then stays as it was.
     """
 
     force: float
     voltage: float
+    way: tuple[float, ...] = (1.0,)
     _mode: str = field(default=UNKNOWN, repr=False, compare=False)
     follows = True
 
@@ -300,13 +304,19 @@ class FollowFriction(VoltageControl):
         self._mode = AT_ZERO if old.voltage == 0.0 else UNKNOWN
 
     def missing(self, reaction: Floats) -> float:
-        return float(self.force - reaction[0]) if self.free else 0.0
+        return self._lacks(reaction) if self.free else 0.0
+
+    def _lacks(self, reaction: Floats) -> float:
+        return float(self.force - reaction[::2] @ np.array(self.way))
 
     def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
         if not self.free:
             return VoltageStep(problem.solve(step))
         unit, push = problem.unit()
-        found = problem.solve(replace(step, unknowns=(*step.unknowns, ExtraUnknown(push, 0, self.force))))
+        along = np.zeros(step.bone.size)
+        along[::2] = self.way
+        unknown = ExtraUnknown(push, 0, self.force, along=along)
+        found = problem.solve(replace(step, unknowns=(*step.unknowns, unknown)))
         most, change = (self.voltage / KILOVOLT) ** 2, float(found.extra[-1])
         if not 0.0 <= problem.squared + change <= most:
             self._mode = AT_ZERO if problem.squared + change < 0.0 else AT_LIMIT
@@ -314,11 +324,12 @@ class FollowFriction(VoltageControl):
             found = problem.solve(replace(step, residual=step.residual + change * push))
         return VoltageStep(found, change, unit)
 
-    def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
+    def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
         """At a bound the force may miss `force` in its direction; else the voltage is unknown again."""
         if self.free:
             return True
-        lacking = forward * (self.force - reaction[0])
+        forward = float(np.sign(travel @ np.array(self.way))) or 1.0
+        lacking = forward * self._lacks(reaction)
         if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
             self._mode = UNKNOWN
             return False
@@ -338,8 +349,8 @@ def sticks(state: State) -> bool:
 @dataclass(frozen=True)
 class Target:
     """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds,
-    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x is then that of
-    the drive, and the bone's an unknown.
+    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x and z are then those of
+    the drive, and the bone's unknowns.
     """
 
     x: float
@@ -361,22 +372,29 @@ class Target:
 
     def bone(self, present: Floats) -> Floats:
         """Translation of the bone (dim,) as far as it is known; the `present` one where it is not."""
-        x = self.x if self.hand is None else float(present[0])
-        along = [] if self.z is None else [self.z]
-        return np.array([x, self.height.known(float(present[1])), *along])
+        bone = np.array(present, dtype=float)
+        bone[1] = self.height.known(float(present[1]))
+        if self.hand is None:
+            bone[::2] = self.place
+        return bone
+
+    @property
+    def place(self) -> Floats:
+        """x[, z] of the drive (d,)."""
+        return np.array([self.x] if self.z is None else [self.x, self.z])
 
     def increment(self, present: Floats) -> Floats:
         """Expected displacement of the bone from its `present` translation (dim,)."""
         increment = self.bone(present) - present
         if self.hand is not None:
-            increment[0] = self.hand.increment
+            increment[::2] = self.hand.increment
         return increment
 
     def begun(self, old: State) -> Target:
         """The target of a step that starts from `old`."""
         if self.hand is None:
             return self
-        return replace(self, hand=self.hand.begun(old, self.x, self.duration))
+        return replace(self, hand=self.hand.begun(old, self.place, self.duration))
 
     def reached(self, bone: Floats) -> bool:
         """Whether the bone's translation is, to the last digit, what is known of it."""
@@ -390,9 +408,10 @@ class Target:
             return old
         before, now = old.rates[0][bone].tolist(), ((self.bone(old.bone) - old.bone) / self.duration).tolist()
         pairs = list(zip(before, now, strict=True))
+        if self.hand is not None:
+            driven = (self.place - old.hand[0]) / self.duration
+            pairs[::2] = zip(old.hand[3].tolist(), driven.tolist(), strict=True)
         if self.height.free:
             del pairs[1]
-        if self.hand is not None:
-            pairs[0] = float(old.hand[3]), (self.x - float(old.hand[0])) / self.duration
         jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)
         return replace(old, seconds=0.0) if jumps else old

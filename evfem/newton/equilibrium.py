@@ -175,7 +175,7 @@ class Equilibrium:
             if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
-            self.interface.jumps.watch(self.interface.places(state)[:, 0], state.touching)
+            self.interface.jumps.watch(self.interface.on_display(state), state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 
@@ -192,9 +192,9 @@ class Equilibrium:
     def _accepts(self, old: State, state: State, target: Target) -> bool:
         if not self.obeys_contact(old, state):
             return False
-        forward = float(np.sign(target.x - old.bone[0])) or 1.0
+        travel = target.place - old.bone[::2]
         slack = self.tolerance * max(np.abs(state.reaction).max(), SMALLEST_FORCE)
-        return target.voltage.accepts(forward, state.reaction, slack)
+        return target.voltage.accepts(travel, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:
         """Whether contact and friction hold here; a node that penetrates becomes a candidate."""

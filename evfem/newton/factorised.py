@@ -152,7 +152,7 @@ class FactorisedBody:
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
         if target.hand is not None:
-            missing.append(target.hand.unbalanced(float(state.bone[0]), reaction))
+            missing.append(target.hand.unbalanced(state.bone[::2], reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
         return max(float(free / largest), target.voltage.lacking(self._pad_state(state)))
 
@@ -197,7 +197,7 @@ class FactorisedBody:
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.voltage.free else after.voltage
         if target.hand is not None:
-            bone[0] = mixed.bone[0]
+            bone[::2] = mixed.bone[::2]
         return replace(mixed, bone=bone, voltage=voltage)
 
     def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
@@ -265,12 +265,12 @@ class FactorisedBody:
         return CandidatesBed(below.among(c), pulled.ravel())
 
     def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
-        """Travels of the bone that are not given: first along y, then along x."""
+        """Travels of the bone that are not given: first along y, then along x[, z]."""
         tangent = self.linearisation.tangent
         height = target.height.unknowns(tangent, float(state.bone[1]))
         if target.hand is None:
             return height
-        return (*height, target.hand.unknown(tangent, float(state.bone[0]), state.bone.size))
+        return (*height, *target.hand.unknowns(tangent, state.bone))
 
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
@@ -363,7 +363,7 @@ class FactorisedBody:
         the iterations show; a tangent of the tissue that is not positive definite is not detected.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
-        crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
+        crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
         timed = dynamics is not None and dynamics.step > 0.0
         if timed or state.bone.size == 3 or not crests.any():
             return None

@@ -9,7 +9,8 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
 
 by backward Euler; beside tissue with mass by its differences of second order
 (`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts
-and the bone comes to rest. Across the slide, the motion prescribes the bone's height.
+and the bone comes to rest. In three dimensions the same holds along z, with the same spring, damper and
+mass. The motion prescribes the bone's height.
 
 Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
 100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
@@ -20,7 +21,7 @@ kg, and the cut-off frequency of the friction, that of a first-order system, by 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -77,52 +78,56 @@ class Hand:
 
     def stored(self, state: State) -> float:
         """Energy of the spring in N mm."""
-        return 0.5 * self.stiffness * (state.hand[0] - float(state.bone[0])) ** 2
+        return 0.5 * self.stiffness * float(np.sum((state.hand[0] - state.bone[::2]) ** 2))
 
     def kinetic(self, state: State) -> float:
         """Energy of the mass in N mm."""
-        return 0.5 * self.mass * float(state.hand[1]) ** 2
+        return 0.5 * self.mass * float(np.sum(state.hand[1] ** 2))
 
     def given(self, old: State, new: State) -> float:
         """Work of the actuator beyond that on the bone, between two states, in N mm."""
         drive = 0.5 * (old.hand[2] + new.hand[2]) * (new.hand[0] - old.hand[0])
-        return float(drive - 0.5 * (old.reaction[0] + new.reaction[0]) * (new.bone[0] - old.bone[0]))
+        bone = 0.5 * (old.reaction + new.reaction) * (new.bone - old.bone)
+        return float(np.sum(drive - bone[::2]))
 
     def dissipation(self, old: State, new: State, duration: float) -> float:
         """Dissipation of the damper in so many seconds, in N mm."""
         if duration == 0.0:
             return 0.0
-        stretched = (new.hand[0] - old.hand[0]) - (new.bone[0] - old.bone[0])
-        return float(self.damping * stretched**2 / duration)
+        stretched = (new.hand[0] - old.hand[0]) - (new.bone - old.bone)[::2]
+        return float(self.damping * np.sum(stretched**2) / duration)
 
 
-#: drive's x (mm), the bone's velocity (mm/s) and the drive's force (N/mm) at the beginning of a run, and mean
-#: rates of the drive's x, the bone's and its velocity over the part before
-AT_REST: Floats = np.zeros(6)
+def at_rest(dim: int) -> Floats:
+    """Along x[, z], (6, d), at the beginning of a run: the drive's place (mm), the bone's velocity (mm/s),
+    the drive's force (N/mm), and mean rates of the drive's place, the bone's and its velocity over the part
+    before.
+    """
+    return np.zeros((6, dim - 1))
 
 
 @dataclass(frozen=True)
 class HandControl:
-    """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s), and
-    their mean rates over the part before, which the step's `difference` may count.
+    """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), its
+    velocity (mm/s), and their mean rates over the part before, which the step's `difference` may count, (d,)
+    each.
     """
 
     hand: Hand
-    drive: float = 0.0
+    drive: Any = 0.0
     duration: float = 0.0
-    before: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rates: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    before: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
+    rates: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
     difference: Difference = field(default_factory=Difference)
 
-    def begun(self, old: State, drive: float, duration: float) -> HandControl:
-        """In the step from `old` that takes the drive to x = `drive`."""
-        before = (float(old.hand[0]), float(old.bone[0]), float(old.hand[1]))
-        along, moved, faster = old.hand[3:].tolist()
+    def begun(self, old: State, drive: Floats, duration: float) -> HandControl:
+        """In the step from `old` that takes the drive to x[, z] = `drive` (d,)."""
+        before, (along, moved, faster) = (old.hand[0], old.bone[::2], old.hand[1]), old.hand[3:]
         difference = Difference.over(duration, old.seconds)
         return HandControl(self.hand, drive, duration, before, (along, moved, faster), difference)
 
-    def _rate(self, number: int, end: float) -> float:
-        """Rate at the end of the step of one of the three that were `before`."""
+    def _rate(self, number: int, end: Any) -> Any:
+        """Rate at the end of the step, (d,), of one of the three that were `before`."""
         mean = (end - self.before[number]) / self.duration
         return self.difference.share * mean - self.difference.lag * self.rates[number]
 
@@ -135,48 +140,53 @@ class HandControl:
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
 
     @property
-    def increment(self) -> float:
-        """Displacement of the bone if nothing changes (mm)."""
+    def increment(self) -> Any:
+        """Displacement of the bone if nothing changes, (d,) in mm."""
         return self.before[2] * self.duration
 
-    def velocity(self, x: float) -> float:
-        """Velocity of the bone at the end of the step, in mm/s."""
-        return self._rate(1, x) if self.duration > 0.0 else 0.0
+    def velocity(self, x: Any) -> Any:
+        """Velocity of the bone at the end of the step, (d,) in mm/s."""
+        return self._rate(1, x) if self.duration > 0.0 else 0.0 * x
 
-    def driving(self, x: float) -> float:
-        """Force of the drive (N/mm), that of spring and damper, at the bone's x."""
+    def driving(self, x: Any) -> Any:
+        """Force of the drive (d,) in N/mm, that of spring and damper, at the bone's x[, z] (d,)."""
         force = self.hand.stiffness * (self.drive - x)
         if self.duration > 0.0:
             force += self.hand.damping * (self._rate(0, self.drive) - self._rate(1, x))
         return force
 
-    def force(self, x: float) -> float:
-        """Force on the bone (N/mm): that of the drive minus the inertia of the mass."""
+    def force(self, x: Any) -> Any:
+        """Force on the bone (d,) in N/mm: that of the drive minus the inertia of the mass."""
         force = self.driving(x)
         if self.duration > 0.0:
             force -= self.hand.mass * self._rate(2, self.velocity(x))
         return force
 
-    def missing(self, x: float, reaction: Floats) -> float:
-        """Force along x (N/mm) that the bone lacks at its x and reactions (dim,)."""
-        return float(self.force(x) - reaction[0])
+    def missing(self, x: Any, reaction: Floats) -> Floats:
+        """Forces along x[, z] (d,) in N/mm that the bone lacks there and at reactions (dim,)."""
+        return np.asarray(self.force(x) - reaction[::2])
 
-    def unbalanced(self, x: float, reaction: Floats) -> float:
-        """The force `missing` beyond rounding, not negative: each of the four places rounds by itself."""
-        largest = max(abs(place) for place in (x, self.drive, *self.before[:2]))
+    def unbalanced(self, x: Any, reaction: Floats) -> float:
+        """The largest force `missing` beyond rounding, not negative: each of the four places rounds by
+        itself.
+        """
+        largest = max(float(np.max(np.abs(place))) for place in (x, self.drive, *self.before[:2]))
         rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
-        return max(abs(self.missing(x, reaction)) - rounding, 0.0)
+        return max(float(np.abs(self.missing(x, reaction)).max()) - rounding, 0.0)
 
-    def unknown(self, tangent: CondensedTangent, x: float, dim: int) -> ExtraUnknown:
-        """The bone's travel from x, in mm."""
-        push = -tangent.schur[:, -dim]
-        push[-dim] -= self.stiffness
-        return ExtraUnknown(push, 0, self.force(x))
+    def unknowns(self, tangent: CondensedTangent, bone: Floats) -> tuple[ExtraUnknown, ...]:
+        """The bone's travels along x[, z] from its translation (dim,), in mm."""
+        found = []
+        for axis, force in zip((0, 2), self.force(bone[::2]).tolist(), strict=False):
+            push = -tangent.schur[:, axis - bone.size]
+            push[axis - bone.size] -= self.stiffness
+            found.append(ExtraUnknown(push, axis, force))
+        return tuple(found)
 
     def settled(self, state: State) -> State:
         """The accepted state with what the hand keeps."""
-        x = float(state.bone[0])
-        ends = (self.drive, x, self.velocity(x))
-        changes = np.array(ends) - self.before
+        x = state.bone[::2]
+        ends = np.stack([self.drive, x, self.velocity(x)])
+        changes = ends - self.before
         rates = changes / self.duration if self.duration > 0.0 else 0.0 * changes
-        return replace(state, hand=np.array([self.drive, ends[2], self.driving(x), *rates]))
+        return replace(state, hand=np.stack([self.drive, ends[2], self.driving(x), *rates]))

@@ -1,15 +1,16 @@
 r"""The interface of pad and surface: gaps, slips and friction of the pad nodes, and the laws of contact.
 
-Contact forces of a state are along the profile's normal and tangent at the node's x, in three dimensions
-along z too. Slip is counted along the profile, :math:`r\,\Delta x` with its stretch r, from the last accepted
-x, or from the jump of friction that holds the node (`FrictionJumps`), and along z. A slipping node's shear
-force opposes its slip. With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
+Contact forces of a state are along the surface's normal and tangents at the node's place
+(`evfem.surface.pad.SurfaceState`). Slip is counted along the tangents, in the plane :math:`r\,\Delta x` with
+the profile's stretch r, from the last accepted place, or from the jump of friction that holds the node
+(`FrictionJumps`). A slipping node's shear force opposes its slip. With penalties the interface has a
+compliance of its own, g + lam_n / (p_n A) = 0
 and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +26,7 @@ from evfem.common.constants import (
     SMALLEST_FORCE,
 )
 from evfem.contact.bed import Bed, Yielding
-from evfem.contact.condensed import Candidates
+from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.contact.slipping import OscillatingNodes
 from evfem.newton.state import State
@@ -33,52 +34,71 @@ from evfem.protocols import FrictionLaw
 from evfem.surface.friction import Slipping, with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
+from evfem.surface.ways import Steps
 
 
 class FrictionJumps:
-    """Nodes that a jump of the friction coefficient holds during one step; `x` (P,) is nan for free nodes.
+    """Nodes that a jump of the friction coefficient holds during a step; `place` (P, d) is nan for free ones.
 
     A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
     to the higher limit. At the jump the coefficient has no single value, and iterates alternate between its
-    two sides. Such a node is fixed `PIN_OFFSET` inside the rougher side, where it sticks with the higher
-    coefficient, and is released below the lower limit. A node that began the step on the rougher side is
-    not held.
+    two sides. Such a node is fixed where its way crosses the jump, `PIN_OFFSET` inside the rougher side,
+    where it sticks with the higher coefficient, and is released below the lower limit. A node that began the
+    step on the rougher side is not held.
     """
 
-    def __init__(self, jumps: Floats, size: int) -> None:
-        """`jumps` (J, 3): position, coefficient before and behind."""
-        self.table, self.size = jumps, size
-        self.begin(np.zeros(size))
+    def __init__(self, steps: Sequence[Steps], begin: Floats) -> None:
+        """The jumps along x, and in space along z; where the nodes begin (P, d)."""
+        self.steps = steps
+        self.begin(begin)
 
-    def begin(self, x: Floats) -> None:
-        """Starts a step with the nodes at x (P,) in mm, none held."""
-        self.x = np.full(self.size, np.nan)
-        self.lower = np.zeros(self.size)
-        if len(self.table):
-            self._side, self._begin = np.searchsorted(self.table[:, 0], x, side="right"), x
-            self._changes = np.zeros(self.size, dtype=np.int64)
-            self._released = np.zeros(self.size, dtype=bool)
+    def begin(self, place: Floats) -> None:
+        """Starts a step with the nodes at these places (P, d) in mm, none held."""
+        self.place = np.full(place.shape, np.nan)
+        self.lower = np.zeros(len(place))
+        self._begin = place
+        self._side = [self._sides(steps, place) for steps in self.steps]
+        self._changes = np.zeros((len(self.steps), len(place)), dtype=np.int64)
+        self._released = np.zeros(len(place), dtype=bool)
+
+    @staticmethod
+    def _sides(steps: Steps, place: Floats) -> Ints:
+        """How many jumps along their axis the nodes at these places have behind them (P,)."""
+        return np.asarray(np.searchsorted(steps.place, place[:, steps.axis], side="right"))
 
     @property
     def held(self) -> Any:
         """Nodes at a jump, (P,) bool."""
-        return np.isfinite(self.x)
+        return np.isfinite(self.place[:, 0])
 
-    def watch(self, x: Floats, touching: Any) -> None:
+    def at(self, place: Floats) -> Floats:
+        """Where the nodes count as being (P, d): held ones at their jump, others at `place`."""
+        return np.where(np.isfinite(self.place), self.place, place)
+
+    def watch(self, place: Floats, touching: Any) -> None:
         """Counts changes of side at the next iterate; holds a node after `CHANGES` of them."""
-        if not len(self.table):
-            return
-        side = np.searchsorted(self.table[:, 0], x, side="right")
-        moved = touching & (side != self._side) & ~self._released
-        self._changes += moved
-        new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
-        place, before, behind = self.table[np.maximum(side, self._side)[new] - 1].T
+        for number, steps in enumerate(self.steps):
+            side = self._sides(steps, place)
+            moved = touching & (side != self._side[number]) & ~self._released
+            self._changes[number] += moved
+            new = np.flatnonzero(moved & (self._changes[number] >= CHANGES) & ~self.held)
+            self._hold(steps, new, np.maximum(side, self._side[number])[new] - 1, place)
+            self._side[number] = side
+
+    def _hold(self, steps: Steps, new: Ints, which: Ints, place: Floats) -> None:
+        """Holds nodes `new` (k,) that come to the jumps `which` (k,) from their smoother side."""
+        begin, axis = self._begin[new], steps.axis
+        way = place[new] - begin
+        whole = np.where(way[:, axis] == 0.0, 1.0, way[:, axis])
+        crossed = begin + way * ((steps.place[which] - begin[:, axis]) / whole)[:, None]
+        across = crossed[:, 1 - axis] if crossed.shape[1] > 1 else np.zeros(new.size)
+        before, behind = steps.sides(which, across)
         inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
-        from_smoother = (place - self._begin[new]) * inside > 0.0
+        crossed[:, axis] = steps.place[which] + inside
+        from_smoother = (steps.place[which] - begin[:, axis]) * inside > 0.0
         new = new[from_smoother]
-        self.x[new] = (place + inside)[from_smoother]
+        self.place[new] = crossed[from_smoother]
         self.lower[new] = np.minimum(before, behind)[from_smoother]
-        self._side = side
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
         """Releases nodes whose shear force is below the lower `limit` (P,); returns if there were any."""
@@ -86,22 +106,9 @@ class FrictionJumps:
 
     def let_go(self, loose: Any) -> bool:
         """Releases these nodes (P,) bool for the rest of the step; returns whether there were any."""
-        self.x[loose] = np.nan
-        if loose.any():
-            self._released |= loose
+        self.place[loose] = np.nan
+        self._released |= loose
         return bool(loose.any())
-
-
-def steps_of_friction(surface: Any, short: float) -> Floats:
-    """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J,
-    3) in ascending order: position, coefficient before and behind. A ramp that a node crosses in
-    one iteration is to it a jump at its rougher end.
-    """
-    jumps, ramps = surface.friction_jumps, getattr(surface, "friction_ramps", np.zeros((0, 4)))
-    begin, end, before, behind = ramps[ramps[:, 1] - ramps[:, 0] < short].T
-    place = np.where(behind > before, end, begin)
-    both = np.concatenate([jumps, np.stack([place, before, behind], axis=1)])
-    return both[np.argsort(both[:, 0], kind="stable")]
 
 
 #: from a voltage (V) to `Attraction.restored`
@@ -129,9 +136,7 @@ class Interface:
         self.follows = self.dim == 3
         self.length = pad.spacing(self.points)
         self._down = pad.facing(self.points)
-        # coefficients of friction may change over x in three dimensions, but not jump
-        jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
-        self.jumps = FrictionJumps(jumps, pad.nodes.size)
+        self.jumps = FrictionJumps(surface.friction_steps(SHORT_RAMP * self.length), self.points[:, ::2])
         elastic, least = getattr(surface, "elastic", None), SHORTEST_LENGTH * self.length
         self.bed: Bed | None = None
         if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
@@ -144,7 +149,7 @@ class Interface:
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
-        self.jumps.begin(self.places(old)[:, 0])
+        self.jumps.begin(self.on_display(old))
         self._oscillating = OscillatingNodes(self.pad.nodes.size)
         self.duration = duration
 
@@ -156,6 +161,10 @@ class Interface:
         """Current positions of the pad nodes (P, dim) relative to the surface, as if it were rigid."""
         return self.positions(state.u) if self.bed is None else self.positions(state.u) + state.given
 
+    def on_display(self, state: State) -> Floats:
+        """x of `places` (P, 1), in space x and z (P, 2)."""
+        return self.places(state)[:, ::2]
+
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states, which many ask for."""
         for u, given, found in self._surfaces:
@@ -164,7 +173,7 @@ class Interface:
         found = surface_state(self.surface, self.places(state))
         if self.bed is not None:
             shortened, sunk = state.strain.T
-            found = replace(found, slope=(found.slope - sunk) / (1.0 - shortened))
+            found = replace(found, slope=(found.slope - sunk[:, None]) / (1.0 - shortened)[:, None])
         self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
 
@@ -207,35 +216,29 @@ class Interface:
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, dim)."""
-        surface = self.surface_at(state)
-        slope, force = surface.slope, state.contact_force.copy()
-        normal, shear = state.contact_force[:, :2].T
-        force[:, 0], force[:, 1] = shear - slope * normal, normal + slope * shear
-        force[:, :2] /= surface.stretch[:, None]
-        return force
+        force = np.einsum("pa,pak->pk", state.contact_force, self.surface_at(state).axes)
+        return np.asarray(force[:, COMPONENTS[: self.dim]])
 
     def slip(self, old: State, state: State) -> Floats:
-        """Slips of the pad nodes (P, dim - 1) in mm, along the profile and along z."""
-        position = self.places(state)
-        moved = (position - self.places(old))[:, ::2]
-        moved[:, 0] = self.surface_at(state).stretch * (position[:, 0] - self._origin(old))
-        return moved
+        """Slips of the pad nodes (P, dim - 1) in mm, along the surface's tangents."""
+        way = self.on_display(state) - self.jumps.at(self.on_display(old))
+        return np.asarray(np.einsum("paj,pj->pa", self.surface_at(state).travel, way))
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
         """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
-        position, surface = self.places(state)[c], self.surface_at(state).of(c)
+        place, surface = self.on_display(state), self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
-        friction = self.friction(old, c, np.where(self.jumps.held[c], self.jumps.x[c], position[:, 0]))
+        friction = self.friction(old, c, self.jumps.at(place)[c])
         known = Candidates(
             surface=surface,
             slip=slip,
             force=state.contact_force[c],
             status=state.status[c],
             friction=friction,
-            friction_slope=np.broadcast_to(self.surface.friction_slope(position[:, 0]), friction.shape),
+            friction_slope=self.surface.friction_gradient(place[c]),
             interface_compliance=compliance,
             negative_stiffness=negative_stiffness[c],
             gain_on_closing=gain_on_closing[c],
@@ -253,10 +256,9 @@ class Interface:
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])
         slip = np.where(known.status >= FORWARD, way, 0.0)
         moving = self.slipping(old, state, c, known.friction, slip)
-        if self.dim == 2:
-            found = self._oscillating.linearised(law, moving, c, known.status, shear)
-        else:  # the direction of a slip turns: the law by the speed of the iterate
-            found = replace(moving.linearised(law), by_speed=np.zeros_like(slip))
+        found = self._oscillating.linearised(law, moving, c, known.status, shear)
+        if self.dim == 3:  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
+            found = replace(found, by_speed=np.maximum(found.by_speed, 0.0))
         by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
         by_slip = by_speed / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         yielding = np.maximum(by_slip, 0.0) * give
@@ -271,7 +273,7 @@ class Interface:
             friction=series * found.slope,
             cohesion=series * (found.offset + yielding * shear),
             slip_stiffness=series * by_slip if self.duration > 0.0 else None,
-            friction_slope=series * known.friction_slope * by_place,
+            friction_slope=(series * by_place)[:, None] * known.friction_slope,
         )
 
     def slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
@@ -300,10 +302,10 @@ class Interface:
         """Tributary lengths or areas (P,) in a state."""
         return self.tributary_of(self.places(state))
 
-    def tributary_at(self, part: tuple[State, State], x: Floats) -> Floats:
-        """Tributary lengths or areas (P,) at x (P,) between two states; in space the mean of both."""
+    def tributary_at(self, part: tuple[State, State], place: Floats) -> Floats:
+        """Tributary lengths or areas (P,) at places (P, d) between two states; in space the mean of both."""
         if self.dim == 2:
-            return self.tributary_of(x[:, None])
+            return self.tributary_of(place)
         old, new = part
         return 0.5 * (self.tributary(old) + self.tributary(new))
 
@@ -317,36 +319,38 @@ class Interface:
             return state
         return replace(state, age=self.age(old))
 
-    def resistance(self, part: tuple[State, State], x: Floats, normal: Floats, slip: Floats) -> Floats:
-        """Largest shear forces of the pad nodes (P,) at x under contact forces (P,), slipping by (P,)."""
+    def resistance(self, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats) -> Floats:
+        """Largest shear forces of the pad nodes (P,) at places (P, d) under contact forces (P,), slipping by
+        (P,).
+        """
         old, new = part
-        mu = self.friction(old, np.arange(x.size), x)
+        nodes = np.arange(len(place))
+        mu = self.friction(old, nodes, place)
         if self.law is None:
             return np.asarray(mu * normal)
-        nodal = self.slipping(old, new, np.arange(x.size), mu, slip)
-        return replace(nodal, normal=normal, length=self.tributary_at(part, x)).bound(self.law)
+        nodal = self.slipping(old, new, nodes, mu, slip)
+        return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
 
-    def limit(self, old: State, state: State, x: Floats, way: Floats) -> Floats:
-        """Bounds of friction (P,) in N/mm of the pad nodes of `state` at x (P,), slipping by `way` (P,)."""
-        mu = self.friction(old, np.arange(x.size), x)
+    def limit(self, old: State, state: State, place: Floats, way: Floats) -> Floats:
+        """Bounds of friction (P,) in N/mm of the pad nodes of `state` at places (P, d), slipping by `way`
+        (P,).
+        """
+        nodes = np.arange(len(place))
+        mu = self.friction(old, nodes, place)
         if self.law is None:
             return np.asarray(mu * state.contact_force[:, 0])
-        return self.slipping(old, state, np.arange(x.size), mu, way).bound(self.law)
-
-    def _origin(self, old: State) -> Floats:
-        """Origin of the slip (P,): the last accepted x, or the jump of friction that holds a node."""
-        return np.where(self.jumps.held, self.jumps.x, self.places(old)[:, 0])
+        return self.slipping(old, state, nodes, mu, way).bound(self.law)
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
         return np.zeros_like(old.contact_force)
 
-    def friction(self, old: State, nodes: Ints, x: Floats) -> Floats:
-        """Friction coefficient of these pad nodes (k,) at the positions x (k,) in mm; `old` is the
+    def friction(self, old: State, nodes: Ints, place: Floats) -> Floats:
+        """Friction coefficient of these pad nodes (k,) at the places (k, d) in mm; `old` is the
         last accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask
         for it here; `FrictionJumps` alone takes the coefficients on both sides of a jump from the surface.
         """
-        return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
+        return np.broadcast_to(np.asarray(self.surface.friction_at(place), dtype=float), len(place))
 
     def fold(self, state: State) -> float | None:
         """x (mm) where the pad has folded, or None."""
@@ -358,12 +362,12 @@ class Interface:
         sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
         return float(gap[sunk].max()) if sunk.any() else None
 
-    def _strayed(self, old: State, state: State, x: Floats) -> Any:
+    def _strayed(self, old: State, state: State, place: Floats) -> Any:
         """Pinned nodes (P,) that slipped to another coefficient, or whose interface no longer holds them."""
-        nodes = np.arange(x.size)
-        pinned = self.friction(old, nodes, np.where(self.jumps.held, self.jumps.x, x))
-        here, slips = self.friction(old, nodes, x), state.status >= FORWARD
-        yielded = np.abs(x - self.jumps.x) > self.tolerance * self.length
+        nodes = np.arange(len(place))
+        pinned = self.friction(old, nodes, self.jumps.at(place))
+        here, slips = self.friction(old, nodes, place), state.status >= FORWARD
+        yielded = sizes(place - self.jumps.at(place)) > self.tolerance * self.length
         beyond = sizes(state.contact_force[:, 1:]) > self._resting_limit(old, state, here) + self._weak(state)
         return self.jumps.held & (pinned != here) & (slips | (yielded & beyond))
 
@@ -373,22 +377,21 @@ class Interface:
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
-        position, surface = self.places(state), self.surface_at(state)
+        place, surface = self.on_display(state), self.surface_at(state)
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self._weak(state)
         lower = self._resting_limit(old, state, self.jumps.lower)
         if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
-        if self.jumps.let_go(self._strayed(old, state, position[:, 0])):
+        if self.jumps.let_go(self._strayed(old, state, place)):
             return False
         normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         compliance = self.compliance(old)[active]
         slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
-        x = np.where(self.jumps.held, self.jumps.x, position[:, 0])[active]
         status, nodes = state.status[active], np.flatnonzero(active)
         way, size = sizes(slip), sizes(shear)
-        limit = (mu := self.friction(old, nodes, x)) * normal
+        limit = (mu := self.friction(old, nodes, self.jumps.at(place)[active])) * normal
         if self.law is not None:
             moving = np.where(status == STICK, 0.0, way)
             limit = self.slipping(old, state, nodes, mu, moving).bound(self.law)
@@ -419,6 +422,13 @@ class PenaltyInterface(Interface):
 
 
 def slipped(interface: Interface, old: State, new: State) -> Floats:
-    """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left."""
+    """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left;
+    along the mean of the surface's tangents.
+    """
+    way = interface.on_display(new) - interface.on_display(old)
+    travel = 0.5 * (interface.surface_at(old).travel + interface.surface_at(new).travel)
+    slip = np.einsum("paj,pj->pa", travel, way)
     status = np.where(new.touching | (old.status == STICK), new.status, old.status)
-    return np.where((status >= FORWARD)[:, None], interface.slip(old, new), 0.0)
+    # a node may stick at a jump of friction that it has slipped up to
+    carried = (status == STICK) & (sizes(slip) > interface.tolerance * interface.length)
+    return np.where(((status >= FORWARD) | carried)[:, None], slip, 0.0)

@@ -37,12 +37,12 @@ from evfem.common.constants import (
     SUBTRACTED,
 )
 from evfem.contact.attraction import Attraction
-from evfem.contact.condensed import CondensedTangent
+from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
 from evfem.newton.condensation import Singular, make_condensation
 from evfem.newton.interface import Interface
 from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
-from evfem.surface.pad import normals, surface_state
+from evfem.surface.pad import surface_state
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import Past
 
@@ -285,13 +285,13 @@ class Linearisation:
         factor = attraction.tangent_factor(place, state.voltage, self.touching, pressing)
         lost = factor * (unpressed - pressed)
         surface = self.interface.surface_at(state)
-        along = np.zeros_like(state.contact_force)
-        along[:, :2] = np.stack([np.ones_like(lost), surface.slope], axis=1) / surface.stretch[:, None]
+        along = surface.axes[:, :, 0]  # of a pull straight down
         if attraction.direction == "normal":
-            along[:, 0], along[:, 1] = surface.stretch, 0.0
+            along = np.zeros_like(state.contact_force)
+            along[:, 0] = surface.stretch
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)[:, None] * along
         # the full tangential gain could close a node on a slope by more than the limited normal gain holds
-        gain[:, 1] = np.where(gain[:, 0] > STABLE, 0.0, gain[:, 1])
+        gain[:, 1:] = np.where(gain[:, :1] > STABLE, 0.0, gain[:, 1:])
         gain[:, 0] = limited_gain(gain[:, 0])
         return Roughness(gain, lost[:, None] * along, pressing)
 
@@ -321,8 +321,7 @@ class Linearisation:
         for a in (0, 2)[: dim - 1]:
             beyond = np.asarray(rows[:, a::dim].sum(axis=1)).ravel() - inner[:, a::dim].sum(axis=1)
             inner[index, dim * (index // dim) + a] += beyond
-        normal = np.zeros((c.size, dim))
-        normal[:, :2] = normals(surface_state(self.interface.surface, position[c]))
+        normal = surface_state(self.interface.surface, position[c]).axes[:, 0, COMPONENTS[:dim]]
         own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
         # weakening with a node's own gap belongs to the contact problem: not twice
         blocks = inner.reshape(c.size, dim, c.size, dim)

@@ -55,7 +55,7 @@ class State:
     the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
     pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
-    Coulomb's `age` (P,) in s; with a hand what it keeps, `hand` (6,) (`evfem.newton.hand`); under a voltage
+    Coulomb's `age` (P,) in s; with a hand what it keeps, `hand` (6, d) (`evfem.newton.hand`); under a voltage
     resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
     (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
     `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface

@@ -25,7 +25,7 @@ from evfem.electrostatics.laws import traction_derivative
 from evfem.electrostatics.roughness import Cored, roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import path_points
+from evfem.planning.resolution import path_depth
 from evfem.scene.electrics import Electrics
 from evfem.scene.scene import Scene
 from evfem.tissue.splitlaw import plane_modulus, split
@@ -223,7 +223,7 @@ def unseen(closing: Closing) -> str | None:
     core, surface = closing.core, closing.scene.ground
     if core is None or surface.is_flat:
         return None
-    depth = float(np.ptp(surface.height(path_points(closing.scene, closing.mesh, core.distance))))
+    depth = path_depth(closing.scene, closing.mesh, core.distance)
     if core.length <= SEEN * depth or depth == 0.0:
         return None
     return (

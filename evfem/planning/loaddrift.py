@@ -25,7 +25,7 @@ import numpy as np
 
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import path_points
+from evfem.planning.resolution import path_line
 from evfem.scene.scene import Scene
 
 #: a drift of the load that is worth a word
@@ -59,7 +59,7 @@ def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[
     """A sentence for the first slide after a press to a force whose held indentation lets the load drift."""
     if not isinstance(scene.finger, FingerPad) or not scene.ground.is_flat:
         return
-    friction = float(np.max(scene.ground.friction_coefficient(path_points(scene, mesh, STEP))))
+    friction = float(np.max(scene.ground.friction_at(path_line(scene, mesh, STEP))))
     load = None
     for i, course in enumerate(scene.courses):
         if course.depth is not None:

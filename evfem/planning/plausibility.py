@@ -18,7 +18,7 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import path_points
+from evfem.planning.resolution import path_depth
 from evfem.protocols import ForceLaw
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
@@ -232,6 +232,6 @@ def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
         return False
     surface: Any = scene.ground
     if not surface.is_flat:
-        gap -= float(np.ptp(surface.height(path_points(scene, mesh, WAY_STEP))))
+        gap -= path_depth(scene, mesh, WAY_STEP)
         return gap > 0.0
     return True

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Ints
+from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
@@ -40,7 +41,16 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
     slope from node to node: noise hardly shows in heights, but contact acts along the slope.
     """
     surface: Any = scene.ground
-    if surface.is_flat or not len(edges := _pad_edges(mesh)):
+    if surface.is_flat:
+        return None
+    found = (_unresolved(scene, mesh, axis) for axis in range(mesh.dim - 1))
+    return next((sentence for sentence in found if sentence is not None), None)
+
+
+def _unresolved(scene: Scene, mesh: Mesh, axis: int) -> str | None:
+    """The same along x (`axis` 0) or z (1)."""
+    surface: Any = scene.ground
+    if not len(edges := _pad_edges(mesh, axis)):
         return None
     ends = mesh.points[edges]
     spacing = float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))) / mesh.order
@@ -50,15 +60,16 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
             f"{PER_WAVE:g} nodes of the pad each, which are {spacing:.2g} mm apart; use a finer mesh, or a "
             f"shortest wave of {PER_WAVE * spacing:.2g} mm"
         )
-    x = path_points(scene, mesh, spacing / PER_SPACING)
-    before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
+    place = path_line(scene, mesh, spacing / PER_SPACING, axis)
+    half = 0.5 * spacing * np.eye(mesh.dim - 1)[axis]
+    before, height, after = (surface.relief(place + shift)[0] for shift in (-half, 0.0 * half, half))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
     if missed > MISSED * whole:
         return (
             f"the surface is sharper than the node spacing of the pad ({spacing:.2g} mm): up to {missed:.2g} "
             f"of its {whole:.2g} mm of height lie between two nodes; use a finer mesh or a smoother profile"
         )
-    slope = surface.slope(x)
+    slope = surface.relief(place)[1][:, axis]
     fine, all_of_it = (float(np.sqrt(np.mean(s**2))) for s in (slope - (after - before) / spacing, slope))
     if fine > ROUGH * all_of_it:
         return (
@@ -69,14 +80,14 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
     return None
 
 
-def _pad_edges(mesh: Mesh) -> Ints:
-    """Ends (K, 2) of the pad's edges; in space of its faces' that run more across than along."""
+def _pad_edges(mesh: Mesh, axis: int) -> Ints:
+    """Ends (K, 2) of the pad's edges; in space of its faces' that run more along x (`axis` 0) or z (1)."""
     if mesh.dim == 2:
         return mesh.edges_of("pad")[:, :2]
     faces = mesh.faces_of("pad")[:, :4]
     edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    across = np.abs(np.diff(mesh.points[edges], axis=1)[:, 0])
-    return edges[across[:, 0] > across[:, 2]]
+    way = np.abs(np.diff(mesh.points[edges], axis=1)[:, 0, ::2])
+    return edges[way[:, axis] > way[:, 1 - axis]]
 
 
 def too_fast(scene: Scene) -> str | None:
@@ -140,8 +151,20 @@ def _instead(signal: TimeSignal) -> str:
     return ""
 
 
-def path_points(scene: Scene, mesh: Mesh, step: float) -> Any:
-    """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
-    pad, bone = mesh.points[mesh.node_sets["pad"], 0], scene.reach
-    first, last = pad.min() + bone[0], pad.max() + bone[1]
-    return np.linspace(first, last, int(np.clip((last - first) / step, 2, MOST)))
+def path_line(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:
+    """Places (n, d) on a line along x (`axis` 0) or z (1) that the pad may come to, `step` apart or as near
+    to that as memory allows.
+    """
+    pad = mesh.points[mesh.node_sets["pad"], ::2]
+    bone = [0.0, *accumulate(course.travel[axis] for course in scene.courses)]
+    first, last = pad[:, axis].min() + min(bone), pad[:, axis].max() + max(bone)
+    place = np.zeros((int(np.clip((last - first) / step, 2, MOST)), mesh.dim - 1))
+    place[:, axis] = np.linspace(first, last, len(place))
+    return place
+
+
+def path_depth(scene: Scene, mesh: Mesh, step: float) -> float:
+    """Depth (mm) of the surface where the pad may come to, seen every `step` (mm)."""
+    surface: Any = scene.ground
+    lines = (path_line(scene, mesh, step, axis) for axis in range(mesh.dim - 1))
+    return float(np.ptp(np.concatenate([surface.relief(place)[0] for place in lines])))

@@ -31,6 +31,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import choice
 from evfem.common.pools import blas_limits
+from evfem.contact.condensed import COMPONENTS
 from evfem.contact.signorini import FORWARD, STICK, sizes
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, quoted
@@ -254,7 +255,7 @@ class Contact:
         none = np.zeros(state.status.size)
         self.known = self.interface.candidates(old, state, self.nodes, none, none)
         # rows n, t_1[, t_2] in the order x, y[, z]
-        self.axes = self.known.axes[:, :, [1, 0, 2][: self.dim]]
+        self.axes = self.known.surface.axes[:, :, COMPONENTS[: self.dim]]
         self.slips = self.known.status >= FORWARD
         self._friction(old)
         self.felt = self._felt()
@@ -271,8 +272,8 @@ class Contact:
     def _friction(self, old: State) -> None:
         """The largest shear force of slipping nodes and its derivatives, (k,), 0 of others."""
         c, state, interface = self.nodes, self.state, self.interface
-        x = interface.positions(state.u)[c, 0]
-        mu, normal = interface.friction(old, c, x), np.maximum(state.contact_force[c, 0], 0.0)
+        place = interface.on_display(state)[c]
+        mu, normal = interface.friction(old, c, place), np.maximum(state.contact_force[c, 0], 0.0)
         way = np.where(self.slips, sizes(interface.slip(old, state)[c]), 0.0)
         bound, by_normal, by_mu, by_speed, by_length = mu * normal, mu, normal, 0.0 * mu, 0.0 * mu
         speed = way / interface.duration if interface.duration > 0.0 else 0.0 * way
@@ -282,10 +283,10 @@ class Contact:
             by_mu, by_speed = found.by_mu, found.by_speed
             by_normal = derivative(lambda N: replace(seen, normal=N).bound(law), normal, FORCE_STEP)
             by_length = derivative(lambda A: replace(seen, length=A).bound(law), seen.length, LENGTH_STEP)
-        by_place = by_mu * interface.surface.friction_slope(x)
-        each = (bound, by_normal, by_place, by_speed, by_length, speed)
+        each = (bound, by_normal, by_mu, by_speed, by_length, speed)
         of_slips = (np.where(self.slips, value, 0.0) for value in each)
-        self.bound, self.by_normal, self.by_place, self.by_speed, self.by_length, self.speed = of_slips
+        self.bound, self.by_normal, by_mu, self.by_speed, self.by_length, self.speed = of_slips
+        self.by_place = by_mu[:, None] * interface.surface.friction_gradient(place)
 
     def _felt(self) -> Floats:
         """What the body feels of touching nodes that are pressed with 1 more, (k, dim) along n and t."""
@@ -300,8 +301,7 @@ class Contact:
         if attraction.direction == "normal":
             felt[:, 0] -= gain * surface.stretch
         else:
-            felt[:, 0] -= gain / surface.stretch
-            felt[:, 1] -= gain * surface.slope / surface.stretch
+            felt -= gain[:, None] * surface.axes[:, :, 0]
         return felt
 
     def _attraction(self) -> Any:
@@ -355,12 +355,9 @@ class Contact:
         """Contact forces that turn with the profile, and friction that changes with place and length."""
         import scipy.sparse as sparse
 
-        surface, force = self.known.surface, self.known.force
-        rate = surface.curvature / surface.stretch**2
-        turned = rate[:, None] * (force[:, 1:2] * self.axes[:, 0] - force[:, :1] * self.axes[:, 1])
-        turned += self.by_place[:, None] * self._shear
+        turned = self.known.surface.turned(self.known.force)[:, COMPONENTS[: self.dim]]
         blocks = np.zeros_like(self.axes)
-        blocks[:, :, 0] = -turned
+        blocks[:, :, ::2] = -turned - self._shear[:, :, None] * self.by_place[:, None]
         of, moved, value = self.pad.tributary_gradient(self.interface.positions(self.state.u))
         among = np.zeros((self.state.status.size, self.dim))
         among[self.nodes] = self.by_length[:, None] * self._shear

@@ -23,6 +23,7 @@ from evfem.simulation.history import UNITS
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.run import Request, Run
 from evfem.simulation.works import Books
+from evfem.surface.ways import Steps
 
 #: share of a parameter between neighbours, their places in steps and the weights of the difference
 STEP = 1e-3
@@ -101,7 +102,7 @@ def moved(owner: Any, change: Change, way: float) -> Any:
 @dataclass(frozen=True, eq=False)
 class Accepted:
     """A part that a run accepted: its states and their margins, which part of the step it is, where a jump of
-    friction holds nodes (`pins`, (P,) in mm, else nan), and the books of the run before and after it.
+    friction holds nodes (`pins`, (P, d) in mm, else nan), and the books of the run before and after it.
     """
 
     old: State
@@ -130,13 +131,15 @@ class Beside:
             run = Run(scene if parameter is None else parameter.applied(scene, way), None)
         return cls(run, way, run.requests())
 
-    def begin(self, part: Accepted, jumps: Floats, old: State) -> Equations:
-        """The equations of a part from `old`; `jumps` (J, 3) of friction are those of the followed run."""
+    def begin(self, part: Accepted, jumps: Sequence[Steps], old: State) -> Equations:
+        """The equations of a part from `old`; `jumps` of friction are those of the followed run."""
         assert self.request is not None
-        pins, own = part.pins.copy(), self.run.model.equilibrium.interface.jumps.table
-        for node in np.flatnonzero(np.isfinite(pins)):
-            jump = int(np.abs(pins[node] - jumps[:, 0]).argmin())
-            pins[node] += own[jump, 0] - jumps[jump, 0]
+        pins, own = part.pins.copy(), self.run.model.equilibrium.interface.jumps.steps
+        for node in np.flatnonzero(np.isfinite(pins[:, 0])):
+            away = [np.abs(pins[node, one.axis] - one.place) for one in jumps]
+            nearest = int(np.argmin([each.min() for each in away]))
+            jump, axis = int(away[nearest].argmin()), jumps[nearest].axis
+            pins[node, axis] += own[nearest].place[jump] - jumps[nearest].place[jump]
         return Equations.begin(self.run.model, old, self.request.path(*part.span), pins)
 
     def booked(self, old: State, new: State, begin: Books | None, sums: dict[str, float]) -> Ledger:
@@ -203,7 +206,9 @@ class Line:
 
     # -- a part
 
-    def follow(self, part: Accepted, solve: Callable[[Floats], Floats], jumps: Floats, patient: bool) -> bool:
+    def follow(
+        self, part: Accepted, solve: Callable[[Floats], Floats], jumps: Sequence[Steps], patient: bool
+    ) -> bool:
         """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(part, jumps, part.old) for one in self.beside]
         change = self._nothing(
@@ -254,7 +259,7 @@ class Line:
             shares.append(np.abs(more[part]).max(initial=0.0) / largest)
         return float(max(shares))
 
-    def _along(self, part: Accepted, jumps: Floats, change: Change) -> tuple[Floats, Floats]:
+    def _along(self, part: Accepted, jumps: Sequence[Steps], change: Change) -> tuple[Floats, Floats]:
         """Derivative (m,) of the part's equations, and of the reaction (dim,), along those of its states, the
         end's being `change`.
         """
@@ -278,13 +283,15 @@ class Line:
         model = self.centre.run.model
         slope = model.equilibrium.interface.surface_at(part.new).slope
         moves = change["u"][model.pad.nodes]
-        rate = np.maximum(np.abs(moves[:, 1] - slope * moves[:, 0]), 1e-300)
+        rate = np.maximum(np.abs(moves[:, 1] - np.sum(slope * moves[:, ::2], axis=1)), 1e-300)
         nearest = min(float((self.lengths(part.new) / rate).min()), NEAR * reach)
         if not model.surface.is_flat:
             nearest = min(nearest, ALONG / max(float(np.abs(moves[:, 0]).max()), 1e-300))
         return max(min(self.longest, nearest / max(PLACES)), LEAST * self.longest)
 
-    def _end(self, part: Accepted, equations: list[Equations], jumps: Floats, change: Change) -> None:
+    def _end(
+        self, part: Accepted, equations: list[Equations], jumps: Sequence[Steps], change: Change
+    ) -> None:
         """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
         step, way = self.step, self._way(part, change)
         by_parameter = changes([one.ended(part.new) for one in equations], step)
@@ -310,7 +317,7 @@ class Line:
             self._book(part, jumps, state, self.way)
         self.state = state
 
-    def _book(self, part: Accepted, jumps: Floats, state: Change, way: float) -> None:
+    def _book(self, part: Accepted, jumps: Sequence[Steps], state: Change, way: float) -> None:
         """The derivatives of the books after the part that ends with these of the state."""
         (begin, _), (sums, _) = part.books, part.sums
         fixed = [one.booked(part.old, part.new, begin, sums) for one in self.beside]

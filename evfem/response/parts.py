@@ -39,13 +39,13 @@ class Equations:
 
     @classmethod
     def begin(cls, model: Model, old: State, target: Target, pins: Floats) -> Equations:
-        """Start the part from `old`: velocities, branches, charges and slips count from there; `pins` (P,)
-        are x of nodes that a jump of friction holds, else nan.
+        """Start the part from `old`: velocities, branches, charges and slips count from there; `pins`
+        (P, d) are places of nodes that a jump of friction holds, else nan.
         """
         target = target.begun(old)
         interface, attraction = model.equilibrium.interface, model.attraction
         interface.begin(old, target.duration)
-        interface.jumps.x = pins
+        interface.jumps.place = pins
         if model.body.dynamics is not None:
             model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
         if attraction is not None and attraction.charging is not None:
@@ -116,7 +116,7 @@ class Equations:
         elif isinstance(target.height, Unsupported):
             found[1] = state.bone[1] - self.old.bone[1]
         if target.hand is not None:
-            found[0] = target.hand.missing(float(state.bone[0]), state.reaction)
+            found[::2] = target.hand.missing(state.bone[::2], state.reaction)
         return found
 
     def _slip(self, state: State) -> Floats:
@@ -126,19 +126,18 @@ class Equations:
             state.contact_force[:, 1:] - self.old.contact_force[:, 1:]
         )
 
-    def bound(self, state: State, x: Floats, way: Floats) -> Floats:
-        """Bound of friction (P,) in N/mm at x (P,) with slips of the size `way` (P,)."""
-        held = self.interface.jumps.held
-        return self.interface.limit(self.old, state, np.where(held, self.interface.jumps.x, x), way)
+    def bound(self, state: State, place: Floats, way: Floats) -> Floats:
+        """Bound of friction (P,) in N/mm at places (P, d) with slips of the size `way` (P,)."""
+        return self.interface.limit(self.old, state, self.interface.jumps.at(place), way)
 
     def contact(self, state: State) -> tuple[Floats, Floats, Floats]:
         """What contact lacks (P, dim), slips (P, dim - 1) and bounds of friction (P,)."""
         interface, status = self.interface, state.status
         normal, shear = np.split(state.contact_force, [1], axis=1)
         gap = interface.surface_at(state).normal_gap + interface.compliance(self.old)[:, 0] * normal[:, 0]
-        slip, x = self._slip(state), interface.positions(state.u)[:, 0]
+        slip = self._slip(state)
         way = np.where(status >= FORWARD, sizes(slip), 0.0)
-        bound = self.bound(state, x, way)
+        bound = self.bound(state, interface.on_display(state), way)
         sliding = shear + bound[:, None] * directions(status, slip)
         along = np.where(
             (status == STICK)[:, None], slip, np.where((status >= FORWARD)[:, None], sliding, shear)

@@ -93,6 +93,8 @@ class _Differentiated:
 
     def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
         self.run = Run(scene, None)
+        if self.run.model.equilibrium.interface.bed is not None:
+            raise InputError("surface.elastic", "an elastic surface", "a rigid one, to be differentiated")
         self.ledger = self.run.ledger = _Followed(self.run.model)
         self.ledger.told = self._accepted
         self.centre = Beside.of(scene, None, 0.0)
@@ -184,13 +186,13 @@ class _Differentiated:
             return
         assert self.ledger.end is not None
         books, sums = (before[1], self.ledger.end), (before[0], self.ledger.sums)
-        part = Accepted(old, new, here.margins(new), span, pins.x.copy(), books, sums)
+        part = Accepted(old, new, here.margins(new), span, pins.place.copy(), books, sums)
         for line in self._followed:
             self._follow(line, part, here)
 
     def _follow(self, line: Line, part: Accepted, here: Equations) -> None:
         """One parameter, with the matrix at hand or, where that is not as good as exact, one of this part."""
-        jumps, fresh = self.run.model.equilibrium.interface.jumps.table, False
+        jumps, fresh = self.run.model.equilibrium.interface.jumps.steps, False
         if self._known[0] != part.new.status.tobytes():
             fresh = self._factorise(here, part.new)
         if not line.follow(part, self._known[1], jumps, patient=fresh) and not fresh:

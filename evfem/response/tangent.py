@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.contact.condensed import COMPONENTS
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.newton.condensation import Condensation
 from evfem.newton.state import State
@@ -108,16 +109,12 @@ class Tangent:
         """Derivative of the pad nodes' forces in the balance by displacements and contact forces."""
         state, (moves, presses) = self.state, self._columns()
         surface, force = self.equations.interface.surface_at(state), state.contact_force
-        n, t = axes(surface.slope, surface.stretch)
-        turn = surface.curvature / surface.stretch**2
-        found = []
-        for axis in (0, 1):
-            by_x = turn * (force[:, 1] * n[axis] - force[:, 0] * t[axis])
-            found.append((moves[:, axis], moves[:, 0], -by_x))
-            found.append((moves[:, axis], presses[:, 0], -n[axis]))
-            found.append((moves[:, axis], presses[:, 1], -t[axis]))
-        if state.bone.size == 3:
-            found.append((moves[:, 2], presses[:, 2], -np.ones(len(moves))))
+        turned, found = surface.turned(force), []
+        for row, axis in enumerate(COMPONENTS[: state.bone.size]):
+            for a in range(state.bone.size):
+                found.append((moves[:, axis], presses[:, a], -surface.axes[:, a, row]))
+            for b in range(state.bone.size - 1):
+                found.append((moves[:, axis], moves[:, 2 * b], -turned[:, row, b]))
         attraction = self.equations.model.attraction
         if attraction is None or not attraction.acts(state.voltage):
             return found
@@ -137,13 +134,14 @@ class Tangent:
         surface, give = interface.surface_at(state), interface.compliance(self.equations.old)
         # the gap over the stretch, whose own change counts for nothing at gap 0
         found = [(rows[opened, a], presses[opened, a], np.ones(opened.size)) for a in range(dim)]
-        found.append((rows[closed, 0], moves[closed, 0], (-surface.slope / surface.stretch)[closed]))
-        found.append((rows[closed, 0], moves[closed, 1], (1.0 / surface.stretch)[closed]))
+        for row, axis in enumerate(COMPONENTS[:dim]):
+            found.append((rows[closed, 0], moves[closed, axis], surface.axes[closed, 0, row]))
         found.append((rows[closed, 0], presses[closed, 0], give[closed, 0]))
         stick, slips = np.flatnonzero(status == STICK), np.flatnonzero(status >= FORWARD)
         for a in range(1, dim):
-            moved = surface.stretch if a == 1 else np.ones(len(moves))
-            found.append((rows[stick, a], moves[stick, 2 * (a - 1)], moved[stick]))
+            for b in range(1, dim):
+                moved = surface.travel[stick, a - 1, b - 1]
+                found.append((rows[stick, a], moves[stick, 2 * (b - 1)], moved))
             found.append((rows[stick, a], presses[stick, a], give[stick, a]))
         return [*found, *self._sliding_rows(slips)]
 
@@ -153,41 +151,36 @@ class Tangent:
         rows, dim = np.arange(moves.size).reshape(moves.shape), state.bone.size
         _, slip, bound = self.equations.contact(state)
         way, e = np.maximum(sizes(slip), 1e-300), directions(state.status, slip)
-        by_normal, by_x, by_way = self._bound_slopes(sizes(slip))
-        stretch = self.equations.interface.surface_at(state).stretch
+        by_normal, by_place, by_way = self._bound_slopes(sizes(slip))
+        travel = self.equations.interface.surface_at(state).travel
         found = []
         for a in range(1, dim):
             along = e[:, a - 1]
             found.append((rows[slips, a], presses[slips, a], np.ones(slips.size)))
             found.append((rows[slips, a], presses[slips, 0], (by_normal * along)[slips]))
-            found.append((rows[slips, a], moves[slips, 0], (by_x * along)[slips]))
+            turns = -along[:, None] * e * (bound / way)[:, None]
+            turns[:, a - 1] += bound / way
+            by_slip = (turns if dim == 3 else 0.0) + (by_way * along)[:, None] * e
+            share = np.einsum("pb,pbk->pk", by_slip, travel) + by_place * along[:, None]
             for b in range(1, dim):
-                turns = bound / way * (float(a == b) - along * e[:, b - 1]) if dim == 3 else 0.0
-                moved = stretch if b == 1 else 1.0
-                share = (turns + by_way * along * e[:, b - 1]) * moved
-                found.append((rows[slips, a], moves[slips, 2 * (b - 1)], share[slips]))
+                found.append((rows[slips, a], moves[slips, 2 * (b - 1)], share[slips, b - 1]))
         return found
 
     def _bound_slopes(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Derivatives (P,) of the bound of friction by contact force, x and size of the slip."""
+        """Derivatives of the bound of friction by contact force, place (P, d) and size of the slip."""
         state, interface, bound = self.state, self.equations.interface, self.equations.bound
-        x, force = interface.positions(state.u)[:, 0], state.contact_force
+        place, force = interface.on_display(state), state.contact_force
         normal, length = SHARE * np.maximum(force[:, 0], 1e-12), SHARE * interface.length
         more, less = (
             replace(state, contact_force=force + sign * normal[:, None] * (np.arange(force.shape[1]) == 0))
             for sign in (1.0, -1.0)
         )
-        by_normal = (bound(more, x, way) - bound(less, x, way)) / (2.0 * normal)
-        by_x = (bound(state, x + length, way) - bound(state, x - length, way)) / (2.0 * length)
+        by_normal = (bound(more, place, way) - bound(less, place, way)) / (2.0 * normal)
+        ways = length * np.eye(place.shape[1])
+        by_place = [bound(state, place + one, way) - bound(state, place - one, way) for one in ways]
         further = SHARE * np.maximum(way, 1e-12)
-        by_way = (bound(state, x, way + further) - bound(state, x, way - further)) / (2.0 * further)
-        return by_normal, by_x, by_way
-
-
-def axes(slope: Floats, stretch: Floats) -> tuple[Floats, Floats]:
-    """x and y of the profile's normals and tangents, (2, P) each."""
-    one = np.ones_like(slope)
-    return np.stack([-slope, one]) / stretch, np.stack([one, slope]) / stretch
+        by_way = (bound(state, place, way + further) - bound(state, place, way - further)) / (2.0 * further)
+        return by_normal, np.stack(by_place, axis=1) / (2.0 * length), by_way
 
 
 def _add(matrix: Floats, triplets: list[Triplet], rows: Ints, columns: Ints) -> None:

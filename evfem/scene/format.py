@@ -35,11 +35,13 @@ from evfem.scene.scene import (
 )
 from evfem.surface import textures
 from evfem.surface.adhesion import ADHESIONS
-from evfem.surface.surfaces import Flat, Friction, GivesWay, Insulator, Profile, Shift
+from evfem.surface.relief import Relief
+from evfem.surface.surfaces import Angle, Flat, Friction, GivesWay, Insulator, Profile, Shift
 
 Table = Mapping[str, Any]
 Pairs = list[list[float]]
 _HEIGHTS = "the path of a csv file with the header x,height"
+_RELIEF = "the path of a csv file with the header x,z,height"
 _CSV = {"file": lambda name: name.lower().endswith(".csv")}
 _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
@@ -134,10 +136,11 @@ class ProfileTable:
     y: Shift = None
     insulator: Insulator = None
     elastic: GivesWay = None
+    angle: Angle = 0.0
 
     def made(self) -> Profile:
         """The profile of the file or of the points."""
-        names = ("friction", "y", "insulator", "elastic")
+        names = ("friction", "y", "insulator", "elastic", "angle")
         common: Any = {name: getattr(self, name) for name in names}
         if (self.file is None) == (self.points is None):
             given = ABSENT if self.file is None else "file and points"
@@ -145,6 +148,33 @@ class ProfileTable:
         if self.points is not None:
             return Profile(*columns("surface.points", self.points), **common)
         return Profile.from_csv(self.file or "", **common)
+
+
+@dataclass(frozen=True)
+class ReliefTable:
+    """[surface] of the kind relief."""
+
+    file: Annotated[str | None, _path(_RELIEF), "heights over x and z"] = None
+    x: Annotated[list[float] | None, instance("x in mm", list, unit="mm"), "of the heights' columns"] = None
+    z: Annotated[list[float] | None, instance("z in mm", list, unit="mm"), "of the heights' rows"] = None
+    height: Annotated[
+        Pairs | None, _rows("heights in mm, a row for each z", "mm"), "the same in the scene file"
+    ] = None
+    friction: Friction = 0.3
+    y: Shift = None
+    insulator: Insulator = None
+    elastic: GivesWay = None
+
+    def made(self) -> Relief:
+        """The surface of the file or of the heights."""
+        common: Any = {name: getattr(self, name) for name in ("friction", "y", "insulator", "elastic")}
+        here = [name for name in ("x", "z", "height") if getattr(self, name) is not None]
+        if len(here) != (0 if self.file is not None else 3):
+            given = " and ".join([*(["file"] if self.file is not None else []), *here]) or ABSENT
+            raise InputError("surface.file", given, f"{_RELIEF}; or x, z and height")
+        if self.file is not None:
+            return Relief.from_csv(self.file, **common)
+        return Relief(self.x, self.z, self.height, **common)
 
 
 @dataclass(frozen=True)
@@ -295,7 +325,7 @@ class Electrostatics:
             return Drive(resolved=given.pop("drive") == "resolved", **given)
 
 
-SURFACES: Mapping[str, Any] = {**textures.SURFACES, "profile": ProfileTable}
+SURFACES: Mapping[str, Any] = {**textures.SURFACES, "profile": ProfileTable, "relief": ReliefTable}
 
 
 def names(*classes: Any) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, get_args
 
 from evfem.common.checks import Named, Within, number, one_of, whole
 from evfem.errors import InputError, quoted
+from evfem.surface.ways import ANGLE, direction
 
 Hold = Literal["indentation", "force"]
 
@@ -27,7 +28,6 @@ _GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0), "mm")
 _NARROWED = number("a gap in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True), "mm")
 VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V")
 _DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "s")
-_ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0), "degrees")
 Steps = Annotated[int, whole(), "in how many equal parts"]
 Held = Annotated[Hold, one_of(*get_args(Hold)), "what stays as it was: the indentation, or the applied force"]
 
@@ -59,11 +59,7 @@ class Course:
     @property
     def direction(self) -> tuple[float, float]:
         """Direction of its angle, x and z of a unit vector; quarter turns are exact."""
-        quarters, rest = divmod(self.angle, 90.0)
-        x, z = math.cos(math.radians(rest)), math.sin(math.radians(rest))
-        for _ in range(int(quarters) % 4):
-            x, z = -z, x
-        return x, z
+        return direction(self.angle)
 
     @property
     def travel(self) -> tuple[float, float]:
@@ -181,7 +177,7 @@ class Slide(Motion, kind="slide"):
     steps: Steps = 100
     speed: Annotated[float | None, _SPEED, "needed with dynamics other than quasistatic"] = None
     hold: Held = "indentation"
-    angle: Annotated[float, _ANGLE, "from +x, of a fingertip; 90 is along the finger"] = 0.0
+    angle: Annotated[float, ANGLE, "from +x, of a fingertip; 90 is along the finger"] = 0.0
 
     @property
     def course(self) -> Course:

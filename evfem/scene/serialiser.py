@@ -26,6 +26,7 @@ from evfem.scene.scene import Scene
 from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.elastic import ElasticLayer, ElasticStack
 from evfem.surface.friction import KINDS, Coulomb
+from evfem.surface.relief import Relief
 from evfem.surface.surfaces import Display, Profile
 from evfem.surface.textures import SURFACES
 
@@ -43,6 +44,8 @@ def dump(scene: Scene) -> str:
     if isinstance(scene.surface, Profile):
         rows = zip(scene.surface.x.tolist(), scene.surface.samples.tolist(), strict=True)
         surface["points"] = [list(row) for row in rows]
+    if isinstance(scene.surface, Relief):
+        surface |= scene.surface.columns
     if (elastic := scene.ground.elastic) is not None:
         if not isinstance(elastic, ElasticLayer | ElasticStack):
             allowed = "ElasticLayer, ElasticStack, for a file"

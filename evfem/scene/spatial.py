@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import os
 
-from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
-from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
-from evfem.protocols import FrictionLaw
 from evfem.scene.scene import Scene
-from evfem.surface.friction import AgeingFriction, RateFriction
 
-SOLID = "with a finger in three dimensions"
+SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
 #: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, which grow with the
 #: nodes; of the dense matrices of contact, which grow with the square of the skin's nodes, of which a
 #: fifth may touch. Fitted to peaks of fingers with 5,000 to 53,000 nodes pressed to 0.5 or 1 N.
@@ -33,51 +29,30 @@ def check_space(scene: Scene, mesh: Mesh) -> None:
 
 
 def _check_plane(scene: Scene) -> list[tuple[str, str, str]]:
-    return [
-        (f"motion[{i}].angle", f"{course.angle:g} degrees with a finger in the plane", "0, or a Fingertip")
+    found = [
+        (f"motion[{i}].angle", f"{course.angle:g} degrees {PLANE}", "0, or a Fingertip")
         for i, course in enumerate(scene.courses)
         if course.angle != 0.0
     ]
+    if scene.ground.crosses:
+        allowed = "a surface at angle 0 whose height and friction are the same along z, or a Fingertip"
+        found.append(("surface", f"heights or friction over x and z {PLANE}", allowed))
+    return found
 
 
 def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     found = []
-    if len(scene.ground.friction_jumps):
-        allowed = "a number, or a table without jumps: a short ramp from one coefficient to the next"
-        found.append(("surface.friction", f"a jump of the coefficient {SOLID}", allowed))
     if scene.ground.elastic is not None:
         found.append(
             ("surface.elastic", f"an elastic surface {SOLID}", "a rigid one, or a finger in the plane")
         )
-    if scene.hand is not None and any(course.travel[1] for course in scene.courses):
-        found.append(("hand", "a hand on a slide across x", "angle 0 or 180: its spring acts along x"))
     if scene.solver.contact != "exact":
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
-    if scene.law is not None and scene.direction != "vertical":
-        found.append(("electrostatics.direction", f"{scene.direction} {SOLID}", "vertical"))
     if scene.law is not None and scene.field != "local":
         found.append(("electrostatics.field", f"{scene.field} {SOLID}", "local"))
-    if not isinstance(roughness_of(scene.roughness_gap), (ConstantRoughness, type(None))):
-        allowed = "a number: separations that depend on the pressure are those of the plane"
-        found.append(("electrostatics.roughness_gap", f"a law {SOLID}", allowed))
-    if not _falls(scene.friction_law):
-        allowed = "a law whose force does not grow with the speed: rate with exponent 0 and ratio up to 1"
-        found.append(("surface.friction_law", f"{scene.friction_law} {SOLID}", allowed))
     if scene.depth is not None:
         found.append(("depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"))
-    if isinstance(scene.voltage, FollowForce) and any(
-        course.direction != (1.0, 0.0) for course in scene.courses
-    ):
-        allowed = "angle 0, and a negative distance for the way back: what is followed is the force along x"
-        found.append(("electrostatics.voltage", "a friction force to follow on a slide across x", allowed))
     return found
-
-
-def _falls(law: FrictionLaw) -> bool:
-    """Whether a law's force is known not to grow with the speed."""
-    if isinstance(law, RateFriction):
-        return law.exponent == 0.0 and law.ratio <= 1.0
-    return isinstance(law, AgeingFriction) or not getattr(law, "timed", False)
 
 
 def needed_memory(mesh: Mesh) -> float:

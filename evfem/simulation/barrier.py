@@ -64,7 +64,7 @@ def _carried(part: SubstepWork, target: Target) -> Floats:
     if target.height.free:
         travel[1] = 0.0
     if target.hand is not None:
-        travel[0] = 0.0
+        travel[::2] = 0.0
     return np.where((part.old.touching & part.new.touching)[:, None], 0.0, travel)
 
 
@@ -108,7 +108,7 @@ def _rubbed(part: SubstepWork) -> float:
     if not length.any():
         return 0.0
     interface, normal = part.model.equilibrium.interface, np.maximum(part.new.contact_force[:, 0], 0.0)
-    return float(np.sum(interface.resistance((part.old, part.new), part.x[1], normal, length) * length))
+    return float(np.sum(interface.resistance((part.old, part.new), part.places[1], normal, length) * length))
 
 
 def _lifted(part: SubstepWork) -> Floats:
@@ -138,5 +138,5 @@ def _hand(part: SubstepWork) -> Floats:
     hand = part.model.scene.hand
     if hand is None:
         return np.zeros_like(PLACES)
-    short = float(part.new.bone[0] - part.old.bone[0]) * (1.0 - PLACES)
-    return 0.5 * hand.stiffness * (short**2 - short[0] ** 2)
+    square = float(np.sum((part.new.bone - part.old.bone)[::2] ** 2))
+    return 0.5 * hand.stiffness * square * ((1.0 - PLACES) ** 2 - (1.0 - PLACES[0]) ** 2)

@@ -135,6 +135,7 @@ SPATIAL: Mapping[str, Mapping[str, Any]] = {
     "applied_tangential_force_z": column("N", "along +z, on the bone"),
     "tangential_force_x": column("N", "sum of contact forces, against +x"),
     "tangential_force_z": column("N", "sum of contact forces, against +z", "shown"),
+    "electrostatic_force_z": column("N", "z component of the attraction"),
     "contact_area": column("mm2", "of the convex hull of what touches", "shown"),
     "real_contact_area": column("mm2", "of all that touches", "shown"),
 }

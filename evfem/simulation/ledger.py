@@ -153,6 +153,7 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
         "applied_tangential_force_z": float(state.reaction[2]),
         "tangential_force_x": float(0.0 - contact[0]),
         "tangential_force_z": float(0.0 - contact[2]),
+        "electrostatic_force_z": float(state.attraction[:, 2].sum()),
         "contact_area": area,
         "real_contact_area": real,
     }

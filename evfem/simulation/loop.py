@@ -17,7 +17,6 @@ from typing import Annotated, Any, ClassVar
 from evfem.common import notices
 from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.common.pools import blas_limits, loaded_blas
-from evfem.electrostatics.signals import FollowForce
 from evfem.errors import ABSENT, InputError, StopRun
 from evfem.newton.control import Target
 from evfem.planning.core import Closing
@@ -212,17 +211,13 @@ class Loop:
             return
         if self._run.model.mesh.dim == 2:
             raise InputError("position_z", "a way across x", "0 with a finger in the plane")
-        if scene.hand is not None:
-            raise InputError("position_z", "a way across x with a hand", "where it is: its spring is along x")
-        if isinstance(scene.voltage, FollowForce):
-            raise InputError("position_z", "a way across x with a friction force to follow", "where it is")
 
     def _start(self) -> Start:
         """Where the step starts."""
         run = self._run
         start = run.start_of(len(run.rows))
         if self.scene.hand is not None:
-            start["position"] = float(run.state.hand[0])
+            start |= dict(zip(("position", "position_z"), run.state.hand[0].tolist(), strict=False))
         return start if self._load is None else start | {"applied_force": self._load}
 
     def _course(self, asked: Asked, start: Start) -> Course:

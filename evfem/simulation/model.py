@@ -130,8 +130,7 @@ def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> I
 
 def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
     """The surface with its height set (first touch where the scene leaves it open), and g0 in mm."""
-    x, y = outline_points[:, 0], outline_points[:, 1]
-    gap = float(np.min(y - surface.height(x)))
+    gap = float(np.min(outline_points[:, 1] - surface.relief(outline_points[:, ::2])[0]))
     if surface.y is None:
         return surface.shifted(gap), 0.0
     g0 = gap - surface.y

@@ -112,7 +112,7 @@ class Result(History):
     the contact forces on the finger, +y and -x components; `electrostatic_force` is the downward attraction.
 
     Of a finger in three dimensions forces are in N, and `in_space` has its further columns
-    (`SPATIAL`): `position_z`, components of the tangential forces, and the contact areas. There
+    (`SPATIAL`): `position_z`, components of forces along x and z, and the contact areas. There
     `tangential_force` and `applied_tangential_force` are along the direction of the last slide's
     angle (+x before the first), positive where a finger slides by a positive distance.
 
@@ -159,6 +159,7 @@ class Result(History):
     tangential_force_z = _component("tangential_force_z")
     applied_tangential_force_x = _component("applied_tangential_force_x")
     applied_tangential_force_z = _component("applied_tangential_force_z")
+    electrostatic_force_z = _component("electrostatic_force_z")
 
     @property
     def units(self) -> Mapping[str, str]:

@@ -33,7 +33,7 @@ from evfem.newton.control import (
     Unsupported,
     VoltageControl,
 )
-from evfem.newton.hand import AT_REST, HandControl
+from evfem.newton.hand import HandControl, at_rest
 from evfem.newton.state import State, StepFailed
 from evfem.planning.pathdependence import allowed_error
 from evfem.protocols import Observer, TimeSignal
@@ -185,7 +185,7 @@ class Run:
         self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
         if scene.hand is not None:
-            self.state = replace(self.state, hand=AT_REST)
+            self.state = replace(self.state, hand=at_rest(self.state.bone.size))
         if resume is not None:
             self._restore(resume)
 
@@ -261,16 +261,17 @@ class Run:
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
         pulled = row["electrostatic_force"] != 0.0 or row["adhesive_force"] != 0.0
         start["loose"] = float(row["normal_force"] <= least and not pulled)
-        return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
+        return start if self.scene.hand is None else start | self._driven(rows_before)
 
-    def _driven(self, rows_before: int) -> float:
-        """x of the drive (mm) at the end of the motions of so many rows; the bone's is another one."""
-        x, done = 0.0, 0
+    def _driven(self, rows_before: int) -> dict[str, float]:
+        """x and z of the drive (mm) at the end of the motions of so many rows; the bone's are others."""
+        x = z = 0.0
+        done = 0
         for motion in self.scene.motion:
             done += motion.steps
             if done <= rows_before:
-                x = x + motion.course.travel[0]
-        return x
+                x, z = x + motion.course.travel[0], z + motion.course.travel[1]
+        return {"position": x, "position_z": z}
 
     def _target(self, course: Course, start: Start, fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
@@ -294,9 +295,10 @@ class Run:
         drive: VoltageControl = GivenVoltage(voltage)
         if course.gap is not None:
             drive = GivenGap(towards("min_gap", course.gap))
-        if isinstance(self.voltage, FollowForce) and course.distance:
-            drive = self._following(self.voltage, position)
         along = position_z if bone.size == 3 else None
+        if isinstance(self.voltage, FollowForce) and course.distance:
+            way = course.direction if bone.size == 3 else (1.0,)
+            drive = self._following(self.voltage, way, (position, position_z))
         return Target(position, height, drive, z=along, hand=self._hand)
 
     def _loose(self, course: Course, start: Start, voltage: float, time: float) -> bool:
@@ -312,8 +314,12 @@ class Run:
         return None if self.scene.hand is None else HandControl(self.scene.hand)
 
     @staticmethod
-    def _following(wish: FollowForce, position: float) -> FollowFriction:
-        return FollowFriction(float(wish(position)), wish.largest_voltage)
+    def _following(
+        wish: FollowForce, way: tuple[float, ...], place: tuple[float, float | None]
+    ) -> FollowFriction:
+        """The wish at a place of the bone (x, z), and in a direction of the display."""
+        along = sum(each * (at or 0.0) for each, at in zip(way, place, strict=False))
+        return FollowFriction(float(wish(along)), wish.largest_voltage, way)
 
     def _path(self, start: Target, end: Target, begin: float, seconds: float) -> Path:
         """Linearly from one target, at time `begin`, to the next, with profile, signal or given force."""
@@ -327,14 +333,14 @@ class Run:
             if start.z is not None and end.z is not None:
                 z = start.z + fraction * (end.z - start.z)
             height = start.height.towards(end.height, fraction)
-            return Target(x, height, drive(x, fraction), duration, z, end.hand)
+            return Target(x, height, drive(x, z, fraction), duration, z, end.hand)
 
-        def drive(x: float, fraction: float) -> VoltageControl:
+        def drive(x: float, z: float | None, fraction: float) -> VoltageControl:
             wanted = self.scene.electrics.voltage
             if isinstance(end.voltage, KeptCharge):
                 return self._kept(begin + fraction * seconds, begin) or end.voltage
             if isinstance(wanted, FollowForce) and isinstance(end.voltage, FollowFriction):
-                return self._following(wanted, x)
+                return self._following(wanted, end.voltage.way, (x, z))
             if isinstance(end.voltage, GivenGap):
                 gap = start.voltage.gap if isinstance(start.voltage, GivenGap) else end.voltage.gap
                 return GivenGap(gap + fraction * (end.voltage.gap - gap))

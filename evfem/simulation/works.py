@@ -313,13 +313,13 @@ class SubstepWork:
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""
-        length, x0, x1 = self.slip_length, self.x[0], self.x[1]
+        length, (begin, end) = self.slip_length, self.places
         if not length.any():
             return 0.0
         before, after = (np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new))
         way = SLIDE[:, None]
         normal = (1.0 - way) * before + way * after
-        part, places = (self.old, self.new), x0 + way * (x1 - x0)
+        part, places = (self.old, self.new), begin + way[..., None] * (end - begin)
         resists = self.model.equilibrium.interface.resistance
         limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
         return float(PART @ np.sum(limit * self._stretched(length), axis=1))
@@ -336,10 +336,10 @@ class SubstepWork:
         return float(self.model.equilibrium.interface.duration)
 
     @cached_property
-    def x(self) -> tuple[Floats, Floats]:
-        """x of the pad nodes (P,) before and after."""
-        x0, x1 = (self.model.equilibrium.interface.places(state)[:, 0] for state in (self.old, self.new))
-        return x0, x1
+    def places(self) -> tuple[Floats, Floats]:
+        """x[, z] of the pad nodes (P, d) before and after."""
+        begin, end = (self.model.equilibrium.interface.on_display(state) for state in (self.old, self.new))
+        return begin, end
 
     @cached_property
     def way(self) -> Floats:
@@ -379,7 +379,7 @@ class SubstepWork:
         """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they left."""
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
         stretch = [interface.surface_at(state).stretch for state in (old, new)]
-        slip = 0.5 * (stretch[0] + stretch[1]) * (self.x[1] - self.x[0])
+        slip = 0.5 * (stretch[0] + stretch[1]) * (self.places[1] - self.places[0])[:, 0]
         slip = slip + self.compliance[:, 1] * (new.contact_force[:, 1] - old.contact_force[:, 1])
         status = np.where(new.touching | (old.status == STICK), new.status, old.status)
         # a node may stick at a jump of friction that it has slipped up to
@@ -395,9 +395,9 @@ class SubstepWork:
             return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))
         return np.abs(self._slip)
 
-    def _coefficient(self, x: Floats) -> Floats:
-        """Friction coefficient of the pad nodes (P,) at the positions x (P,)."""
-        return self.model.equilibrium.interface.friction(self.old, np.arange(x.size), x)
+    def _coefficient(self, place: Floats) -> Floats:
+        """Friction coefficient of the pad nodes (P,) at the places (P, d)."""
+        return self.model.equilibrium.interface.friction(self.old, np.arange(len(place)), place)
 
     def _contact(self) -> float:
         """Trapezoidal work of the contact forces, N mm per mm of depth."""
@@ -428,8 +428,8 @@ class SubstepWork:
         if model.attraction is not None:
             at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
             work += float(np.sum((at[1] - at[0]) * along))
-        x = model.equilibrium.interface.places(carried)[:, 0]
-        less = self._coefficient(x) - self._coefficient(self.x[1])
+        less = self._coefficient(model.equilibrium.interface.on_display(carried))
+        less = less - self._coefficient(self.places[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 
     def _with_slip(self, along: Floats) -> Floats:
@@ -437,7 +437,8 @@ class SubstepWork:
         interface = self.model.equilibrium.interface
         if interface.dim == 3:
             slip = slipped(interface, self.old, self.new) / np.maximum(self.slip_length, 1e-300)[:, None]
-            return np.asarray(np.sum(slip * along[:, ::2], axis=1))
+            way = np.einsum("paj,pj->pa", interface.surface_at(self.new).travel, along[:, ::2])
+            return np.asarray(np.sum(slip * way, axis=1))
         return np.sign(self._slip) * along[:, 0]
 
 

@@ -150,10 +150,11 @@ class Relaxation:
 
 
 def _at_once(bone: Floats, target: Target) -> Target:
-    """The target while no time passes: below a hand the bone (dim,) stays at the x where it is."""
+    """The target while no time passes: below a hand the bone (dim,) stays where it is."""
     if target.hand is None:
         return replace(target, duration=0.0)
-    return replace(target, x=float(bone[0]), duration=0.0, hand=None)
+    z = None if target.z is None else float(bone[2])
+    return replace(target, x=float(bone[0]), z=z, duration=0.0, hand=None)
 
 
 def _refuse_flight(state: State, target: Target) -> None:

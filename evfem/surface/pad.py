@@ -4,8 +4,9 @@ and contact widths.
 A pad edge with ends a, b carries :math:`\max(0, x_b - x_a)` of projected length, shared 1/2, 1/2
 between its nodes, or 1/6, 4/6, 1/6 on quadratic edges (the outward normal faces down exactly where
 x grows along the edge, the body being on its left). The vertical gap is :math:`g = y - h(x)`,
-positive when open; normal and tangent of the surface are :math:`n = (-h', 1)/r`,
-:math:`t = (1, h')/r`, :math:`r = \sqrt{1 + h'^2}`. Arrays: P pad nodes in ascending number.
+positive when open; normal and tangents of the surface are those of `SurfaceState`, in the plane
+:math:`n = (-h', 1)/r`, :math:`t = (1, h')/r`, :math:`r = \sqrt{1 + h'^2}`. Arrays: P pad nodes in
+ascending number.
 """
 
 from __future__ import annotations
@@ -104,6 +105,11 @@ class Pad:
         """`length_gradient` with respect to the unknowns, 2 j + a for component a of node j."""
         of, moved, value = self.length_gradient(position[:, 0])
         return of, 2 * moved, value
+
+    def tributary_curvature(self, position: Floats, weight: Floats) -> tuple[Ints, Ints, Floats]:
+        """Second derivatives of the lengths, none: they are linear in x (`evfem.surface.skin.Skin`)."""
+        none = np.zeros(0, dtype=np.int64)
+        return none, none, np.zeros(0)
 
     def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
         """Derivative of the tributary lengths with respect to x, as triplets (node, moved node, value)."""
@@ -252,7 +258,13 @@ def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
 
 @dataclass(frozen=True)
 class SurfaceState:
-    """The surface below (or above) the pad nodes: gap, normal gap, slope, curvature, all (P,)."""
+    r"""The surface below (or above) the pad nodes: vertical gap (P,), slopes (P, d) and curvatures (P, d, d)
+    along x, in space along x and z.
+
+    With the slopes p, q and :math:`r_1 = \sqrt{1 + p^2}`, :math:`r = \sqrt{1 + p^2 + q^2}` a node's frame
+    in (x, y, z) is :math:`n = (-p, 1, -q)/r`, :math:`t_1 = (1, p, 0)/r_1`,
+    :math:`t_2 = (-pq, q, r_1^2)/(r_1 r)`.
+    """
 
     gap: Floats
     slope: Floats
@@ -263,27 +275,63 @@ class SurfaceState:
         return SurfaceState(self.gap[nodes], self.slope[nodes], self.curvature[nodes])
 
     @cached_property
+    def _sizes(self) -> tuple[Floats, Floats | float, Floats, Floats]:
+        """Slopes p and q, 0 in the plane, and the lengths r_1 and r, (P,) each."""
+        p, q = self.slope[:, 0], self.slope[:, 1] if self.slope.shape[1] > 1 else 0.0
+        first = np.sqrt(1.0 + p**2)
+        return p, q, first, np.sqrt(1.0 + p**2 + q**2)
+
+    @property
     def stretch(self) -> Floats:
-        """Arc length of the profile per unit of x."""
-        return np.sqrt(1.0 + self.slope**2)
+        """Length of the surface's upward vector (-p, 1, -q), in the plane arc length per unit of x."""
+        return self._sizes[3]
 
     @cached_property
     def normal_gap(self) -> Floats:
-        """Gap along the profile's normal at the node's x (first order)."""
+        """Gap along the surface's normal at the node's place (first order)."""
         return self.gap / self.stretch
+
+    @cached_property
+    def axes(self) -> Floats:
+        """Rows n, t1[, t2] of every node, in the order (y, x[, z]) of their components, (P, 1 + d, 1 + d)."""
+        (p, q, first, r), n = self._sizes, 1 + self.slope.shape[1]
+        axes = np.zeros((p.size, n, n))
+        axes[:, 0, 0], axes[:, 0, 1] = 1.0 / r, -p / r
+        axes[:, 1, 0], axes[:, 1, 1] = p / first, 1.0 / first
+        if n == 3:
+            axes[:, 0, 2] = -q / r
+            axes[:, 2] = np.stack([q, -p * q, first**2], axis=1) / (first * r)[:, None]
+        return axes
+
+    @cached_property
+    def travel(self) -> Floats:
+        """Ways along t1[, t2] per way along x[, z] on the surface, (P, d, d)."""
+        (p, q, first, r), d = self._sizes, self.slope.shape[1]
+        found = np.zeros((p.size, d, d))
+        found[:, 0, 0] = first
+        if d == 2:
+            found[:, 0, 1], found[:, 1, 1] = p * q / first, r / first
+        return found
+
+    def turned(self, force: Floats) -> Floats:
+        """By how much forces (P, 1 + d) along n, t1[, t2] turn with their nodes: change along (y, x[, z])
+        per displacement along x[, z], (P, 1 + d, d).
+        """
+        (p, q, first, r), d = self._sizes, self.slope.shape[1]
+        # rates at which n turns towards t1 and t2, and t1 towards t2, by p and by q
+        a, b, c = (np.zeros((p.size, d)) for _ in range(3))
+        a[:, 0] = -1.0 / (first * r)
+        normal, one = force[:, :1], force[:, 1:2]
+        changes = [-a * one, a * normal]
+        if d == 2:
+            b[:, 0], b[:, 1], c[:, 0] = p * q / (first * r**2), -first / r**2, q / (first**2 * r)
+            two = force[:, 2:]
+            changes = [changes[0] - b * two, changes[1] - c * two, b * normal + c * one]
+        by_slope = np.einsum("paj,pak->pkj", np.stack(changes, axis=1), self.axes)
+        return np.asarray(by_slope @ self.curvature)
 
 
 def surface_state(surface: Any, position: Floats) -> SurfaceState:
-    """Surface frame at node positions (P, dim); h(x) = surface.y + surface.height(x)."""
-    x = position[:, 0]
-    if surface.is_flat:
-        zero = np.zeros_like(x)
-        return SurfaceState(position[:, 1] - surface.y, zero, zero)
-    return SurfaceState(
-        position[:, 1] - surface.y - surface.height(x), surface.slope(x), surface.curvature(x)
-    )
-
-
-def normals(state: SurfaceState) -> Floats:
-    """Unit normals of the profile at the nodes (P, 2), pointing towards the finger."""
-    return np.stack([-state.slope, np.ones_like(state.slope)], axis=1) / state.stretch[:, None]
+    """Surface frame at node positions (P, dim); h(x[, z]) = surface.y + surface.relief(place)."""
+    height, slope, curvature = surface.relief(position[:, ::2])
+    return SurfaceState(position[:, 1] - surface.y - height, slope, curvature)

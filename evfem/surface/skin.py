@@ -78,6 +78,20 @@ class Skin:
         unknown = 3 * self.faces[:, None, :] + np.array([0, 2])[:, None, None, None]
         return of.ravel(), np.broadcast_to(unknown, values.shape).ravel(), values.ravel()
 
+    def tributary_curvature(self, position: Floats, weight: Floats) -> tuple[Ints, Ints, Floats]:
+        """Second derivatives of the sum of `weight` (P,) times the areas, as triplets (moved unknown, moved
+        unknown, value): of x by z and of z by x.
+        """
+        first, second = self._ways(position)
+        facing = first[..., 0] * second[..., 1] > first[..., 1] * second[..., 0]
+        value, slope = self._gauss
+        at = np.einsum("gm,km->kg", value, weight[self.faces]) * facing
+        turn = np.einsum("gi,gj->gij", slope[:, :, 0], slope[:, :, 1])
+        values = np.einsum("kg,gij->kij", at, turn - turn.transpose(0, 2, 1))
+        x, z = np.broadcast_arrays(3 * self.faces[:, :, None], 3 * self.faces[:, None, :] + 2)
+        pairs = [each.ravel() for each in (x, z, values)]
+        return np.append(pairs[0], pairs[1]), np.append(pairs[1], pairs[0]), np.tile(pairs[2], 2)
+
     @property
     def _quarters(self) -> Ints:
         """Bilinear faces (4 K or K, 4) between neighbouring nodes."""

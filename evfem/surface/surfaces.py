@@ -7,11 +7,15 @@ between its rows, constant beyond them; at a repeated x the later row holds from
 `insulator` is the layer between the surface and the electrode under it (None: no electrode).
 `elastic` says how the surface gives way (`evfem.surface.elastic`; None: it is rigid). x may
 be any array, real or complex (for `tensor.complex_step`); the results have its shape.
+
+On a finger in three dimensions a surface is the same across the direction of its `angle`, and x above is
+the distance along that direction; tables of friction stay tables over x, and an `ev.FrictionMap` has
+coefficients over x and z. `ev.Relief` (`evfem.surface.relief`) has heights over x and z.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,18 +31,19 @@ from evfem.electrostatics.laws import FILM, Layer
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
 from evfem.surface.elastic import ELASTIC, elastic_of
+from evfem.surface.ways import ANGLE, FrictionMap, OneWay, Steps, direction
 from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
 
 FRICTION = (
     "a number from 0 to 100, or a table [[x, mu], ...] with mu from 0 to 100 and x not decreasing, "
-    "within 1e6 mm, in at most 10000 rows"
+    "within 1e6 mm, in at most 10000 rows, or a FrictionMap"
 )
 ELECTRODES = "rows [from, to, share] in mm from left to right, gaps in between, shares from -1 to 1"
 TERMS = (
-    "a list of at most 1000 rows [amplitude, wavenumber, phase], amplitudes within 1e3 mm, wavenumbers and "
-    "phases within 1e6"
+    "a list of at most 1000 rows [amplitude, wavenumber, phase] or [amplitude, wavenumber, phase, angle], "
+    "amplitudes within 1e3 mm, wavenumbers and phases within 1e6, angles within 360 degrees"
 )
 #: what a surface may be at most: rows of a table, sines of a sum, samples of a profile; positions (mm),
 #: heights and amplitudes (mm), wavenumbers (rad/mm), coefficients of friction; how near samples may be (mm)
@@ -49,14 +54,15 @@ EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi 
 
 
 Friction = Annotated[
-    float | Rows,
+    float | Rows | FrictionMap,
     {
         "allowed": FRICTION,
         "check": lambda key, given: _friction(key, given),
-        "type": float | list[list[float]],
+        "type": float | list[list[float]] | dict,
     },
-    "Coulomb's coefficient, or its table over x (mm), linear in between",
+    "Coulomb's coefficient, its table over x (mm), or a table {x, z, friction}; linear in between",
 ]
+Angle = Annotated[float, ANGLE, "from +x, of the direction in which it varies; 90 is along the finger"]
 Shift = Annotated[
     float | None,
     number("a height in mm, within 1e3 mm", Within(-HIGHEST, HIGHEST), "mm"),
@@ -66,10 +72,10 @@ Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None",
 GivesWay = Annotated[Elastic | None, {"check": lambda key, given: elastic_of(given, key), "allowed": ELASTIC}]
 
 
-class RigidSurface(Checked):
+class RigidSurface(OneWay, Checked):
     """Base of surfaces; subclasses are frozen dataclasses with these fields."""
 
-    friction: float | Rows
+    friction: float | Rows | FrictionMap
     y: float | None
     insulator: Layer | None
     elastic: Elastic | None
@@ -79,10 +85,43 @@ class RigidSurface(Checked):
     @property
     def has_friction(self) -> bool:
         """Whether the friction coefficient is positive anywhere."""
+        if isinstance(self.friction, FrictionMap):
+            return bool(np.max(self.friction.friction) > 0.0)
         return bool(np.max(np.atleast_2d(self.friction)[:, -1]) > 0.0)
 
+    @property
+    def crosses(self) -> bool:
+        """Whether a finger in the plane cannot have it."""
+        return super().crosses or isinstance(self.friction, FrictionMap)
+
+    def friction_at(self, place: Array) -> Array:
+        """Coefficients of friction (...) at places (..., d)."""
+        if isinstance(self.friction, FrictionMap):
+            return self.friction.at(place)
+        return super().friction_at(place)
+
+    def friction_gradient(self, place: Array) -> Array:
+        """Derivatives (..., d) of the coefficient along x and z, in 1/mm, jumps left out."""
+        if isinstance(self.friction, FrictionMap):
+            return self.friction.gradient(place)
+        return super().friction_gradient(place)
+
+    def friction_steps(self, short: float) -> tuple[Steps, ...]:
+        """Jumps of the coefficient, in tables over x also ramps shorter than `short` (mm)."""
+        if isinstance(self.friction, FrictionMap):
+            return self.friction.steps
+        return super().friction_steps(short)
+
+    @property
+    def _rows(self) -> Array:
+        """Positions and coefficients (R, 2) of the table over x; of a map that on z = 0."""
+        if isinstance(self.friction, FrictionMap):
+            x = self.friction.x
+            return np.column_stack([x, self.friction.at(x[:, None])])
+        return np.array(self.friction)
+
     def friction_coefficient(self, x: Array) -> Array:
-        """Friction coefficient at x (mm), real.
+        """Friction coefficient at x (mm), real, on z = 0.
 
         >>> step = Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.0, 0.6]])
         >>> step.friction_coefficient(np.array([-1.0, 1.9, 2.0, 9.0])).tolist()
@@ -90,7 +129,7 @@ class RigidSurface(Checked):
         """
         if isinstance(self.friction, float):
             return np.full(np.shape(x), self.friction)
-        place, mu = np.array(self.friction).T
+        place, mu = self._rows.T
         return piecewise_linear(place, mu, x)
 
     def friction_slope(self, x: Array) -> Array:
@@ -101,7 +140,7 @@ class RigidSurface(Checked):
         """
         if isinstance(self.friction, float):
             return np.zeros(np.shape(x))
-        place, mu = np.array(self.friction).T
+        place, mu = self._rows.T
         return piecewise_slope(place, mu, x)
 
     @property
@@ -113,7 +152,7 @@ class RigidSurface(Checked):
         """
         if isinstance(self.friction, float):
             return np.zeros((0, 3))
-        place, mu = np.array(self.friction).T
+        place, mu = self._rows.T
         first = np.concatenate([[True], np.diff(place) > 0])
         last = np.concatenate([np.diff(place) > 0, [True]])
         jumps = np.stack([place[last], mu[first], mu[last]], axis=1)
@@ -128,7 +167,7 @@ class RigidSurface(Checked):
         """
         if isinstance(self.friction, float):
             return np.zeros((0, 4))
-        place, mu = np.array(self.friction).T
+        place, mu = self._rows.T
         ramps = np.stack([place[:-1], place[1:], mu[:-1], mu[1:]], axis=1)
         return ramps[(ramps[:, 0] < ramps[:, 1]) & (ramps[:, 2] != ramps[:, 3])]
 
@@ -140,15 +179,15 @@ class RigidSurface(Checked):
 
     def height(self, x: Array) -> Array:
         """Height (mm) of the unshifted profile at x (mm)."""
-        raise NotImplementedError
+        return self.relief(np.asarray(x)[..., None])[0]
 
     def slope(self, x: Array) -> Array:
         """Derivative of the height at x (mm)."""
-        raise NotImplementedError
+        return self.relief(np.asarray(x)[..., None])[1][..., 0]
 
     def curvature(self, x: Array) -> Array:
         """Second derivative (1/mm) of the height at x (mm)."""
-        raise NotImplementedError
+        return self.relief(np.asarray(x)[..., None])[2][..., 0, 0]
 
 
 class _Level(RigidSurface):
@@ -161,6 +200,10 @@ class _Level(RigidSurface):
         return np.zeros_like(x, dtype=np.result_type(x, float))
 
     slope = curvature = height
+
+    def relief(self, place: Array) -> tuple[Array, Array, Array]:
+        """Zeros."""
+        return np.zeros(place.shape[:-1]), np.zeros(place.shape), np.zeros((*place.shape, place.shape[-1]))
 
 
 @dataclass(frozen=True)
@@ -210,10 +253,14 @@ class Display(_Level):
 @dataclass(frozen=True)
 class Sinusoid(RigidSurface):
     """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase); without `terms` equation (25)
-    of the paper, 0.025 (sin 6x + cos 12x - 1) mm.
+    of the paper, 0.025 (sin 6x + cos 12x - 1) mm. A term may have an angle of its own, from that of the
+    surface on.
 
     >>> float(Sinusoid().height(0.0))
     0.0
+    >>> eggs = Sinusoid(terms=[[0.02, 6.0, 0.0], [0.02, 6.0, 0.0, 90.0]])
+    >>> eggs.relief(np.array([[0.1, 0.2]]))[0].round(6).tolist()
+    [0.029934]
     """
 
     friction: Friction = 0.3
@@ -225,34 +272,35 @@ class Sinusoid(RigidSurface):
     y: Shift = None
     insulator: Insulator = None
     elastic: GivesWay = None
+    angle: Angle = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         terms = EQUATION_25 if self.terms is None else self.terms
-        rows = _rows("surface.terms", terms, 3, TERMS, MOST_TERMS)
-        if (np.abs(rows) > [HIGHEST, FASTEST, FASTEST]).any():
-            raise InputError("surface.terms", quoted(terms), TERMS)
+        rows = _terms("surface.terms", terms)
         set_frozen(self, terms=rows)
 
-    def _sum(self, x: Array, order: int) -> Array:
-        """Derivative of the given order: each one is a factor k and a quarter of a turn."""
+    @property
+    def crosses(self) -> bool:
+        """Whether a finger in the plane cannot have it."""
+        return super().crosses or any(way != 0.0 for _, _, _, *own in self._all for way in own)
+
+    @property
+    def _all(self) -> Rows:
         assert self.terms is not None
-        total: Any = 0.0
-        for a, k, phase in self.terms:
-            total = total + a * k**order * np.sin(k * x + phase + order * np.pi / 2)
-        return total
+        return self.terms
 
-    def height(self, x: Array) -> Array:
-        """Height (mm) of the unshifted profile at x (mm)."""
-        return self._sum(x, 0)
-
-    def slope(self, x: Array) -> Array:
-        """Derivative of the height at x (mm)."""
-        return self._sum(x, 1)
-
-    def curvature(self, x: Array) -> Array:
-        """Second derivative (1/mm) of the height at x (mm)."""
-        return self._sum(x, 2)
+    def relief(self, place: Array) -> tuple[Array, Array, Array]:
+        """Heights, slopes and curvatures of all terms, each along its own direction."""
+        parts = []
+        for a, k, phase, *own in self._all:
+            way = np.array(direction(self.angle + sum(own))[: place.shape[-1]])
+            at = k * (place @ way) + phase
+            wave = a * np.sin(at)
+            slope = (a * k * np.cos(at))[..., None] * way
+            parts.append((wave, slope, (-(k**2) * wave)[..., None, None] * np.outer(way, way)))
+        height, slope, curvature = (sum(each) for each in zip(*parts, strict=True))
+        return np.asarray(height), np.asarray(slope), np.asarray(curvature)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -273,17 +321,19 @@ class Profile(RigidSurface):
     y: Shift = None
     insulator: Insulator = None
     elastic: GivesWay = None
+    angle: Angle = 0.0
 
     def __init__(
         self,
         x: Any,
         height: Any,
-        friction: float | Rows = 0.3,
+        friction: Any = 0.3,
         y: float | None = None,
         insulator: Layer | None = None,
         elastic: Elastic | None = None,
+        angle: float = 0.0,
     ) -> None:
-        set_frozen(self, friction=friction, y=y, insulator=insulator, elastic=elastic)
+        set_frozen(self, friction=friction, y=y, insulator=insulator, elastic=elastic, angle=angle)
         super().__post_init__()
         set_frozen(self, x=numbers("surface.x", x, "a list of positions in mm"))
         set_frozen(self, samples=numbers("surface.height", height, "a list of heights in mm"))
@@ -293,14 +343,15 @@ class Profile(RigidSurface):
     def from_csv(
         cls,
         path: str | Path,
-        friction: float | Rows = 0.3,
+        friction: Any = 0.3,
         y: float | None = None,
         insulator: Layer | None = None,
         elastic: Elastic | None = None,
+        angle: float = 0.0,
     ) -> Profile:
         """The profile in a file with the header `x,height` and one point (mm) in each further line."""
         x, height = read_columns(Path(path), ["x", "height"], "surface.file")
-        return cls(x, height, friction, y, insulator, elastic)
+        return cls(x, height, friction, y, insulator, elastic, angle)
 
     def __repr__(self) -> str:
         x, low, high = self.x, self.samples.min(), self.samples.max()
@@ -340,8 +391,15 @@ class Profile(RigidSurface):
         return 2.0 * c[1] + d * 6.0 * c[0]
 
 
-def _friction(key: str, given: Any) -> float | Rows:
-    """A number as float, a table as a tuple of rows."""
+def _friction(key: str, given: Any) -> float | Rows | FrictionMap:
+    """A number as float, a table as a tuple of rows, a map as it is or from its table."""
+    if isinstance(given, FrictionMap):
+        return given
+    if isinstance(given, Mapping):
+        if set(given) != {"x", "z", "friction"}:
+            found = ", ".join(map(str, given)) or "nothing"
+            raise InputError(key, f"a table of {found}", "x, z and friction")
+        return FrictionMap(**given)
     if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
         return real(key, given, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)
     rows = _rows(key, given, 2, FRICTION, MOST_ROWS)
@@ -349,6 +407,18 @@ def _friction(key: str, given: Any) -> float | Rows:
     if not ((mu >= 0.0) & (mu <= ROUGHEST) & (np.abs(x) <= FARTHEST)).all() or (np.diff(x) < 0.0).any():
         raise InputError(key, given, FRICTION)
     return rows
+
+
+def _terms(key: str, given: Any) -> tuple[tuple[float, ...], ...]:
+    """Rows of a sum of sines, with angles or without."""
+    rows = list(given) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else given
+    long = isinstance(rows, list) and any(np.size(row) == 4 for row in rows)
+    if long:  # some rows with an angle, some without
+        rows = [[*row, 0.0] if np.size(row) == 3 else row for row in rows]
+    found = _rows(key, rows, 4 if long else 3, TERMS, MOST_TERMS)
+    if (np.abs(found) > [HIGHEST, FASTEST, FASTEST, 360.0][: len(found[0])]).any():
+        raise InputError(key, quoted(given), TERMS)
+    return found
 
 
 def _rows(key: str, given: Any, columns: int, allowed: str, most: int) -> tuple[tuple[float, ...], ...]:

@@ -27,10 +27,12 @@ import numpy as np
 
 from evfem.common.checks import SEED, Within, number, real, set_frozen
 from evfem.errors import InputError
+from evfem.surface.relief import Relief
 from evfem.surface.surfaces import (
     FARTHEST,
     HIGHEST,
     MOST_TERMS,
+    Angle,
     Flat,
     Friction,
     GivesWay,
@@ -87,6 +89,7 @@ class Grating(RigidSurface):
     y: Shift = None
     insulator: Insulator = None
     elastic: GivesWay = None
+    angle: Angle = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -155,6 +158,7 @@ class SelfAffine(RigidSurface):
     y: Shift = None
     insulator: Insulator = None
     elastic: GivesWay = None
+    angle: Angle = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -218,4 +222,5 @@ SURFACES: Mapping[str, Any] = {
     "profile": Profile,
     "grating": Grating,
     "self_affine": SelfAffine,
+    "relief": Relief,
 }

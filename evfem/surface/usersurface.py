@@ -12,6 +12,7 @@ from evfem.common.checks import set_frozen
 from evfem.errors import InputError, quoted
 from evfem.protocols import CompleteSurface, Surface
 from evfem.surface.surfaces import Flat
+from evfem.surface.ways import OneWay
 from evfem.tensor import Array, derivative, difference
 
 #: step of differences in mm
@@ -46,13 +47,18 @@ def completed(surface: Surface) -> CompleteSurface:
 
 
 @dataclass(frozen=True)
-class OwnSurface:
+class OwnSurface(OneWay):
     """A user's surface `own` with derivatives, and with what it does not say itself taken from `plain`."""
 
     own: Any
     plain: Flat
     y: float | None = field(default=None)
     is_flat = False
+
+    @property
+    def angle(self) -> float:  # type: ignore[override]
+        """The user's own direction in degrees from +x, or that of x."""
+        return float(getattr(self.own, "angle", 0.0))
 
     @property
     def insulator(self) -> Any:

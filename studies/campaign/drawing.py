@@ -4,7 +4,8 @@ Scene `number` of a seed is the same however many are drawn. Lengths in mm, forc
 voltages in V. The ranges are those of coarse fingers: any size, smooth and ridged, ready-made
 meshes, all surfaces, friction from 0 to 1.5, insulators of 5 um to 0.5 mm below 60 V/um and 3000 V.
 Sizes follow the finger's: `scale` is its width over that of Table 2. One scene in ten has a finger
-in three dimensions: smooth coarse tips in few steps, in any direction over flat faces and long waves.
+in three dimensions: smooth coarse tips in few steps, in any direction over flat faces and long waves along
+x, z and askew.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from copy import deepcopy
 
 from .attractions import add_drive, add_field, add_roughness, add_voltage, electrostatics
 from .bodies import LAYERS, TABLE_2_WIDTH, finger, width
-from .grounds import add_friction_law, surface
+from .grounds import add_both_ways, add_friction_law, surface
 from .tables import Draw, Tables, six_digits
 
 #: share of the scenes whose finger has three dimensions, and the random numbers that these are drawn with
@@ -153,17 +154,13 @@ def _hold(random: Draw) -> Tables:
 
 # -- fingers in three dimensions
 
-#: what a finger in three dimensions cannot do yet, of the keys that `electrostatics` draws
-PLANE = ("direction",)
-
 
 def draw_solid(random: Draw) -> Tables:
     """The tables of a scene with a finger in three dimensions."""
     finger = _tip(random)
     tables: Tables = {"version": 1, "finger": finger, "surface": _tip_surface(random), "solver": {}}
     if random.chance(0.6):
-        table = electrostatics(random)
-        tables["electrostatics"] = {key: value for key, value in table.items() if key not in PLANE}
+        tables["electrostatics"] = electrostatics(random)
         if random.chance(0.2):
             tables["electrostatics"]["roughness_gap"] = random.spread(2e-4, 0.01)
     if random.chance(0.3):
@@ -171,6 +168,11 @@ def draw_solid(random: Draw) -> Tables:
         finger["viscosity"] = random.spread(1e-4, 2e-2)
     tables["motion"] = _tip_motions(random, tables)
     add_voltage(random, tables)
+    if random.chance(0.6):
+        add_both_ways(random, tables["surface"])
+        add_roughness(random, tables)
+        add_friction_law(random, tables)
+        _add_hand(random, tables)
     return deepcopy(tables)
 
 

@@ -39,6 +39,40 @@ def surface(random: Draw, finger: Tables) -> Tables:
     return table
 
 
+def add_both_ways(random: Draw, table: Tables) -> None:
+    """Perhaps another surface below a coarse tip: waves, a profile, a grating or a relief in some direction,
+    which its skin resolves, and friction over x and z, with jumps or without.
+    """
+    angle, amplitude = random.between(-180.0, 180.0), random.spread(0.002, 0.05)
+    one, other = (2.0 * np.pi / random.spread(4.0, 12.0) for _ in range(2))
+    kind = random.one_of("as it is", "sinusoid", "profile", "grating", "relief")
+    if kind != "as it is":
+        for key in ("terms", "y"):
+            table.pop(key, None)
+        table["kind"] = kind
+    if kind == "sinusoid":
+        table["terms"] = [[amplitude, six_digits(one), 0.0, 0.0], [amplitude, six_digits(other), 1.0, 90.0]]
+    elif kind == "profile":
+        x = np.linspace(-20.0, 20.0, 81)
+        height = amplitude * np.sin(one * x)
+        table["points"] = [[six_digits(a), six_digits(b)] for a, b in zip(x, height, strict=True)]
+    elif kind == "grating":
+        period = random.between(8.0, 12.0)
+        table |= {"period": period, "groove_depth": amplitude, "wall_width": six_digits(0.45 * period)}
+    elif kind == "relief":
+        x = np.linspace(-20.0, 20.0, 41)
+        height = amplitude * np.sin(one * x) * np.cos(other * x[:, None])
+        table |= {"x": x.tolist(), "z": x.tolist(), "height": np.round(height, 6).tolist()}
+    if kind in ("sinusoid", "profile", "grating"):
+        table["angle"] = angle
+    if random.chance(0.3):
+        place = random.between(-2.0, 2.0)
+        ends = [-20.0, place, place, 20.0] if random.chance(0.5) else [-20.0, place, place + 1.0, 20.0]
+        mu = [random.between(0.05, 1.0) for _ in range(2)]
+        rows = [[mu[0], mu[0], mu[1], mu[1]]] * 2 + [[mu[1], mu[1], mu[0], mu[0]]] * 2
+        table["friction"] = {"x": ends, "z": ends, "friction": rows}
+
+
 def add_friction_law(random: Draw, tables: Tables) -> None:
     """Perhaps a law of friction; where it asks for speeds, slides have them. Friction falls with the
     speed only where inertia holds it.

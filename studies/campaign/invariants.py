@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -107,13 +108,14 @@ def forces(scene: ev.Scene, result: ev.Result) -> Found:
     force, energy, step = _largest_force(result), largest_energy(result), result.step
     if scene.solver.dynamics != "inertial":  # as a vector
         x = result.applied_tangential_force_x - result.tangential_force_x + result.electrostatic_force_x
-        z = result.applied_tangential_force_z - result.tangential_force_z
+        z = result.applied_tangential_force_z - result.tangential_force_z + result.electrostatic_force_z
         y = -result.applied_force + result.normal_force - result.electrostatic_force
         allowed = max(TOLERANCE, 1e2 * scene.solver.tolerance)
         yield _worst("balance", np.hypot(np.hypot(x, z), y) / force, allowed, step)
     if scene.ground.is_flat and isinstance(scene.friction_law, ev.Coulomb):
         # on a level surface the sums lie within the cone of the largest coefficient
-        mu = float(np.max(np.atleast_2d(scene.surface.friction)[:, -1]))  # type: ignore[attr-defined]
+        friction = scene.surface.friction  # type: ignore[attr-defined]
+        mu = float(np.max(getattr(friction, "friction", np.atleast_2d(friction)[:, -1:])))
         beyond = np.hypot(result.tangential_force_x, result.tangential_force_z) - mu * result.normal_force
         yield _worst("cone", beyond / force, TOLERANCE, step)
     if scene.drive is None or not scene.drive.resolved:  # charges attract without voltage
@@ -208,8 +210,9 @@ def _beyond_the_cone(scene: ev.Scene, result: ev.Result, frame: ev.Frame) -> flo
 
     At a jump, and within a steep ramp, any coefficient within `NEAR` will do.
     """
-    x = result.mesh.points[:, 0] + frame.displacement[:, 0]
-    coefficients = [scene.ground.friction_coefficient(x + shift) for shift in (-NEAR, 0.0, NEAR)]
+    place = (result.mesh.points + frame.displacement)[:, ::2]
+    shifts = [NEAR * np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=place.shape[1])]
+    coefficients = [scene.ground.friction_at(place + shift) for shift in shifts]
     shear, slips = np.abs(frame.shear_traction), frame.contact_status == SLIP
     p = np.maximum(frame.contact_pressure, 0.0)
     bounds = [scene.friction_law.bound(p, mu, 0.0, 0.0) for mu in coefficients]

@@ -12,10 +12,14 @@ from contextlib import chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 import evfem as ev
 from evfem import plotting
 
 README = Path(__file__).with_name("slide.png")
+#: the picture of a print on a texture, which takes minutes
+RELIEF = "relief.png"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 #: picture in docs/pictures -> the page that shows it, and the file that this page's code writes; the code of
 #: "paraview.png" needs evfem[vtk]
@@ -62,6 +66,26 @@ def draw_readme(path: Path = README) -> None:
     figure.savefig(path, dpi=90)
 
 
+def draw_relief(path: Path) -> None:
+    """Press a print on waves along x and z and slide it askew; draw pressures, then what sticks and slips."""
+    from matplotlib.figure import Figure
+
+    finger = ev.Fingertip(resolution="coarse", ridges="whorl", ridge_width=0.6)
+    eggs = ev.Sinusoid(terms=[[0.08, 2.0, 0.0], [0.08, 2.0, 0.0, 90.0]], friction=0.3)
+    motion = [ev.Press(force=0.5, steps=4), ev.Slide(0.06, steps=1, angle=45.0, hold="force")]
+    result = ev.simulate(ev.Scene(finger, eggs, motion=motion))
+    figure = Figure(figsize=(9.6, 4.6), layout="constrained")
+    titles = "pressed to 0.5 N", "slid 0.06 mm towards 45 degrees"
+    for ax, field, frame, title in zip(
+        figure.subplots(1, 2), ("contact_pressure", "contact_status"), (3, 4), titles, strict=True
+    ):
+        plotting.footprint(result, field, frame, ax, near=(-5.0, 5.0, -5.0, 5.0)).set_title(title)
+        x, z = np.meshgrid(*[np.linspace(-5.0, 5.0, 200)] * 2)
+        height = eggs.relief(np.stack([x, z], axis=-1))[0]
+        ax.contour(x, z, height, levels=[-0.08, 0.0, 0.08], colors="0.5", linewidths=0.6)
+    figure.savefig(path, dpi=75)
+
+
 def draw_from_page(page: str, pictures: Iterable[str]) -> None:
     """Run the Python blocks of the page in a folder of their own and keep the pictures."""
     code = "\n".join(block for mark, block in CODE.findall((DOCS / page).read_text("utf-8")) if not mark)
@@ -73,12 +97,14 @@ def draw_from_page(page: str, pictures: Iterable[str]) -> None:
 
 def main(names: list[str]) -> None:
     """Draw the named pictures, or all of them; each page is run once."""
-    wanted = names or [README.name, *OF_PAGES]
+    wanted = names or [README.name, RELIEF, *OF_PAGES]
     if README.name in wanted:
         draw_readme()
+    if RELIEF in wanted:
+        draw_relief(DOCS / "pictures" / RELIEF)
     pages: dict[str, list[str]] = {}
     for name in wanted:
-        if name != README.name:
+        if name not in (README.name, RELIEF):
             pages.setdefault(OF_PAGES[name][0], []).append(name)
     for page, pictures in pages.items():
         draw_from_page(page, pictures)

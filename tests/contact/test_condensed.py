@@ -32,7 +32,11 @@ def candidates(rng, curved, **changes):
     shear = np.choose(status, [0.0, 0.1, -0.4, 0.4]) * normal
     force = np.where((status == OPEN)[:, None], 0.0, np.stack([normal, shear], axis=1))
     slope, curvature = (curved * rng.uniform(-0.5, 0.5, (2, K))) if curved else np.zeros((2, K))
-    surface = SurfaceState(np.where(status == OPEN, 0.5, 1e-3) * rng.uniform(0.5, 1.0, K), slope, curvature)
+    surface = SurfaceState(
+        np.where(status == OPEN, 0.5, 1e-3) * rng.uniform(0.5, 1.0, K),
+        slope[:, None],
+        curvature[:, None, None],
+    )
     zero = np.zeros(K)
     known = Candidates(
         surface=surface,
@@ -43,13 +47,13 @@ def candidates(rng, curved, **changes):
         interface_compliance=np.zeros((K, 2)),
         negative_stiffness=zero,
         gain_on_closing=zero,
-        friction_slope=zero,
+        friction_slope=zero[:, None],
     )
     return replace(known, **changes)
 
 
 def axes_of(surface):
-    angle = np.arctan(surface.slope)
+    angle = np.arctan(surface.slope[:, 0])
     normal = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
     return normal, np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
@@ -62,10 +66,11 @@ def pushed(step, found):
     known, moved = step.candidates, found.moved.reshape(-1, 2)
     normal, tangent = axes_of(known.surface)
     on_axes = found.force[:, :1] * normal + found.force[:, 1:] * tangent
-    angle = known.surface.curvature / (1.0 + known.surface.slope**2) * moved[:, 0]  # d atan(h')
+    turning = known.surface.curvature[:, 0, 0] / (1.0 + known.surface.slope[:, 0] ** 2)
+    angle = turning * moved[:, 0]  # d atan(h')
     turned = angle[:, None] * (known.force[:, 1:] * normal - known.force[:, :1] * tangent)
     against = np.where(known.status == FORWARD, -1.0, np.where(known.status == BACKWARD, 1.0, 0.0))
-    rougher = against * known.friction_slope * moved[:, 0] * known.force[:, 0]
+    rougher = against * known.friction_slope[:, 0] * moved[:, 0] * known.force[:, 0]
     rougher[found.status != OPEN] = 0.0  # it is in the force
     return (on_axes + turned + rougher[:, None] * tangent).ravel()
 
@@ -102,7 +107,7 @@ def laws(step, found):
     )
     pressing, shear = found.force.T
     limit = known.friction * pressing
-    rougher = known.friction_slope * moved[:, 0] * known.force[:, 0]
+    rougher = known.friction_slope[:, 0] * moved[:, 0] * known.force[:, 0]
     limit = limit + np.where((known.status >= FORWARD) & (found.status != OPEN), rougher, 0.0)
     return max(
         (-pressing).max(),
@@ -161,7 +166,7 @@ def test_prescribed_forces_are_reached_on_any_profile(seed, curved, unknowns):
 
 def test_friction_that_grows_along_the_way_is_felt():
     rng = np.random.default_rng(3)
-    step, *matrices = step_of(rng, 1.0, 0.0, ("force",), friction_slope=rng.uniform(0.5, 1.0, K))
+    step, *matrices = step_of(rng, 1.0, 0.0, ("force",), friction_slope=rng.uniform(0.5, 1.0, (K, 1)))
     check(step, *matrices)
 
 
@@ -172,10 +177,10 @@ def test_friction_that_rises_with_the_slip_holds_whatever_the_own_compliance(own
     """
     step, *_ = step_of(np.random.default_rng(0), 0.0, 0.0)
     rising = replace(step.candidates, status=np.full(K, FORWARD), slip_stiffness=np.full(K, 0.5))
-    np.testing.assert_allclose(rising.follower_rate(np.full(K, own))[:, 1], -0.5, rtol=1e-14)
+    np.testing.assert_allclose(rising.follower_rate(np.full((K, 1), own))[:, 1, 0], -0.5, rtol=1e-14)
     falling = replace(rising, slip_stiffness=np.full(K, -0.5))
     left = 0.0 if own > 0.0 else 0.5
-    np.testing.assert_allclose(falling.follower_rate(np.full(K, own))[:, 1], left, rtol=1e-14)
+    np.testing.assert_allclose(falling.follower_rate(np.full((K, 1), own))[:, 1, 0], left, rtol=1e-14)
 
 
 def test_steep_friction_of_soft_tissue_balances_near_the_equilibrium():
@@ -189,7 +194,7 @@ def test_steep_friction_of_soft_tissue_balances_near_the_equilibrium():
     schur = 1e-3 * schur
     known = replace(
         step.candidates,
-        surface=SurfaceState(np.zeros(K), np.zeros(K), np.zeros(K)),
+        surface=SurfaceState(np.zeros(K), np.zeros((K, 1)), np.zeros((K, 1, 1))),
         status=status,
         force=1e-3 * np.stack([np.ones(K), shear], axis=1),
         slip=np.where(status == FORWARD, 1e-3, 0.0)[:, None],
@@ -248,7 +253,9 @@ def test_nodes_and_bone_feel_how_the_attraction_changes(seed):
 def test_crests_that_push_harder_than_the_body_holds_have_no_solution(seed):
     crests = candidates(np.random.default_rng(seed), 1.0).surface
     held, lost = (
-        step_of(np.random.default_rng(seed), 1.0, surface=replace(crests, curvature=np.full(K, curvature)))
+        step_of(
+            np.random.default_rng(seed), 1.0, surface=replace(crests, curvature=np.full((K, 1, 1), curvature))
+        )
         for curvature in (-0.1, -5.0)
     )
     check(*held)
@@ -260,7 +267,7 @@ def test_crests_that_push_harder_than_the_body_holds_have_no_solution(seed):
 def test_a_body_that_nothing_holds_falls_under_its_load_whatever_the_rounding(rounding):
     """Its row of the balance is zero in exact numbers; one that is held keeps its own."""
     body = CondensedTangent.make(np.eye(4), None)
-    step = SimpleNamespace(body=body, unknowns=[SimpleNamespace(axis=1, condition=None)])
+    step = SimpleNamespace(body=body, unknowns=[ExtraUnknown(np.zeros(4), 1, 0.0)])
     free = np.ones((2, 2))
     body.schur[-1, :2] = 0.5
     (loose,), (held,) = (LinearContactStep._held(step, np.array([[own]]), free)[0] for own in (rounding, 2.0))

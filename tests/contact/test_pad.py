@@ -141,8 +141,8 @@ def test_frame_on_a_sinusoid_by_hand():
     surface = Sinusoid(terms=[[0.2, 3.0, 0.0]], y=1.0)
     found = surface_state(surface, np.array([[0.0, 1.5], [np.pi / 6, 1.5]]))
     np.testing.assert_allclose(found.gap, [0.5, 0.3], rtol=1e-14)
-    np.testing.assert_allclose(found.slope, [0.6, 0.0], atol=1e-15)
-    np.testing.assert_allclose(found.curvature, [0.0, -1.8], atol=1e-14)
+    np.testing.assert_allclose(found.slope[:, 0], [0.6, 0.0], atol=1e-15)
+    np.testing.assert_allclose(found.curvature[:, 0, 0], [0.0, -1.8], atol=1e-14)
     np.testing.assert_allclose(found.stretch, [np.sqrt(1.36), 1.0], rtol=1e-15)
 
 
@@ -153,7 +153,7 @@ def test_the_normal_gap_is_the_distance_along_the_normal_to_first_order():
     for gap in (1e-3, 1e-4):
         position = np.column_stack([x, surface.height(x) + gap])
         found = surface_state(surface, position)
-        normal = np.column_stack([-found.slope, np.ones_like(x)]) / found.stretch[:, None]
+        normal = np.column_stack([-found.slope[:, 0], np.ones_like(x)]) / found.stretch[:, None]
         foot = position - found.normal_gap[:, None] * normal
         # a tenth of the gap leaves a hundredth of the error
         rest.append(np.abs(foot[:, 1] - surface.height(foot[:, 0])).max())

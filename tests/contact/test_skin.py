@@ -6,37 +6,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import dblquad
-from tools.solids import block
+from tools.solids import bent, block, sheet
 
 from evfem.contact.attraction import Attraction
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.errors import InputError
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.surface.pad import surface_state
-from evfem.surface.skin import Skin, make_skin
+from evfem.surface.skin import make_skin
 from evfem.surface.surfaces import Flat, Sinusoid
 
 FACES = {4: "bilinear", 9: "biquadratic"}
-
-
-def sheet(n, m, place):
-    """A skin of n x n faces with m nodes, its normal down, and the positions place(p, q) of its
-    nodes on the unit square.
-    """
-    step = 2 if m == 9 else 1
-    t = np.linspace(0.0, 1.0, step * n + 1)
-    number = np.arange(t.size**2).reshape(t.size, t.size)
-    corner = step * np.stack(np.meshgrid(range(n), range(n), indexing="ij"), axis=-1).reshape(-1, 2)
-    at = corner[:, None] + ((PLACES[:m] + 1) * step / 2).astype(int)
-    faces = number[at[..., 0], at[..., 1]]
-    q, p = np.meshgrid(t, t)
-    points = np.stack([c.ravel() for c in place(p, q)], axis=1)
-    return Skin(np.arange(len(points)), faces, np.ones(len(points), bool)), points
-
-
-def bent(p, q):
-    """A sheet that is curved, sheared, and turns up at one side."""
-    return 3.0 * p + 0.4 * q - 1.2 * p**2, 0.3 * p**2 + 0.1 * q, 2.0 * q + 0.3 * p * q
 
 
 @pytest.mark.parametrize("m", FACES)

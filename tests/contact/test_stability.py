@@ -21,7 +21,7 @@ def point(status, slope=0.0, curvature=0.0, friction=0.0, friction_slope=0.0, we
     schur = np.block([[stiffness, -stiffness], [-stiffness, stiffness]])
     shear = {FORWARD: -friction, BACKWARD: friction}.get(status, 0.0) * LOAD
     known = Candidates(
-        surface=SurfaceState(*(np.array([value]) for value in (0.0, slope, curvature))),
+        surface=SurfaceState(np.zeros(1), np.array([[slope]]), np.array([[[curvature]]])),
         slip=np.zeros((1, 1)),
         force=np.array([[LOAD, shear]]) * (status != OPEN),
         status=np.array([status]),
@@ -29,7 +29,7 @@ def point(status, slope=0.0, curvature=0.0, friction=0.0, friction_slope=0.0, we
         interface_compliance=np.zeros((1, 2)),
         negative_stiffness=np.array([weakening]),
         gain_on_closing=np.zeros(1),
-        friction_slope=np.array([friction_slope]),
+        friction_slope=np.array([[friction_slope]]),
     )
     return LinearContactStep(CondensedTangent.make(schur, None), known, np.zeros(4), np.zeros(2))
 

@@ -288,10 +288,11 @@ def test_tests_that_the_page_on_verification_names_are_there():
 
 
 def test_every_picture_has_a_recipe():
-    """A study of its name draws it, or the code of a page, as the script of the pictures says."""
-    recipes = runpy.run_path(str(ROOT / "studies/pictures/make.py"), run_name="recipes")["OF_PAGES"]
+    """A study of its name draws it, or the code of a page, or the script of the pictures itself."""
+    script = runpy.run_path(str(ROOT / "studies/pictures/make.py"), run_name="recipes")
+    recipes = script["OF_PAGES"]
     pictures = {path.name for path in (DOCS / "pictures").iterdir()}
-    assert pictures - set(recipes) <= {f"{name}.png" for name in studies.NAMES}
+    assert pictures - set(recipes) <= {script["RELIEF"], *(f"{name}.png" for name in studies.NAMES)}
     assert set(recipes) <= pictures
     for picture, (page, written) in recipes.items():
         code = "".join(text for kind, text, _, _ in blocks(page) if kind == "python")

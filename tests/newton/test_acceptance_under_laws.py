@@ -49,7 +49,7 @@ def lawful(kind, law, surface=None):
     shear = good.contact_force[:, 1]
     for _ in range(60):  # shares change a little with the slips
         x = X + np.where(touching, SLIP * sign - give[:, 1] * (shear - before[:, 1]), 0.0)
-        share, speed = interface.tributary_at((old, good), x), np.abs(sign) * SLIP / SECONDS
+        share, speed = interface.tributary_at((old, good), x[:, None]), np.abs(sign) * SLIP / SECONDS
         mu = surface.friction if surface else MU
         limit = mu * normal if law is None else law.bound(normal / share, mu, speed, 0.0) * share
         shear = np.where(sign != 0.0, -sign * limit, np.where(touching, 0.2 * limit, 0.0))

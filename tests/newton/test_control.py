@@ -98,7 +98,7 @@ def test_a_bound_is_left_only_where_the_voltage_could_help(way, wish, tolerated,
     for force, accepted in ((tolerated, True), (corrected, False)):
         control, _, _ = follow(wish, 1.0)
         control.force = way * control.force
-        assert control.accepts(way, np.array([way * force, 0.0]), 1e-6) == accepted
+        assert control.accepts(np.array([way]), np.array([way * force, 0.0]), 1e-6) == accepted
         assert control.free == (not accepted)
 
 

@@ -192,7 +192,7 @@ def test_a_combination_of_iterates_whose_bone_leaves_is_not_taken(pressed, monke
 def test_a_finger_leaves_an_equilibrium_only_by_the_tangent_there(pressed, monkeypatch):
     """An older one may say that slopes win where the finger is held."""
     body, state, _ = pressed
-    frame = replace(body.interface.surface_at(state), curvature=np.full(state.status.size, -1.0))
+    frame = replace(body.interface.surface_at(state), curvature=np.full((state.status.size, 1, 1), -1.0))
     monkeypatch.setattr(body.interface, "surface_at", lambda state: frame)
     slipping = replace(state, status=np.where(state.status == OPEN, OPEN, FORWARD))
 

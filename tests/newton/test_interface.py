@@ -9,7 +9,7 @@ from tools.meshes import block
 
 from evfem.common.constants import CHANGES, PIN_OFFSET
 from evfem.contact.signorini import OPEN, STICK
-from evfem.newton.interface import FrictionJumps, steps_of_friction
+from evfem.newton.interface import FrictionJumps
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
@@ -39,12 +39,12 @@ def crossing(table, times, smoother=True):
     away; the first two begin on the smoother side of it, or on the other one.
     """
     surface = Flat(friction=table)
-    pins, touching = FrictionJumps(surface.friction_jumps, 3), np.array([True, False, True])
+    touching = np.array([True, False, True])
     begin, beyond = (0.2, 0.4) if (table[-1][1] == 0.6) == smoother else (0.4, 0.2)
-    pins.begin(np.array([begin, begin, -1.0]))
+    pins = FrictionJumps(surface.friction_steps(0.0), np.array([[begin], [begin], [-1.0]]))
     for k in range(times):
         x = beyond if k % 2 == 0 else begin
-        pins.watch(np.array([x, x, -1.0]), touching)
+        pins.watch(np.array([[x], [x], [-1.0]]), touching)
     return surface, pins
 
 
@@ -53,8 +53,8 @@ def test_a_node_that_keeps_crossing_a_jump_is_pinned_to_its_rougher_side(table):
     assert not crossing(table, CHANGES - 1)[1].held.any()
     surface, pins = crossing(table, CHANGES)
     assert pins.held.tolist() == [True, False, False]
-    assert abs(pins.x[0] - 0.3) <= 1.001 * PIN_OFFSET
-    assert surface.friction_coefficient(pins.x[:1]).tolist() == [0.6]
+    assert abs(pins.place[0, 0] - 0.3) <= 1.001 * PIN_OFFSET
+    assert surface.friction_at(pins.place[:1]).tolist() == [0.6]
     assert pins.lower[0] == 0.2
 
 
@@ -67,12 +67,12 @@ def test_a_pinned_node_is_let_go_below_the_lower_limit_and_for_good(table):
         assert pins.release(pins.lower * normal, np.full(3, shear), weak) == free
         assert pins.held[0] != free
     for x in (0.4, 0.2, 0.4, 0.2, 0.4):
-        pins.watch(np.array([x, 0.2, -1.0]), np.full(3, True))
+        pins.watch(np.array([[x], [0.2], [-1.0]]), np.full(3, True))
     assert not pins.held[0]
     begin = 0.2 if table[-1][1] == 0.6 else 0.4
-    pins.begin(np.full(3, begin))
+    pins.begin(np.full((3, 1), begin))
     for x in (0.6 - begin, begin, 0.6 - begin):
-        pins.watch(np.array([x, 0.2, -1.0]), np.full(3, True))
+        pins.watch(np.array([[x], [0.2], [-1.0]]), np.full(3, True))
     assert pins.held[0]  # in the next step it may be pinned again
 
 
@@ -83,7 +83,7 @@ def test_contact_takes_a_pinned_node_at_its_jump(table):
     x = interface.positions(old.u)[:, 0]
     node = int(np.argmin(np.abs(x - 0.3)))
     place = 0.3 + (PIN_OFFSET if table[-1][1] == 0.6 else -PIN_OFFSET)
-    interface.jumps.x[node], interface.jumps.lower[node] = place, 0.2
+    interface.jumps.place[node], interface.jumps.lower[node] = place, 0.2
     u = old.u.copy()
     u[interface.pad.nodes, 0] = 0.25
     c, nothing = np.arange(x.size), np.zeros(x.size)
@@ -116,7 +116,7 @@ def test_a_pinned_node_does_not_yield_to_where_nothing_holds_it(table, shear, ob
     position, rougher = interface.positions(old.u), 1.0 if table[-1][1] == 0.6 else -1.0
     node = int(np.argmin(np.abs(position[:, 0] - 0.3)))
     place, force = 0.3 + rougher * PIN_OFFSET, np.array([5.0, rougher * shear])
-    interface.jumps.x[node], interface.jumps.lower[node] = place, 0.2
+    interface.jumps.place[node], interface.jumps.lower[node] = place, 0.2
     give = interface.compliance(old)[node]
     u, every = old.u.copy(), np.zeros_like(old.contact_force)
     u[interface.pad.nodes[node]] += [place - give[1] * force[1], -0.1 - give[0] * force[0]] - position[node]
@@ -130,6 +130,12 @@ def test_a_pinned_node_does_not_yield_to_where_nothing_holds_it(table, shear, ob
 def test_short_ramps_of_friction_are_jumps_at_their_rougher_end():
     table = [[0.0, 0.2], [1.0, 0.2], [1.01, 0.6], [2.0, 0.6], [2.0, 0.3], [3.0, 0.3], [3.01, 0.1], [5.0, 0.4]]
     surface = Flat(friction=table)
-    found = steps_of_friction(surface, 0.05)
-    np.testing.assert_allclose(found, [[1.01, 0.2, 0.6], [2.0, 0.6, 0.3], [3.0, 0.3, 0.1]])
-    np.testing.assert_array_equal(steps_of_friction(surface, 0.005), surface.friction_jumps)
+    for short, expected in (
+        (0.05, [[1.01, 0.2, 0.6], [2.0, 0.6, 0.3], [3.0, 0.3, 0.1]]),
+        (0.005, surface.friction_jumps),
+    ):
+        (found,) = surface.friction_steps(short)
+        assert found.axis == 0
+        np.testing.assert_allclose(
+            np.column_stack([found.place, found.before, found.behind]), expected, rtol=1e-15
+        )

@@ -59,7 +59,7 @@ def known(x, force):
     surface = surface_state(RAMP.shifted(0.0), np.column_stack([x, RAMP.height(x), 0.0 * x]))
     zero, one = np.zeros(1), np.array([0.3 + 0.1 * x[0]])
     return Candidates(surface, np.zeros((1, 2)), np.array([force]), np.array([SLIP]), one,
-                             np.zeros((1, 3)), zero, zero, np.array([0.1]))  # fmt: skip
+                             np.zeros((1, 3)), zero, zero, np.array([[0.1, 0.0]]))  # fmt: skip
 
 
 def test_a_force_turns_with_its_node_and_grows_with_friction():
@@ -67,11 +67,13 @@ def test_a_force_turns_with_its_node_and_grows_with_friction():
 
     def force(x):
         mu = 0.3 + 0.1 * x
-        return np.einsum("a,ak->k", [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8], known(x, [0.0, 0.0, 0.0]).axes[0])
+        return np.einsum(
+            "a,ak->k", [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8], known(x, [0.0, 0.0, 0.0]).surface.axes[0]
+        )
 
     at, h = 0.7, 1e-5
     mu = 0.3 + 0.1 * at
-    found = known(at, [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8]).follower_rate(np.zeros(1))[0]
+    found = known(at, [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8]).follower_rate(np.zeros((1, 2)))[0, :, 0]
     assert_allclose(found, (force(at + h) - force(at - h)) / (2 * h), atol=1e-8)
 
 
@@ -86,19 +88,20 @@ def test_friction_that_grows_against_the_force_never_pushes_a_node_on():
         (-0.6, -100.0, True),
     ):
         force = [2.0, ahead, 0.8]
-        free, found = (known(0.7, force).follower_rate(np.array([c]))[0] for c in (0.0, own))
+        free, found = (known(0.7, force).follower_rate(np.array([[c, c]]))[0] for c in (0.0, own))
         assert (found == free).all() == kept
 
 
 def test_turning_forces_are_part_of_the_body():
     """u = C (f + T u) for the compliance that comes back, and for motions that come from outside."""
     rng = np.random.default_rng(3)
-    A, rate = rng.normal(size=(9, 9)), np.zeros((3, 3))
-    C, rate[[0, 2]] = np.eye(9) + 0.1 * A @ A.T, 0.1 * rng.normal(size=(2, 3))
+    A, rate = rng.normal(size=(9, 9)), np.zeros((3, 3, 2))
+    C, rate[[0, 2]] = np.eye(9) + 0.1 * A @ A.T, 0.1 * rng.normal(size=(2, 3, 2))
+    rate[2, :, 1] = 0.0  # a node on a slope along x alone
     turning, W = FollowerStiffness.of(rate), rng.normal(size=(9, 1))
     T = np.zeros((9, 9))
     for node in range(3):
-        T[3 * node : 3 * node + 3, 3 * node + 1] = rate[node]
+        T[3 * node : 3 * node + 3, 3 * node + 1 : 3 * node + 3] = rate[node]
     whole = np.linalg.inv(np.eye(9) - C @ T)
     found = turning.apply(C, W)
     assert_allclose(found[0], whole @ C)

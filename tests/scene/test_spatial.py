@@ -1,5 +1,6 @@
 """What a finger in three dimensions is refused, where slides go, and the memory that is announced."""
 
+import numpy as np
 import pytest
 from tools.domes import Dome, dome, dome_scene
 
@@ -7,6 +8,7 @@ import evfem as ev
 from evfem.errors import InputError
 from evfem.planning.plan import plan
 from evfem.scene import spatial
+from evfem.scene.file import dump, loads
 from evfem.scene.spatial import needed_memory
 from evfem.simulation.model import make_model
 
@@ -14,27 +16,17 @@ PRESS = ev.Press(indentation=0.1)
 
 
 def refusals():
-    jump = ev.Flat(friction=[[0.0, 0.2], [1.0, 0.2], [1.0, 0.5]])
-    across = [PRESS, ev.Slide(1.0, angle=90.0)]
-    follow = ev.FollowForce([0.0, 1.0], [0.01, 0.01])
     penalty = ev.Solver(element="hex8", contact="penalty", penalty_normal=1.0, penalty_tangential=1.0)
-    rough = ev.PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
-    fast = ev.RateFriction(speed=5.0, exponent=0.5)
     return {
-        "electrostatics.roughness_gap": dome_scene(PRESS, roughness_gap=rough),
-        "surface.friction_law": dome_scene(ev.Press(indentation=0.1, speed=1.0), friction_law=fast),
-        "hand": dome_scene(*across, hand=ev.Hand(0.1)),
-        "surface.friction": dome_scene(PRESS, surface=jump, law=None, voltage=0.0),
         "solver.contact": dome_scene(PRESS, solver=penalty),
-        "electrostatics.direction": dome_scene(PRESS, direction="normal"),
+        "electrostatics.field": dome_scene(PRESS, law=ev.StrongTroxel(), field="full"),
         "depth": dome_scene(PRESS, depth=10.0),
-        "electrostatics.voltage": dome_scene(*across, voltage=follow),
     }
 
 
 @pytest.mark.parametrize("key", refusals())
 def test_what_is_not_possible_yet_is_refused_by_the_plan(key):
-    with pytest.raises(InputError, match=r"three dimensions|across x") as refused:
+    with pytest.raises(InputError, match="three dimensions") as refused:
         plan(refusals()[key])
     assert str(refused.value).startswith(key)
 
@@ -43,6 +35,53 @@ def test_a_finger_in_the_plane_slides_along_x():
     flat = ev.Scene(ev.FingerPad(resolution="coarse"), ev.Flat(), motion=[PRESS, ev.Slide(1.0, angle=10.0)])
     with pytest.raises(InputError, match=r"motion\[1\].angle: given 10 degrees with a finger in the plane"):
         plan(flat)
+
+
+FOUR = [0.0, 1.0, 2.0, 3.0]
+ACROSS = {
+    "turned": ev.Sinusoid(angle=180.0),
+    "term": ev.Sinusoid(terms=[[0.02, 6.0, 0.0, 90.0]]),
+    "profile": ev.Profile(FOUR, FOUR, angle=90.0),
+    "grating": ev.Grating(1.0, 0.1, angle=1.0),
+    "relief": ev.Relief(FOUR, FOUR, [FOUR] * 4),
+    "map": ev.Flat(friction=ev.FrictionMap([0.0, 1.0], [0.0, 1.0], [[0.1, 0.2], [0.3, 0.4]])),
+}
+
+
+@pytest.mark.parametrize("name", ACROSS)
+def test_a_finger_in_the_plane_knows_no_surface_that_differs_along_z(name):
+    """Plane strain would not be; in a file as in Python, where a solid takes each of them."""
+    pad = ev.Scene(ev.FingerPad(resolution="coarse"), ACROSS[name], motion=[PRESS])
+    with pytest.raises(
+        InputError, match=r"^surface: given heights or friction over x and z with a finger in"
+    ):
+        plan(pad)
+    scene = ev.Scene(ev.Fingertip(resolution="coarse", ridges="none"), ACROSS[name], motion=[PRESS])
+    again = loads(dump(scene))
+    assert again.digest() == scene.digest()
+    assert type(again.surface) is type(ACROSS[name])
+
+
+def test_a_relief_may_be_in_a_file_of_its_own(tmp_path):
+    rows = "".join(f"{x},{z},{0.01 * x * z}\n" for x in range(4) for z in range(5))
+    (tmp_path / "scan.csv").write_text("x,z,height\n" + rows)
+    text = "version = 1\n[finger]\nkind = 'fingertip'\n[surface]\nkind = 'relief'\n{}friction = {}\n"
+    text += "[[motion]]\nkind = 'press'\nindentation = 0.1\n"
+    table = "{x = [0, 1], z = [0, 1], friction = [[0.1, 0.2], [0.3, 0.4]]}"
+    surface = loads(text.format("file = 'scan.csv'\n", table), tmp_path).surface
+    assert (surface.samples.shape, surface.samples[2, 3]) == ((5, 4), 0.06)
+    assert surface.friction.at(np.array([[0.5, 0.5]])).tolist() == [0.25]
+    for keys, given in (
+        ("", "missing"),
+        ("file = 'scan.csv'\nx = [0.0]\n", "file and x"),
+        ("x = [0]\n", "x"),
+    ):
+        with pytest.raises(InputError, match=rf"surface\.file: (given )?{given}; allowed: the path of a csv"):
+            loads(text.format(keys, 0.3), tmp_path)
+    with pytest.raises(
+        InputError, match=r"surface\.friction: given a table of x; allowed: x, z and friction"
+    ):
+        loads(text.format("file = 'scan.csv'\n", "{x = [0, 1]}"), tmp_path)
 
 
 def test_the_plan_says_what_a_whole_finger_needs():

@@ -1,5 +1,7 @@
 """In three dimensions: laws of friction, a hand behind the finger, and a drive resolved in time."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -17,6 +19,8 @@ LAWS = [
     ev.AdhesiveFriction(strength=0.004),
     ev.AgeingFriction(fresh=0.2, time=0.1),
     ev.RateFriction(speed=5.0, ratio=0.5),
+    ev.RateFriction(speed=5.0, exponent=0.5),
+    ev.RateFriction(speed=2.0, ratio=3.0),
 ]
 
 
@@ -46,12 +50,40 @@ def test_every_slipping_node_has_the_shear_of_its_law(law):
     assert_allclose(frame.shear_traction[slips][shown], bound[shown], rtol=1e-5)
 
 
-def test_a_hand_that_went_backwards_goes_on_from_there():
-    there, back = ev.Slide(0.1, steps=1, angle=180.0), ev.Slide(0.1, steps=1)
+@pytest.mark.parametrize("angle", [0.0, 90.0, 30.0])
+def test_a_hand_is_stretched_by_its_force_along_both_ways_of_the_display(angle):
+    """Drive less bone is force over stiffness, there and back, at every end of a motion."""
+    there, back = ev.Slide(-0.1, steps=1, angle=angle), ev.Slide(0.3, steps=1, angle=angle)
     result = simulate(dome_scene(PRESS, there, back, hand=ev.Hand(0.1)))
-    assert_allclose(
-        0.1 * ([0.0, 0.0, -0.1, 0.0] - result.position), result.applied_tangential_force_x, atol=1e-9
-    )
+    along = np.array([0.0, 0.0, -0.1, 0.2])
+    for axis, part in (("x", np.cos(np.radians(angle))), ("z", np.sin(np.radians(angle)))):
+        bone = result["position" if axis == "x" else "position_z"]
+        assert_allclose(0.1 * (part * along - bone), result[f"applied_tangential_force_{axis}"], atol=1e-9)
+    assert balance(result) < 1e-6
+
+
+def test_a_hand_at_rest_pulls_across_the_slide_too():
+    """On a slope along z the contact pushes the bone aside: the spring gives way by the force over k."""
+    slope = ev.Sinusoid(terms=[[0.3, 0.2, 0.0]], angle=90.0, friction=0.0)
+    scene = dome_scene(PRESS, ev.Slide(0.2, steps=1, speed=1.0), surface=slope, law=None, voltage=0.0)
+    still = simulate(scene).applied_tangential_force_z[-1]
+    result = simulate(replace(scene, hand=ev.Hand(0.2)))
+    assert_allclose(result.applied_tangential_force_z, -0.2 * result["position_z"], atol=1e-9)
+    assert 0.5 < result.applied_tangential_force_z[-1] / still < 1.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 60.0, 180.0])
+def test_a_friction_force_is_followed_along_the_slide_there_and_back(angle):
+    """Wished over the way along the slide's direction: what a bare slide has, a tenth more of it."""
+    way = {"steps": 2, "hold": "force", "angle": angle}
+    motion = [ev.Press(force=0.1, steps=2), ev.Slide(0.8, **way), ev.Slide(-0.6, **way)]
+    display = ev.Display(insulator=ev.Layer(thickness=0.01, eps_r=3.35), friction=0.3)
+    follow = ev.FollowForce([0.2, 0.21, 0.8], [-0.033, 0.033, 0.033], largest_voltage=2000.0)
+    result = simulate(dome_scene(*motion, surface=display, voltage=follow))
+    assert_allclose(result.applied_tangential_force[[3, 5]], [0.033, -0.033], rtol=1e-6)
+    x, z = (result[f"applied_tangential_force_{axis}"][3] for axis in "xz")
+    assert_allclose(np.hypot(x, z), 0.033, rtol=1e-2)
+    assert (result.voltage[[3, 5]] > 100.0).all()
 
 
 @pytest.mark.filterwarnings("ignore:at .* V touching skin")

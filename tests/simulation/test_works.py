@@ -255,7 +255,9 @@ def test_in_space_a_way_counts_along_the_slip(monkeypatch):
     """By hand: 3 and 4 mm of slip along x and z, on a way of 1 and 2 mm; then 2 mm back along z."""
     slips = np.array([[3.0, 4.0], [0.0, -2.0]])
     monkeypatch.setattr(works, "slipped", lambda *_: slips)
-    model = SimpleNamespace(equilibrium=SimpleNamespace(interface=SimpleNamespace(dim=3)))
+    level = SimpleNamespace(travel=np.stack([np.eye(2)] * 2))
+    interface = SimpleNamespace(dim=3, surface_at=lambda _: level)
+    model = SimpleNamespace(equilibrium=SimpleNamespace(interface=interface))
     part = SimpleNamespace(model=model, old=None, new=None, slip_length=np.array([5.0, 2.0]))
     along = np.array([[1.0, 9.0, 2.0], [5.0, 9.0, 7.0]])
     np.testing.assert_allclose(SubstepWork._with_slip(part, along), [2.2, -7.0], rtol=1e-12)

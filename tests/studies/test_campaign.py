@@ -42,7 +42,10 @@ def test_drawn_scenes_stay_within_the_stated_ranges(drawn):
             assert scene.electrics.largest_voltage <= min(3000.0, 60e3 * thickness) * (1.0 + 1e-5)
         assert 1e-3 <= thickness <= 0.5
     for one in drawn:
-        friction = np.atleast_2d(one["surface"]["friction"])[:, -1]
+        friction = one["surface"]["friction"]
+        friction = np.array(
+            friction["friction"] if isinstance(friction, dict) else np.atleast_2d(friction)[:, -1]
+        )
         assert friction.min() >= 0.0
         assert friction.max() <= 1.5
 

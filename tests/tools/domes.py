@@ -31,6 +31,17 @@ def dome(divisions=(5, 2, 5), size=(4.0, 2.0, 4.0), radius=6.0, order=1, spread=
     return mesh
 
 
+def cylinder(length, cells, divisions=(8, 2), radius=6.0):
+    """A block of 4 x 2 mm whose underside is a parabola along x, the same along z, below a bone."""
+    mesh = block((*divisions, cells), (4.0, 2.0, length))
+    points = mesh.points - np.array([2.0, 0.0, 0.5 * length])
+    low = 0.5 * points[:, 0] ** 2 / radius
+    points[:, 1] = low + points[:, 1] / 2.0 * (2.0 - low)
+    return replace(
+        mesh, points=points, node_sets={"pad": mesh.node_sets["bottom"], "bone": mesh.node_sets["top"]}
+    )
+
+
 @dataclass(frozen=True)
 class Dome:
     """A dome as a scene's finger."""
@@ -39,10 +50,11 @@ class Dome:
     law: Any = field(default_factory=lambda: ev.NeoHookean(E=0.1, nu=0.45))
     electrical: Any = field(default_factory=lambda: Electrical(stratum_corneum_thickness=0.38))
     viscosity: float = 0.0
+    region: str = "lower"
 
     @property
     def materials(self):
-        return {"lower": self.law}
+        return {self.region: self.law}
 
     def mesh(self, order=2):
         return self.shape if order == 1 else raised(self.shape)

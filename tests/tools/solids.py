@@ -1,9 +1,11 @@
-"""Blocks of hexahedra for tests of the third dimension."""
+"""Blocks of hexahedra and sheets of their skin, for tests of the third dimension."""
 
 import numpy as np
 
+from evfem.mesh import faces
 from evfem.mesh.hexahedron import PLACES
 from evfem.mesh.mesh import Mesh, raised
+from evfem.surface.skin import Skin
 from evfem.tissue.space import ELEMENTS, make_space
 
 SIDES = ("left", "right", "bottom", "top", "back", "front")  # -x, +x, -y, +y, -z, +z
@@ -45,3 +47,23 @@ def box(element, divisions, size=(1.0, 1.0, 1.0), warp=None, jitter=0.0, split=N
         points = np.column_stack(warp(*mesh.points.T))
         mesh = Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names, mesh.node_sets)
     return make_space(mesh, element)
+
+
+def sheet(n, m, place):
+    """A skin of n x n faces with m nodes, its normal down, and the positions place(p, q) of its
+    nodes on the unit square.
+    """
+    step = 2 if m == 9 else 1
+    t = np.linspace(0.0, 1.0, step * n + 1)
+    number = np.arange(t.size**2).reshape(t.size, t.size)
+    corner = step * np.stack(np.meshgrid(range(n), range(n), indexing="ij"), axis=-1).reshape(-1, 2)
+    at = corner[:, None] + ((faces.PLACES[:m] + 1) * step / 2).astype(int)
+    sides = number[at[..., 0], at[..., 1]]
+    q, p = np.meshgrid(t, t)
+    points = np.stack([c.ravel() for c in place(p, q)], axis=1)
+    return Skin(np.arange(len(points)), sides, np.ones(len(points), bool)), points
+
+
+def bent(p, q):
+    """A sheet that is curved, sheared, and turns up at one side."""
+    return 3.0 * p + 0.4 * q - 1.2 * p**2, 0.3 * p**2 + 0.1 * q, 2.0 * q + 0.3 * p * q

@@ -13,7 +13,7 @@ from evfem.newton.interface import Interface
 from evfem.newton.state import Balance, Limits, Record
 from evfem.newton.strategy import Strategy
 from evfem.surface.pad import make_pad
-from evfem.tissue.dynamics import NO_BRANCHES
+from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES
 from tools.meshes import block
 
 TOLERANCE, MU = 1e-6, 0.5
@@ -35,7 +35,7 @@ class Script:
     def __init__(self, states, residuals):
         self.size, self.record = len(MESH.points), Record()
         self.states, self.residuals, self.left = states, residuals, None
-        self.body = SimpleNamespace(at_rest=NO_BRANCHES)
+        self.body = SimpleNamespace(at_rest=NO_BRANCHES, rates=lambda u: NO_RATES)
 
     def known(self, old, target):
         return None
