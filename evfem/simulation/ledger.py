@@ -25,6 +25,10 @@ def unloaded(state: State) -> State:
     return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
 
 
+#: a finger that does not touch has come off when adhesion holds less than this share of the last pull
+LEFT = 0.01
+
+
 @dataclass
 class Ledger:
     """Running sums of a run by the history's columns, and the books at the end of its last part; the `pull`
@@ -42,7 +46,7 @@ class Ledger:
     def accept(self, old: State, new: State) -> bool:
         """Adds the works of one converged part; returns whether stability was lost in it."""
         part = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
-        self._watch(old, new)
+        self._watch(new)
         begin = self.end or Books.nothing(old.u.shape)
         self.end = part.end()
         works = part.works(begin, self.end)
@@ -50,14 +54,15 @@ class Ledger:
             self.sums[name] += work
         return works["snap_dissipation"] > 0.0
 
-    def _watch(self, old: State, new: State) -> None:
+    def _watch(self, new: State) -> None:
         """Remember the pull at which a finger that adhesion holds comes off: that of the last equilibrium."""
         if self.model.scene.adhesion is None:
             return
-        if old.touching.any() and not new.touching.any() and self.pull > 0.0:
+        holds = -float(self.model.equilibrium.adhesion_at(new)[:, 1].sum())
+        if not new.touching.any() and self.pull > 0.0 and holds < LEFT * self.pull:
             self.let_go, self.pull = self.pull, 0.0
-        elif new.touching.any() and self.model.body.drag_rate == 0.0:
-            self.pull = max(0.0, float(new.reaction[1]))
+        elif self.model.body.drag_rate == 0.0:
+            self.pull = max(0.0, float(new.reaction[1])) if new.touching.any() or holds > 0.0 else 0.0
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
         """Present sums and energy balance."""
