@@ -65,7 +65,9 @@ def _carried(part: SubstepWork, target: Target) -> Floats:
         travel[1] = 0.0
     if target.hand is not None:
         travel[::2] = 0.0
-    return np.where((part.old.touching & part.new.touching)[:, None], 0.0, travel)
+    attraction = part.model.attraction
+    sticks = attraction is not None and attraction.adhesive is not None  # what adheres is not carried off
+    return np.where((part.old.touching & (part.new.touching | sticks))[:, None], 0.0, travel)
 
 
 def _pulled(part: SubstepWork, carried: Floats) -> Floats:
