@@ -47,6 +47,7 @@ _NAMES = {
     "finger.fingertip": ("Fingertip",),
     "finger.scan": ("RidgeScan",),
     "loading": ("load",),
+    "response.impedance": ("Impedance", "impedance"),
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),

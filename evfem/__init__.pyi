@@ -60,6 +60,8 @@ from evfem.newton.hand import Hand as Hand
 from evfem.newton.strategy import Strategy as Strategy
 from evfem.planning.plan import plan as plan
 from evfem.response.design import design as design
+from evfem.response.impedance import Impedance as Impedance
+from evfem.response.impedance import impedance as impedance
 from evfem.response.parameters import ShapeChange as ShapeChange
 from evfem.response.sensitivities import Sensitivities as Sensitivities
 from evfem.response.sensitivities import sensitivities as sensitivities

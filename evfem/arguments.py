@@ -158,7 +158,7 @@ def _sweep_options(sweep: argparse.ArgumentParser) -> None:
 
 
 def _signal_options(voltage: argparse.ArgumentParser) -> None:
-    _path(voltage, "file", "VOLTAGE", help="signal to read, .csv or .wav")
+    _path(voltage, "file", "VOLTAGE", help="signal to read, .csv, .wav or .hjif")
     _path(voltage, "--out", "FILE", required=True, help="file to write; its ending says as what")
     voltage.add_argument("--full-scale", type=float, metavar="V", help="largest voltage the file can hold")
     voltage.add_argument("--speed", type=float, metavar="MM/S", help="sliding speed, for .wav and .hjif")
@@ -207,7 +207,7 @@ def _make_options(make: argparse.ArgumentParser) -> None:
 def _import_options(command: argparse.ArgumentParser) -> None:
     from evfem.textures.importers import IMPORTERS
 
-    _path(command, "file", "FILE", help=".csv, .wav, an image or a scan")
+    _path(command, "file", "FILE", help=".csv, .wav, .hjif, an image or a scan")
     _about_texture(command)
     _fields(command, *IMPORTERS.values())
 

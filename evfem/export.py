@@ -1,4 +1,4 @@
-"""ParaView series: one .vtu per step and a .pvd index that is valid after every step.
+"""ParaView series: one .vtu per step and a .pvd index that is valid after every step. Arrays for TouchSim.
 
 Points are in the reference configuration (mm); displacement has three components, so that "Warp By
 Vector" shows the deformed finger. Cells keep the VTK node order of the mesh.
@@ -15,7 +15,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from evfem.common.arrays import Ints
+from evfem.common.arrays import Floats, Ints
+from evfem.common.checks import Within, real
 from evfem.common.storage import replacing, write_text
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
@@ -54,7 +55,7 @@ class FieldFiles:
         >>> from evfem.scene.scene import default_scene
         >>> scene = default_scene()
         >>> print(FieldFiles.of(scene, scene.finger.mesh()))
-        fields of every 4th step and the last of each motion, single precision: 29 files, 25 MB
+        fields of every 5th step and the last of each motion, single precision: 22 files, 20 MB
         """
         output, steps = scene.output, scene.total_steps
         every, single = output.every or 1, output.precision == "single"
@@ -119,6 +120,83 @@ def paraview(result: Result, path: str | Path, *, skin: bool = False) -> Path:
         series.add(rows[frame.step], frame, result.mesh)
     series.write_index()
     return series.path
+
+
+def touchsim(
+    result: Result, *, sample_rate: float = 5000.0, pin_radius: float | None = None
+) -> dict[str, Any]:
+    """Arrays for a stimulus of TouchSim, a model of afferents below an elastic half-space.
+
+    Every node of the skin that the surface comes to is a pin, whose trace is how deep the surface stands in
+    the undeformed skin there. Between frames it is linear in time, from nothing at time 0.
+
+    Parameters
+    ----------
+    result
+        A result whose frames have times, best one of every step.
+    sample_rate
+        Samples a second (Hz).
+    pin_radius
+        In mm; without it half the mean distance of a pin from its nearest neighbour.
+
+    Returns
+    -------
+    dict
+        `trace` (samples, pins) in mm, `location` (pins, 2) in mm, of the undeformed nodes, x and z, in the
+        plane z = 0; `fs` (Hz) and `pin_radius` (mm).
+
+    Raises
+    ------
+    InputError
+        Frames without time; a surface that comes to no skin; a rate or radius that is not positive.
+
+    Notes
+    -----
+    TouchSim (doi:10.1073/pnas.1704856114) finds pressures of its own, of its own half-space. The pins of a
+    section in the plane are a line: counts over an area need a finger in three dimensions.
+    """
+    rate = real("sample_rate", sample_rate, "a rate in Hz, from 1 to 1e6", Within(1.0, 1e6))
+    time, depth = _stood(result)
+    reached = np.flatnonzero((depth > 0.0).any(axis=0))
+    if not reached.size:
+        raise InputError("result", "a surface that comes to no skin", "a finger that is pressed on it")
+    points = result.mesh.points[reached]
+    location = np.column_stack(
+        [points[:, 0], points[:, 2] if points.shape[1] == 3 else np.zeros(len(points))]
+    )
+    if pin_radius is None:
+        pin_radius = 0.5 * _spacing(location)
+    radius = real("pin_radius", pin_radius, "a radius in mm, larger than 0", Within(0.0, above=True))
+    at = np.arange(int(np.floor(time[-1] * rate * (1.0 + 1e-12))) + 1) / rate
+    trace = np.column_stack([np.interp(at, time, depth[:, node]) for node in reached])
+    return {"trace": trace, "location": location, "fs": rate, "pin_radius": radius}
+
+
+def _stood(result: Result) -> tuple[Floats, Floats]:
+    """Times (T,) of the frames, from 0 on, and how deep the surface then stands in the skin (T, N)."""
+    bone = result.mesh.node_sets["bone"][0]
+    times, depths = [0.0], [np.zeros(len(result.mesh.points))]
+    for frame in result.frames:
+        # a touching node is where the surface is, an open one as far above it as its gap
+        up = frame.displacement[:, 1] - frame.displacement[bone, 1]
+        now = np.where(np.isfinite(frame.gap), np.maximum(up - np.nan_to_num(frame.gap), 0.0), 0.0)
+        if frame.time > times[-1]:
+            times.append(frame.time)
+            depths.append(now)
+        else:  # a motion without time: its end
+            depths[-1] = now
+    if len(times) < 2:
+        raise InputError("result", "frames in which no time passes", "motions with a speed, or a Wait")
+    return np.array(times), np.array(depths)
+
+
+def _spacing(location: Floats) -> float:
+    """Mean distance (mm) of points (P, 2) from their nearest neighbour; 0.1 of a single one."""
+    from scipy.spatial import KDTree
+
+    if len(location) < 2:
+        return 0.1
+    return float(KDTree(location).query(location, k=2)[0][:, 1].mean())
 
 
 def skin_of(mesh: Mesh) -> tuple[Mesh, Ints, Ints]:

@@ -7,6 +7,7 @@ A new file of `evfem/` must be given its place in `ROOMS`.
 import ast
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -76,7 +77,10 @@ ROOMS = {
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
         "samples file folder table run check",
     ),
-    "response": ({"numpy", "scipy"}, "parameters parts tangent lines sensitivities uncertainty design"),
+    "response": (
+        {"numpy", "scipy"},
+        "parameters parts tangent lines sensitivities uncertainty design impedance",
+    ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
@@ -198,6 +202,15 @@ def _module(full):
 
 def test_every_module_has_its_place():
     assert sorted(ORDER) == modules()
+
+
+def test_every_folder_with_code_is_installed():
+    """`packages` is a list by hand: a folder that it lacks is in no wheel."""
+    project = tomllib.loads((TESTS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    listed = {name.split(".", 1)[-1] for name in project["tool"]["setuptools"]["packages"]} - {"evfem"}
+    folders = (path.parent.relative_to(PACKAGE).parts for path in PACKAGE.rglob("__init__.py"))
+    found = {".".join(parts) for parts in folders if parts and parts[0] not in NO_ROOMS}
+    assert found == {name for name in listed if name.split(".")[0] not in NO_ROOMS}
 
 
 def test_a_module_imports_only_what_stands_before_it():

@@ -255,7 +255,7 @@ class Interface:
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         way = sizes(known.slip + give[:, None] * known.force[:, 1:])
         slip = np.where(known.status >= FORWARD, way, 0.0)
-        moving = self._slipping(old, state, c, known.friction, slip)
+        moving = self.slipping(old, state, c, known.friction, slip)
         found = self._oscillating.linearised(law, moving, c, known.status, shear)
         if self.dim == 3:  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
             found = replace(found, by_speed=np.maximum(found.by_speed, 0.0))
@@ -276,7 +276,7 @@ class Interface:
             friction_slope=(series * by_place)[:, None] * known.friction_slope,
         )
 
-    def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
+    def slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
         """Data of a law of friction at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         length = self.tributary(state)[nodes]
@@ -328,7 +328,7 @@ class Interface:
         mu = self.friction(old, nodes, place)
         if self.law is None:
             return np.asarray(mu * normal)
-        nodal = self._slipping(old, new, nodes, mu, slip)
+        nodal = self.slipping(old, new, nodes, mu, slip)
         return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
 
     def limit(self, old: State, state: State, place: Floats, way: Floats) -> Floats:
@@ -339,7 +339,7 @@ class Interface:
         mu = self.friction(old, nodes, place)
         if self.law is None:
             return np.asarray(mu * state.contact_force[:, 0])
-        return self._slipping(old, state, nodes, mu, way).bound(self.law)
+        return self.slipping(old, state, nodes, mu, way).bound(self.law)
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
@@ -394,7 +394,7 @@ class Interface:
         limit = (mu := self.friction(old, nodes, self.jumps.at(place)[active])) * normal
         if self.law is not None:
             moving = np.where(status == STICK, 0.0, way)
-            limit = self._slipping(old, state, nodes, mu, moving).bound(self.law)
+            limit = self.slipping(old, state, nodes, mu, moving).bound(self.law)
         sticks = (way <= short) & (size <= limit + weak)
         # a slip is known to `short`, and its direction accordingly
         against = sizes(shear + (limit / np.maximum(way, 1e-300))[:, None] * slip)
@@ -408,7 +408,7 @@ class Interface:
         """Shear forces (P,) that hold pad nodes with the coefficients mu (P,)."""
         if self.law is None:
             return np.asarray(mu * state.contact_force[:, 0])
-        return self._slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
+        return self.slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
 
 
 class PenaltyInterface(Interface):

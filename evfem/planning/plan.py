@@ -33,16 +33,19 @@ from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
+from evfem.tissue.branches import KEPT_BYTES, branches_in
 from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
-from evfem.tissue.space import elements_of_order
+from evfem.tissue.space import elements_of_order, points_per_cell
 from evfem.tissue.splitlaw import nearly_incompressible
 from evfem.tissue.userforms import Trial, tried
 
 #: columns of a printed plan, at most
 WIDTH = 79
+#: by dimensions, memory that branches take in a run, over what they keep, as measured
+RELAXING = {2: 10, 3: 20}
 #: the two laws of the literature, each beside the other
 OTHER_LAW: dict[type, type[StrongTroxel | Kaczmarek]] = {StrongTroxel: Kaczmarek, Kaczmarek: StrongTroxel}
 
@@ -149,15 +152,6 @@ def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
     return mesh, scene.solver.element_on(mesh.corners)
 
 
-def probed(scene: Scene) -> str | None:
-    """A sentence where probes lack what branches carry, else None."""
-    laws = scene.finger.materials.values()
-    relaxes = getattr(scene.finger, "relaxation", ()) or any(getattr(law, "relaxation", ()) for law in laws)
-    if not (scene.output.probes and scene.solver.timed and relaxes):
-        return None
-    return "probes have the stress and the energy of the law at rest, without what its branches add"
-
-
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
     if not scene.motion:
@@ -178,7 +172,6 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         too_fast(scene),
         left_out(scene),
         unseen(closing),
-        probed(scene),
         *oscillating(scene, mesh),
         *drifting(scene, mesh, moduli),
     )
@@ -191,7 +184,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         *_adhesion(closing),
         *_field(scene, mesh),
         *_drive(scene),
-        _time(scene),
+        _time(scene, mesh, element),
         *_hand(scene),
         _forms(scene, mesh),
     )
@@ -309,26 +302,31 @@ def _drive(scene: Scene) -> tuple[Term, ...]:
     return (Term("drive", True, time_scales(scene)),)
 
 
-def _time(scene: Scene) -> Term:
+def _time(scene: Scene, mesh: Mesh, element: str) -> Term:
     dynamics, terms = scene.solver.dynamics, DYNAMICS[scene.solver.dynamics]
     clock = ", the clock sets the voltage alone" if isinstance(scene.electrics.voltage, TimeSignal) else ""
     lost = "released where no equilibrium is near" if scene.solver.strategy.relaxation else ""
     if terms is None:
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
     lost = lost and f"; without speed quasi-static, {lost}"
-    return Term("time", True, f"{dynamics}, {terms.scheme}{_relaxing(scene)}{lost}")
+    return Term("time", True, f"{dynamics}, {terms.scheme}{_relaxing(scene, mesh, element)}{lost}")
 
 
-def _relaxing(scene: Scene) -> str:
-    """Relaxation times of the tissue's branches beside the seconds of the steps."""
-    givers = (scene.finger, *scene.finger.materials.values())
-    times = [time for one in givers for _, time in getattr(one, "relaxation", None) or ()]
+def _relaxing(scene: Scene, mesh: Mesh, element: str) -> str:
+    """Relaxation times of the tissue's branches beside the seconds of the steps, and their memory."""
+    rows = {name: branches_in(scene.finger, law) for name, law in scene.finger.materials.items()}
+    times = [time for several in rows.values() for _, time in several]
     if not times:
         return ""
     parts = [(one.course, one.part(k)[2]) for one in scene.motion for k in {1, min(2, one.steps), one.steps}]
     steps = [course.seconds(count) for course, count in parts if course.takes_time]
     told = f"; branches relax in {min(times):.2g} to {max(times):.2g} s"
-    return told + (f", steps take {min(steps):.2g} to {max(steps):.2g} s" if steps else "")
+    told += f", steps take {min(steps):.2g} to {max(steps):.2g} s" if steps else ""
+    cells = sum(mesh.cells_of(name).size for name, several in rows.items() if several)
+    kept = cells * points_per_cell(element) * max(map(len, rows.values())) * KEPT_BYTES[mesh.dim]
+    return (
+        f"{told}; what they remember takes {kept / 1e6:.2g} MB, a run about {RELAXING[mesh.dim]} times that"
+    )
 
 
 def _hand(scene: Scene) -> tuple[Term, ...]:

@@ -21,7 +21,7 @@ from evfem.plotting.finger import deformed, side_by_side
 from evfem.plotting.footprint import footprint
 from evfem.plotting.meshes import regions
 from evfem.plotting.movie import animate
-from evfem.plotting.response import tornado
+from evfem.plotting.response import impedance, tornado
 from evfem.plotting.sweeps import sweep, sweep_histogram, sweep_map, sweep_scatter
 
 __all__ = [
@@ -37,6 +37,7 @@ __all__ = [
     "forces",
     "friction",
     "history",
+    "impedance",
     "probes",
     "regions",
     "residuals",

@@ -41,7 +41,7 @@ FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
 FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
 #: quantity of a probe -> its unit if it is not MPa
 QUANTITY_UNITS = dict.fromkeys(("deformation_gradient", "green_strain", "principal_stretches", "J"), "")
-QUANTITY_UNITS |= {"displacement": "mm", "strain_energy_density": "N/mm2"}
+QUANTITY_UNITS |= {"displacement": "mm", "strain_energy_density": "N/mm2", "branch_energy_density": "N/mm2"}
 
 
 def with_unit(text: str, unit: str) -> str:

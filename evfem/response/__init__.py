@@ -1,1 +1,1 @@
-"""How what a scene does answers to its parameters: exact derivatives, uncertainty, design."""
+"""How what a scene does answers to its parameters and to small motions: exact derivatives, impedance."""

@@ -214,11 +214,12 @@ class Line:
         change = self._nothing(
             part.new, difference([one.target.voltage.voltage for one in equations], self.step)
         )
-        by_parameter = difference([one.residual(part.new) for one in equations], self.step)
+        parts = [(one.smooth(part.new), one.kinked(part.new)) for one in equations]
+        by_parameter, reaction = (difference([a[i] + b[i] for a, b in parts], self.step) for i in (0, 1))
         rate, before, rounds = 1.0, 1.0, 0
         while rounds < ROUNDS:
             rounds += 1
-            more = solve(-by_parameter - self._along(part, jumps, change))
+            more = solve(-by_parameter - self._along(part, jumps, change)[0])
             self._add(change, more)
             share = self._share(more, change, part.new)
             rate, before = share / before if rounds > 1 else 1.0, share
@@ -227,6 +228,7 @@ class Line:
             if not np.isfinite(share) or (rate > SLOW and rounds > 1 and not patient):
                 break
         if before <= WRONG and (patient or rate <= SLOW or before <= ROUNDING):
+            change["reaction"] = reaction + self._along(part, jumps, change)[1]
             self._end(part, equations, jumps, change)
             return True
         self.reason = LOST if patient else ""
@@ -257,8 +259,10 @@ class Line:
             shares.append(np.abs(more[part]).max(initial=0.0) / largest)
         return float(max(shares))
 
-    def _along(self, part: Accepted, jumps: Sequence[Steps], change: Change) -> Floats:
-        """Derivative (m,) of the part's equations along those of its states, the end's being `change`."""
+    def _along(self, part: Accepted, jumps: Sequence[Steps], change: Change) -> tuple[Floats, Floats]:
+        """Derivative (m,) of the part's equations, and of the reaction (dim,), along those of its states, the
+        end's being `change`.
+        """
         way = self._way(part, change)
         near, far = [], []
         for place in PLACES:
@@ -266,7 +270,11 @@ class Line:
             near.append(begun.kinked(moved(part.new, change, place * way)))
             begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * self.far))
             far.append(begun.smooth(moved(part.new, change, place * self.far)))
-        return np.asarray(difference(near, way) + difference(far, self.far))
+        rows, reaction = (
+            difference([one[i] for one in near], way) + difference([one[i] for one in far], self.far)
+            for i in (0, 1)
+        )
+        return rows, reaction
 
     def _way(self, part: Accepted, change: Change, reach: float = np.inf) -> float:
         """How far places are apart along the states: no node moves further than it may, and all stay within

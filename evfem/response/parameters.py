@@ -32,7 +32,7 @@ ELECTRIC = {
     "roughness_gap": ("roughness_gap",),
     "voltage": ("voltage",),
 }
-TABLES = ("finger", "surface", "electrostatics", "hand", "motion")
+TABLES = ("finger", "surface", "electrostatics", "adhesion", "hand", "motion")
 NUMBER = "a number of the scene"
 
 

@@ -10,7 +10,7 @@ stick  :math:`g = 0`, slip since z :math:`= 0`
 slip   :math:`g = 0`, :math:`\lambda_t + b(\lambda_n, x, s)\,s/|s| = 0`
 =====  ========================================================
 
-with the bound b of friction, :math:`\mu(x)\lambda_n` under Coulomb's law. `Equations.residual` asks the parts
+with the bound b of friction, :math:`\mu(x)\lambda_n` under Coulomb's law. `Equations` asks the parts
 of the run's own model: tissue, attraction, surface, law of friction, controls.
 """
 
@@ -59,27 +59,14 @@ class Equations:
         """Of the model."""
         return self.model.equilibrium.interface
 
-    def loaded(self, state: State) -> State:
-        """The state with its attraction and reaction."""
+    def _attracted(self, state: State) -> State:
+        """The state with its attraction."""
         attraction = self.model.equilibrium.attraction_at(self.old, state, state.voltage)
-        state = replace(state, attraction=attraction)
-        forces = self._tissue(state) - self._pushed(state)
-        return replace(state, reaction=forces[self.model.body.bone])
-
-    def _tissue(self, state: State) -> Floats:
-        """Internal forces (n,)."""
-        body = self.model.body
-        return body.reduce(body.forces(state.u))
-
-    def _pushed(self, state: State) -> Floats:
-        """Forces (n,) of attraction and contact on the pad, the state's own."""
-        nodal = np.zeros_like(state.u)
-        nodal[self.model.pad.nodes] = state.attraction + self.interface.contact_forces(state)
-        return self.model.body.reduce(nodal)
+        return replace(state, attraction=attraction)
 
     def ended(self, state: State) -> State:
-        """The state as the run would accept it, with the history that it leaves behind."""
-        state, attraction = self.loaded(state), self.model.attraction
+        """The state as the run would accept it, its reaction left, with the history that it leaves behind."""
+        state, attraction = self._attracted(state), self.model.attraction
         state = self.interface.aged(self.old, self.model.equilibrium.body.accepted(self.old, state))
         if self.target.hand is not None:
             state = self.target.hand.settled(state)
@@ -88,24 +75,29 @@ class Equations:
         resting, pressing = self.interface.resting(state), state.contact_force[:, 0]
         return replace(state, charges=attraction.charged(resting, state.voltage, pressing).charges)
 
-    def residual(self, state: State) -> Floats:
-        """R (m,): balance of the free unknowns, bone, contact of all pad nodes."""
-        return self.smooth(state) + self.kinked(state)
-
-    def smooth(self, state: State) -> Floats:
-        """The part of R (m,) that is smooth over long ways: tissue, bone; on flat surfaces gaps, sticking."""
-        forces = self._tissue(state)
+    def smooth(self, state: State) -> tuple[Floats, Floats]:
+        """The part of R (m,) that is smooth over long ways: tissue, bone, and on flat surfaces gaps and
+        sticking; and its reaction (dim,).
+        """
+        body = self.model.body
+        forces = body.reduce(body.forces(state.u))
         contact = np.where(self._near(state), 0.0, self.contact(state)[0])
-        bone = self._bone(replace(state, reaction=forces[self.model.body.bone]))
-        return np.concatenate([forces[: -state.bone.size], bone, contact.ravel()])
+        reaction = forces[body.bone]
+        bone = self._bone(replace(state, reaction=reaction))
+        return np.concatenate([forces[: -state.bone.size], bone, contact.ravel()]), reaction
 
-    def kinked(self, state: State) -> Floats:
-        """The rest of R (m,): attraction, contact forces, friction, and what follows a profile."""
-        attraction = self.model.equilibrium.attraction_at(self.old, state, state.voltage)
-        pushed = -self._pushed(replace(state, attraction=attraction))
-        pushed[self.model.body.bone] *= [-float(self.pulled(axis)) for axis in range(state.bone.size)]
+    def kinked(self, state: State) -> tuple[Floats, Floats]:
+        """The rest of R (m,): attraction, contact forces, friction, and what follows a profile; and its
+        reaction (dim,), of pad nodes on the bone.
+        """
+        body, nodal = self.model.body, np.zeros_like(state.u)
+        attraction = self._attracted(state).attraction
+        nodal[self.model.pad.nodes] -= attraction + self.interface.contact_forces(state)
+        forces = body.reduce(nodal)
+        reaction = forces[body.bone]
+        forces[body.bone] = [-reaction[axis] if self.pulled(axis) else 0.0 for axis in range(reaction.size)]
         contact = np.where(self._near(state), self.contact(state)[0], 0.0)
-        return np.concatenate([pushed, contact.ravel()])
+        return np.concatenate([forces, contact.ravel()]), reaction
 
     def _near(self, state: State) -> Any:
         """Which of what contact lacks is `kinked`, (P, dim) bool."""

@@ -29,8 +29,9 @@ The derivative is that of the piece between changes of status. How far the piece
 the margin m of a node (gap, contact force, shear force below the bound, slip) :math:`|m / m'|`, the least of
 all nodes and parts of the step. The widths of contact, counts and times have none.
 
-Sources: P. Michaleris, D. A. Tortorelli, C. A. Vidal, Int. J. Numer. Methods Eng. 37 (1994) 2471-2499,
-doi:10.1002/nme.1620371408.
+Sources: C. A. Vidal, R. B. Haber, Comput. Methods Appl. Mech. Eng. (August 1993) 393-431 (direct
+differentiation step by step, with the history); J. Korelc, P. Wriggers, doi:10.1007/978-3-030-33520-5_2
+(of whole finite element runs).
 """
 
 from __future__ import annotations
@@ -92,6 +93,8 @@ class _Differentiated:
 
     def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
         self.run = Run(scene, None)
+        if self.run.model.equilibrium.interface.bed is not None:
+            raise InputError("surface.elastic", "an elastic surface", "a rigid one, to be differentiated")
         self.ledger = self.run.ledger = _Followed(self.run.model)
         self.ledger.told = self._accepted
         self.centre = Beside.of(scene, None, 0.0)
@@ -149,7 +152,7 @@ class _Differentiated:
         for line in self.lines:
             if self.stopped or line.reason:
                 line.rows.append({})
-                line.valid_to.append(0.0)
+                line.valid_to.append(np.nan)
                 continue
             assert self.ledger.end is not None
             line.ends(request.step, self.run.state, self.ledger.end, self.ledger.sums, self.run.rows[-1])
@@ -359,7 +362,8 @@ def sensitivities(
     Raises
     ------
     InputError
-        A parameter that the scene does not have, that is 0, or that changes the mesh's cells.
+        A parameter that the scene does not have, that is 0, or that changes the mesh's cells; an elastic
+        surface.
     NotConverged
         A step has no solution.
 
@@ -376,6 +380,8 @@ def sensitivities(
         from evfem.scene.file import scene_at
 
         scene = scene_at(scene)
+    if scene.ground.elastic is not None:
+        raise InputError("surface.elastic", "an elastic surface", "a rigid one: derivatives know no other")
     given = (
         [parameters] if isinstance(parameters, str) or hasattr(parameters, "applied") else list(parameters)
     )

@@ -4,7 +4,8 @@ A point is one of the material: it is given in the undeformed mesh and moves wit
 in one cell, on a border in that of the region with the lowest number, or of the layer at whose
 boundary it was asked for. F is that of the point; ln J in the law is :math:`\theta`, the element's own
 measure of volume continued to the point (`evfem.tissue.space`), so that pressures do not oscillate
-where nu is close to 1/2.
+where nu is close to 1/2. What Maxwell branches remember is known at the quadrature points: their second
+Piola-Kirchhoff stress and their energy are continued from there in the same way.
 """
 
 from __future__ import annotations
@@ -127,7 +128,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "cauchy_stress": SYMMETRIC,
     "green_strain": SYMMETRIC,
     "principal_stretches": tuple("123"),
-    **dict.fromkeys(("J", "pressure", "von_mises", "strain_energy_density"), ("",)),
+    **dict.fromkeys(("J", "pressure", "von_mises", "strain_energy_density", "branch_energy_density"), ("",)),
 }
 
 
@@ -136,9 +137,9 @@ class ProbeHistory:
     """What was found at P points after each of S steps; mm, MPa, and N/mm2 for the energy density.
 
     Tensors are those of space, in the plane those of plane strain. `cauchy_stress`, `pressure` (a third
-    of its negative trace) and `von_mises` are of the material's law, without its viscosity, and so is
-    `strain_energy_density`, per undeformed volume. `principal_stretches` begin with the largest; `J` is
-    det F of the point.
+    of its negative trace) and `von_mises` are of the material's law with its branches, without its
+    viscosity, and so is `strain_energy_density`, per undeformed volume; `branch_energy_density` is the share
+    of the branches. `principal_stretches` begin with the largest; `J` is det F of the point.
     """
 
     position: Floats
@@ -151,6 +152,7 @@ class ProbeHistory:
     pressure: Floats
     von_mises: Floats
     strain_energy_density: Floats
+    branch_energy_density: Floats
 
     def __repr__(self) -> str:
         """How many points and steps."""
@@ -215,12 +217,13 @@ def read_csv(text: str, wanted: Wanted, dim: int, steps: int) -> dict[str, Probe
 
 
 class Probes:
-    """The points of all probes in the cells of a tissue (`evfem.tissue.weakform.Tissue`).
+    """The points of all probes in the cells of a tissue (`evfem.tissue.weakform.Tissue`) with its branches
+    (`evfem.tissue.branches.Branches`), if it has any.
 
     `place` (P, d) are the points. Raises InputError for a point outside.
     """
 
-    def __init__(self, wanted: Wanted, tissue: Any) -> None:
+    def __init__(self, wanted: Wanted, tissue: Any, branches: Any = None) -> None:
         self.wanted = wanted
         self.space, mesh = tissue.space, tissue.space.mesh
         places, layers = [], []
@@ -237,7 +240,11 @@ class Probes:
         self.value, local = found.shape(inner)
         way = np.einsum("pnc,pnk->pck", mesh.points[self.nodes], local)
         self.gradient: Floats = np.einsum("pnk,pkc->pnc", local, np.linalg.inv(way))
+        x = np.moveaxis(self.space.points[:, cells], 0, 2) - self.place[:, None]
+        # linear in each cell, or constant: a polynomial through its quadrature points
+        self.from_points = np.linalg.pinv(np.concatenate([np.ones_like(x[..., :1]), x], axis=2))[:, 0]
         self.sample, self.share = self._measure(cells)
+        self.relaxing = None if branches is None else Relaxing(branches, cells, self.from_points)
         self.groups = [
             (self._law(law, own), own)
             for law, of in tissue.groups
@@ -254,10 +261,7 @@ class Probes:
             if not hasattr(sampled, "inverse")
             else (sampled.reference @ sampled.inverse[cells])
         )
-        # theta is linear in each cell, or constant: a polynomial through its quadrature points
-        x = np.moveaxis(space.points[:, cells], 0, 2) - self.place[:, None]
-        at_point = np.linalg.pinv(np.concatenate([np.ones_like(x[..., :1]), x], axis=2))[:, 0]
-        return gradients, np.einsum("pq,pqs->ps", at_point, space.projection[cells])
+        return gradients, np.einsum("pq,pqs->ps", self.from_points, space.projection[cells])
 
     def _law(self, law: Any, own: Ints) -> Any:
         from evfem.tissue.splitlaw import FormLaw
@@ -274,8 +278,8 @@ class Probes:
         """The history of each probe from the numbers of several steps."""
         return histories(self.wanted, self.space.dim, self.stacked(several))
 
-    def at(self, u: Floats) -> Floats:
-        """The numbers (P, K) of `columns` at displacements u (N, d)."""
+    def at(self, u: Floats, inner: Floats | None = None) -> Floats:
+        """The numbers (P, K) of `columns` at displacements u (N, d) and the branches' variables `inner`."""
         from evfem.tissue.forms import Field
         from evfem.tissue.splitlaw import embed
         from evfem.tissue.weakform import cauchy_stress
@@ -294,6 +298,10 @@ class Probes:
             sigma = cauchy_stress(law, Field(np.zeros(dim), grad[:, :, own], theta))[..., 0]
             stress[own, : len(sigma)] = sigma.T
             energy[own] = law.split_energy(F[:, :, own], theta)[:, 0]
+        more = np.zeros(len(moved))
+        if self.relaxing is not None and inner is not None:
+            added, more = self.relaxing.at(u, inner, whole)
+            stress, energy = stress + added, energy + more
         pressure = -stress[:, :3].mean(axis=1)
         deviator = stress + pressure[:, None] * [1, 1, 1, 0, 0, 0]
         strain = 0.5 * (np.swapaxes(whole, 1, 2) @ whole - np.eye(3))
@@ -308,8 +316,34 @@ class Probes:
             pressure,
             np.sqrt(1.5 * (deviator**2 @ [1, 1, 1, 2, 2, 2])),
             energy,
+            more,
         ]
         return np.column_stack(parts)
+
+
+class Relaxing:
+    """What branches add at P points in `cells` (P,), `share` (P, Q) of what is at their quadrature points."""
+
+    def __init__(self, branches: Any, cells: Ints, share: Floats) -> None:
+        self.branches, self.place = branches.among(cells)
+        own = self.branches.integral.points.cells
+        self.rows = np.flatnonzero(np.isin(cells, own))
+        self.column, self.share = np.searchsorted(own, cells[self.rows]), share[self.rows]
+
+    def at(self, u: Floats, inner: Floats, F: Floats) -> tuple[Floats, Floats]:
+        """Cauchy stress (P, 6) in MPa and energy (P,) in N/mm2 at displacements u (N, d) and F (P, 3, 3)."""
+        stress, energy = np.zeros((len(F), 6)), np.zeros(len(F))
+        if not self.rows.size:
+            return stress, energy
+        S, q, stored = self.branches.overstress(u, inner[:, :, self.place])
+        S, q, stored = (np.sum(x[..., self.column, :] * self.share, axis=-1) for x in (S, q, stored))
+        F = F[self.rows]
+        tau = F @ np.moveaxis(S, 2, 0) @ np.swapaxes(F, 1, 2)
+        tau += (q - np.trace(tau, axis1=1, axis2=2) / 3.0)[:, None, None] * np.eye(3)
+        sigma = tau / np.linalg.det(F)[:, None, None]
+        stress[self.rows] = sigma[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+        energy[self.rows] = np.maximum(stored, 0.0)
+        return stress, energy
 
 
 class Cells:

@@ -91,8 +91,8 @@ class Scene:
     without a charge, above electrodes of different voltages. `friction_law` says what the surface's
     coefficient means (`Coulomb`, ... or one's own), `adhesion` what attracts without a voltage (`Dugdale`,
     `Capillary`, or one's own). A `hand` is between drive and bone: motions then say where the drive goes.
-    `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. Raises InputError for anything that does
-    not fit together.
+    `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. `motion` may be empty where steps are
+    taken at will (`evfem.simulation.loop`). Raises InputError for anything that does not fit together.
     """
 
     finger: Finger

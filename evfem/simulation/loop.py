@@ -203,7 +203,7 @@ class Loop:
     def _check_course(self, course: Course) -> None:
         """Raise InputError for a step that no motion of the scene could be."""
         scene, dynamic = self.scene, _dynamic(self.scene)
-        if course.force == 0.0 and scene.law is None:
+        if course.force == 0.0 and scene.law is None and scene.adhesion is None:
             raise InputError("force", 0.0, "larger than 0 when nothing else pulls the finger down")
         if course.distance and dynamic and not course.duration:
             raise InputError("duration", 0.0, f"larger than 0 where the finger moves along, with {dynamic}")

@@ -178,7 +178,7 @@ class Run:
         if scene.output.probes:
             from evfem.scene.probes import Probes
 
-            self.probes = Probes(scene.output.probes, self.model.body.tissue)
+            self.probes = Probes(scene.output.probes, self.model.body.tissue, self.model.body.branches)
         self.probed: list[Floats] = []
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
@@ -375,7 +375,7 @@ class Run:
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if self.probes is not None:
-            self.probed.append(self.probes.at(self.state.u))
+            self.probed.append(self.probes.at(self.state.u, self.state.inner))
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))

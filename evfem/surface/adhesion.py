@@ -86,7 +86,7 @@ class Dugdale(NamedAdhesion, kind="dugdale"):
     """A constant traction, `stress` in MPa, up to a gap, `reach` in mm.
 
     >>> law = Dugdale(stress=0.01, reach=0.005)
-    >>> law.traction(np.array([0.0, 0.004, 0.005, 0.006])).tolist()
+    >>> law.traction(np.array([0.0, 0.004, 0.005, 0.006])).round(12).tolist()
     [0.01, 0.01, 0.005, 0.0]
     >>> law.potential(0.0), law.potential(1.0)
     (-5e-05, 0.0)

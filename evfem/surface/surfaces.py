@@ -31,7 +31,7 @@ from evfem.electrostatics.laws import FILM, Layer
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
 from evfem.surface.elastic import ELASTIC, elastic_of
-from evfem.surface.ways import ANGLE, FrictionMap, OneWay, Steps, direction
+from evfem.surface.ways import ANGLE, FrictionMap, OneWay, direction
 from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
@@ -90,29 +90,6 @@ class RigidSurface(OneWay, Checked):
         if isinstance(self.friction, FrictionMap):
             return bool(np.max(self.friction.friction) > 0.0)
         return bool(np.max(np.atleast_2d(self.friction)[:, -1]) > 0.0)
-
-    @property
-    def crosses(self) -> bool:
-        """Whether a finger in the plane cannot have it."""
-        return super().crosses or isinstance(self.friction, FrictionMap)
-
-    def friction_at(self, place: Array) -> Array:
-        """Coefficients of friction (...) at places (..., d)."""
-        if isinstance(self.friction, FrictionMap):
-            return self.friction.at(place)
-        return super().friction_at(place)
-
-    def friction_gradient(self, place: Array) -> Array:
-        """Derivatives (..., d) of the coefficient along x and z, in 1/mm, jumps left out."""
-        if isinstance(self.friction, FrictionMap):
-            return self.friction.gradient(place)
-        return super().friction_gradient(place)
-
-    def friction_steps(self, short: float) -> tuple[Steps, ...]:
-        """Jumps of the coefficient, in tables over x also ramps shorter than `short` (mm)."""
-        if isinstance(self.friction, FrictionMap):
-            return self.friction.steps
-        return super().friction_steps(short)
 
     @property
     def _rows(self) -> Array:

@@ -158,6 +158,11 @@ class Body:
         return NO_RATES if self.dynamics is None else self.dynamics.rates(u)
 
     @property
+    def branches(self) -> Any:
+        """The Maxwell branches of the tissue, or None."""
+        return None if self.dynamics is None else self.dynamics.branches
+
+    @property
     def at_rest(self) -> Floats:
         """What branches keep of the undeformed body."""
         return NO_BRANCHES if self.dynamics is None else self.dynamics.at_rest

@@ -22,14 +22,14 @@ measure in the same way, with the pressure :math:`K_i(\theta - \theta_v)`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.tensor import Array, det, inv, mul, trace
 from evfem.tissue.assembly import Integral, points_of
@@ -42,6 +42,8 @@ from evfem.tissue.splitlaw import split
 
 #: entries of a symmetric matrix that are kept, in the plane without those out of it, which are 0
 KEPT = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
+#: bytes that a branch keeps at a point, by dimensions
+KEPT_BYTES = {dim: 8 * (len(kept) + 1) for dim, kept in KEPT.items()}
 
 
 @dataclass(frozen=True)
@@ -59,9 +61,8 @@ def branches_of(space: Space, laws: Mapping[str, Any], finger: Any) -> list[Bran
     """The branches of the laws on a space; a law without its own has those of the `finger`."""
     found: list[Branch] = []
     for name, law in laws.items():
-        own = getattr(law, "relaxation", None)
-        giver = finger if own is None else law
-        rows = shares_of(f"finger.materials.{name}.relaxation", getattr(giver, "relaxation", None) or ())
+        giver = _giver(finger, law)
+        rows = shares_of(f"finger.materials.{name}.relaxation", branches_in(finger, law))
         bulk = _bulk_modulus(name, law) if rows and getattr(giver, "bulk_relaxation", False) else 0.0
         cells = space.mesh.cells_of(name)
         for i, (share, time) in enumerate(rows):
@@ -71,6 +72,16 @@ def branches_of(space: Space, laws: Mapping[str, Any], finger: Any) -> list[Bran
             found[i].shear[cells] = share * split(law, space.dim).shear_modulus
             found[i].bulk[cells], found[i].time[cells] = share * bulk, time
     return found
+
+
+def branches_in(finger: Any, law: Any) -> Any:
+    """Rows (share, s) of a law's branches, or of those of its finger."""
+    return getattr(_giver(finger, law), "relaxation", None) or ()
+
+
+def _giver(finger: Any, law: Any) -> Any:
+    """Which of the two says how the law's tissue relaxes."""
+    return finger if getattr(law, "relaxation", None) is None else law
 
 
 def _bulk_modulus(name: str, law: Any) -> float:
@@ -93,9 +104,12 @@ class Branches:
     entries of C_i, `KEPT`, and theta_v.
     """
 
-    def __init__(self, space: Space, branches: list[Branch]) -> None:
-        self.space = space
+    def __init__(self, space: Space, branches: list[Branch], wanted: Ints | None = None) -> None:
+        """In the cells that have branches, or those of them that are `wanted`."""
+        self.space, self.rows = space, branches
         cells = np.flatnonzero(sum(branch.shear for branch in branches))
+        if wanted is not None:
+            cells = np.intersect1d(cells, wanted)
         self.shear, self.bulk, self.time = (
             np.array([getattr(branch, name)[cells, None] for branch in branches])
             for name in ("shear", "bulk", "time")
@@ -104,6 +118,28 @@ class Branches:
         w = SimpleNamespace(branches=(), has_bulk=parts.theta)
         self.integral = Integral(maxwell, points_of(space, cells), parts, w, at_once=True)
         self.step = 0.0
+
+    def among(self, cells: Ints) -> tuple[Branches, Ints]:
+        """The branches of those cells alone, and where these are in `inner`."""
+        part = Branches(self.space, self.rows, cells)
+        return part, np.searchsorted(self.integral.points.cells, part.integral.points.cells)
+
+    def overstress(self, u: Floats, inner: Floats) -> tuple[Array, Array, Array]:
+        """What the branches add at the points of their cells: the second Piola-Kirchhoff stress of the shear
+        (3, 3, C, Q) and the pressure of the volume measure (C, Q), both MPa, and the energy (C, Q) in N/mm2.
+        """
+        field = self.integral.field(u - u[:1])
+        F = deformation_gradient(field)
+        bar, theta = isochoric(F), field.theta if self.integral.parts.theta else 0.0
+        A: Any = np.zeros_like(bar)
+        q, energy = np.zeros(bar.shape[2:]), np.zeros(bar.shape[2:])
+        for m, K, kept in zip(self.shear, self.bulk, inner, strict=True):
+            Ci, theta_v = self._unpacked(kept)
+            A = A + m * inv(Ci)
+            q = q + K * (theta - theta_v)
+            energy = energy + 0.5 * m * (trace(mul(bar, inv(Ci))) - 3.0) + 0.5 * K * (theta - theta_v) ** 2
+        stress = det(F) ** (-2.0 / 3.0) * (A - trace(mul(bar, A)) / 3.0 * inv(bar))
+        return stress, q, energy
 
     @cached_property
     def at_rest(self) -> Floats:
@@ -143,6 +179,21 @@ class Branches:
         """Add the tangent to the `data` of a pattern."""
         if self.step > 0.0:
             self.integral.add_tangent(u - u[:1], pattern, data)
+
+    def at_once(self, u: Floats, pattern: Pattern) -> dict[float, Floats]:
+        """By relaxation time (s), the tangents at u (N, dim) of branches that are at rest there, to changes
+        faster than they relax: added up like `Pattern.zeros`.
+        """
+        bar, theta = self._strain(u)
+        found = {}
+        for time in np.unique(self.time[self.shear > 0.0]):
+            shear, bulk = ((each * (self.time == time)).sum(axis=0) for each in (self.shear, self.bulk))
+            rest = {"before": bar[:, :, None], "share": 0.0, "theta_before": theta, "theta_share": 0.0}
+            branch = SimpleNamespace(shear=shear, bulk=bulk, **rest)
+            w = SimpleNamespace(branches=[branch], has_bulk=self.integral.parts.theta)
+            found[float(time)] = pattern.zeros()
+            replace(self.integral, w=w).add_tangent(u - u[:1], pattern, found[float(time)])
+        return found
 
     def inner(self, u: Floats) -> Floats:
         """`inner` at the end of a step that ends at u (N, dim)."""

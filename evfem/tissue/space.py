@@ -66,6 +66,18 @@ def elements_of_order(order: int) -> tuple[str, ...]:
     return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].order == order)
 
 
+def points_per_cell(element: str) -> int:
+    """Number of quadrature points of a cell.
+
+    >>> points_per_cell("q2p1"), points_per_cell("p2")
+    (9, 6)
+    """
+    import skfem
+
+    kind, intorder, _ = ELEMENTS[element]
+    return int(skfem.quadrature.get_quadrature(shape_functions(kind).refdom, intorder)[1].size)
+
+
 def scikit_mesh(mesh: Mesh) -> Any:
     """The same mesh as a scikit-fem mesh, its nodes where ours are (curved mid-nodes included)."""
     import skfem

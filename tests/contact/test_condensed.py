@@ -267,7 +267,7 @@ def test_crests_that_push_harder_than_the_body_holds_have_no_solution(seed):
 def test_a_body_that_nothing_holds_falls_under_its_load_whatever_the_rounding(rounding):
     """Its row of the balance is zero in exact numbers; one that is held keeps its own."""
     body = CondensedTangent.make(np.eye(4), None)
-    step = SimpleNamespace(body=body, unknowns=[SimpleNamespace(axis=1, condition=None)])
+    step = SimpleNamespace(body=body, unknowns=[ExtraUnknown(np.zeros(4), 1, 0.0)])
     free = np.ones((2, 2))
     body.schur[-1, :2] = 0.5
     (loose,), (held,) = (LinearContactStep._held(step, np.array([[own]]), free)[0] for own in (rounding, 2.0))

@@ -258,6 +258,7 @@ CASES = {
         ),
         "surface.friction.2.1",
     ),
+    "adhesion": (lambda: block(adhesion=ev.Dugdale(stress=0.002, reach=0.02)), "adhesion.stress"),
     "solid": (solid, "surface.friction"),
 }
 
@@ -291,6 +292,20 @@ def test_derivatives_are_those_of_differences_of_runs(case):
 def test_what_is_no_parameter_is_refused_in_a_sentence(key, said):
     with pytest.raises(ev.InputError, match=said.replace("(", r"\(").replace(")", r"\)")):
         ev.sensitivities(block(), [key])
+
+
+def test_an_elastic_surface_is_refused():
+    soft = replace(block().surface, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
+    with pytest.raises(ev.InputError, match="a rigid one, to be differentiated"):
+        ev.sensitivities(block(surface=soft), "surface.friction")
+
+
+def test_a_voltage_that_follows_a_force_is_not_differentiated_and_said_so():
+    scene = block(voltage=ev.FollowForce([0.0, 1.0], [0.005, 0.005], 300.0), motion=block().motion[:2])
+    found = ev.sensitivities(scene, TISSUE + "E", ["normal_force"])
+    assert np.isfinite(found["normal_force", TISSUE + "E"][:3]).all()
+    assert np.isnan(found["normal_force", TISSUE + "E"][3:]).all()
+    assert "unknown of the step" in found.reasons[TISSUE + "E"]
 
 
 @pytest.mark.parametrize("hold", ["indentation", "force"])

@@ -8,7 +8,7 @@ import pytest
 from tools import solids
 from tools.commands import called
 from tools.domes import dome
-from tools.meshes import block
+from tools.meshes import block, held
 
 import evfem as ev
 from evfem import scenefile
@@ -269,8 +269,48 @@ def test_a_mistake_in_a_file_names_the_probe(line):
     assert str(error.value).startswith(TABLES[line])
 
 
-def test_probes_of_tissue_that_relaxes_say_what_they_lack():
-    pad = ev.FingerPad(resolution="coarse", relaxation=[(0.5, 0.1)])
-    output, press = ev.Output(probes={"deep": [[0.0, -5.0]]}), ev.Press(indentation=0.1, steps=1, speed=1.0)
-    scene = ev.Scene(pad, ev.Display(), motion=[press], output=output, solver=ev.Solver(dynamics="viscous"))
-    assert any("without what its branches add" in said for said in ev.plan(scene).warnings)
+@pytest.mark.parametrize("bulk", [False, True])
+@pytest.mark.parametrize("element", ["q1", "q1_fbar", "hex8"])
+def test_what_branches_add_balances_the_bone(element, bulk):
+    """The block deforms homogeneously, so the first Piola-Kirchhoff stress of a point times the area is the
+    force on the bone, and its energy times the volume what is stored; at rest branches add nothing.
+    """
+    area = {"hex8": 8.0}.get(element, 2.0)
+    solid = element == "hex8"
+    mesh = held(solids.block((2, 1, 2), (2.0, 1.0, 4.0))) if solid else block(4, 1, width=2.0, height=1.0)
+    law = replace(LAW, relaxation=((0.8, 0.01), (0.5, 0.1)), bulk_relaxation=bulk)
+    finger = ev.MeshedFinger(mesh, dict.fromkeys(mesh.region_names, law))
+    motion = [
+        ev.Press(indentation=0.2, steps=4, speed=10.0),
+        ev.Slide(distance=0.2, steps=4, speed=20.0),
+        ev.Wait(0.02, steps=2),
+        ev.Press(indentation=0.2, steps=1),
+    ]
+    point = mesh.points.mean(axis=0) + 0.1 * np.arange(1, mesh.dim + 1) / mesh.dim
+    scene = ev.Scene(
+        finger, ev.Flat(friction=50.0, y=0.0), motion=motion, output=ev.Output(probes={"deep": [point]}),
+        solver=ev.Solver(element=element, dynamics="viscous", tolerance=1e-10),
+    )  # fmt: skip
+    result = ev.simulate(scene)
+    probe = result.probes["deep"]
+    F, J = probe.deformation_gradient[:, 0], probe.J[:, 0, None, None]
+    P = J * probe.cauchy_stress[:, 0] @ np.linalg.inv(F).transpose(0, 2, 1)
+    largest = result.applied_force.max()
+    np.testing.assert_allclose(area * P[:, 1, 1], -result.applied_force, atol=1e-8 * largest)
+    np.testing.assert_allclose(area * P[:, 0, 1], result.applied_tangential_force, atol=1e-8 * largest)
+    np.testing.assert_allclose(area * probe.strain_energy_density[:, 0], result.stored_energy, rtol=1e-8)
+    share = probe.branch_energy_density[:, 0] / probe.strain_energy_density[:, 0]
+    assert share[:9].min() > 0.01
+    assert share[-1] < 1e-12
+
+
+def test_a_layer_without_branches_has_none():
+    nail = ev.NeoHookean(E=17.0, nu=0.3, relaxation=())
+    pad = ev.FingerPad(resolution="coarse", relaxation=[(0.5, 0.1)], materials={"nail": nail})
+    mesh = pad.mesh()
+    places = [mesh.points[mesh.cells[mesh.cells_of(name)[0]]].mean(axis=0) for name in ("nail", "dermis")]
+    press = ev.Press(indentation=0.1, steps=1, speed=20.0)
+    solver, output = ev.Solver(dynamics="viscous"), ev.Output(probes={"both": places})
+    scene = ev.Scene(pad, ev.Flat(), motion=[press], output=output, solver=solver)
+    found = ev.simulate(scene).probes["both"].branch_energy_density[-1]
+    assert found[0] == 0.0 < found[1]

@@ -223,3 +223,39 @@ def test_a_surface_that_is_strained_too_much_is_told():
     with pytest.warns(UserWarning, match=r"strained by about \d+%"):
         result = ev.simulate(scene)
     assert any("strained by about" in one for one in result.warnings)
+
+
+def test_a_clutch_of_two_strips():
+    """Strips of EA 0.5 and 0.3 N per mm of width, 12 mm long, drawn apart under a drag t = mu p: both slip
+    from their loaded ends over F EA2/((EA1 + EA2) t) and F EA1/((EA1 + EA2) t), and all slip at F = t L.
+    """
+    first, second, length, number, drag = 0.5, 0.3, 12.0, 48, 0.3 * 0.005
+
+    class Strip:
+        def compliance(self, x, lengths):
+            n, place = len(x), np.asarray(x) + 0.5 * length
+            none, stretch = np.zeros((n, n)), np.minimum.outer(place, place) / second
+            return np.block([[none, none], [none, stretch]])
+
+    x, y = np.meshgrid(np.linspace(-0.5 * length, 0.5 * length, number + 1), [0.0, 0.1])
+    low = np.arange(number)
+    cells = np.stack([low, low + 1, low + number + 2, low + number + 1], axis=1)
+    sets = {"pad": low, "bone": np.array([number, 2 * number + 1])}
+    points = np.column_stack([x.ravel(), y.ravel()])
+    mesh = ev.Mesh(points, cells, "quad", np.zeros(number, dtype=int), {"strip": 0}, sets)
+    law = {"strip": ev.LinearElastic(E=10.0 * first, nu=0.0)}
+    strip = ev.MeshedFinger(mesh, law, electrical=ev.Electrical(0.01, 1.0))
+    voltage = 0.06 * np.sqrt(2.0 * 0.005 / ev.eps_0)  # 0.005 MPa across 0.06 mm
+    surface = ev.Display(ev.Layer(0.05, 1.0), friction=0.3, elastic=Strip())
+    motion = [ev.Press(indentation=1e-6, steps=1), ev.Slide(0.25, steps=2), ev.Slide(1.0, steps=1)]
+    result = ev.simulate(ev.Scene(strip, surface, ev.StrongTroxel(), voltage, motion))
+    drag *= 1.0 - 1.0 / number  # the edge at the held end carries no drag
+    force, slid = result.applied_tangential_force[2], result.position[2]
+    both = first + second
+    ways = second**2 / first + first**2 / second
+    travel = force * length / both + force**2 / (2.0 * both**2 * drag) * ways
+    assert slid == pytest.approx(travel, rel=0.02)
+    sticks = np.flatnonzero(result.frames[2].contact_status[sets["pad"]] == 1) * length / number
+    assert length - sticks[-1] == pytest.approx(force * second / (both * drag), abs=0.4)
+    assert sticks[0] == pytest.approx(force * first / (both * drag), abs=0.4)
+    assert result.applied_tangential_force[-1] == pytest.approx(drag * length, rel=0.02)

@@ -29,7 +29,8 @@ QUICK = [
     "hypotheses",
 ]
 SLOW = ["fig11", "fig12", "fig13", "participants", "uncertainty", "stability", "work_precision", "fringe"]
-SLOW += ["fingertip", "fingerprint", "friction_spectrum", "stick_slip"]
+SLOW += ["fingertip", "fingerprint", "friction_spectrum", "stick_slip", "relaxation", "impedance"]
+SLOW += ["soft_display", "moisture"]
 
 
 @pytest.mark.filterwarnings("ignore:motion . has steps of")

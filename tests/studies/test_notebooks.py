@@ -13,7 +13,13 @@ from evfem.studies.measured import participant_forces
 pytestmark = pytest.mark.solver
 
 NOTEBOOKS = Path(__file__).parents[2] / "studies" / "notebooks"
-NAMES = ("compare_participants", "design_a_voltage_signal", "explore_a_scene", "lecture")
+NAMES = (
+    "compare_participants",
+    "compare_two_presses",
+    "design_a_voltage_signal",
+    "explore_a_scene",
+    "lecture",
+)
 
 
 @pytest.fixture(scope="module")
@@ -93,4 +99,20 @@ def test_the_compared_participants_are_those_of_fig_5(ran):
         assert found["closed"][name] == pytest.approx(forces[name, "HVLD"], rel=1e-9)
         change = found["computed"][name] / found["closed"][name][chosen] - 1.0
         assert -0.07 < change.min() <= change.max() < 0.0
+    assert not list(folder.iterdir())
+
+
+def test_the_neuron_of_two_presses_is_the_published_one(ran):
+    """Roots of its equations by an event solver: interval under 30 kPa, spikes of a ramp to 20 kPa."""
+    found, folder = ran("compare_two_presses")
+    assert found["interval"] == pytest.approx(242.38032041, abs=0.1)
+    ramp = found["ramp"]
+    assert ((ramp <= 100.0).sum(), (ramp > 100.0).sum()) == (3, 23)
+    assert (ramp[0], ramp[-1]) == (pytest.approx(51.103350, abs=0.05), pytest.approx(1921.137820, abs=0.1))
+    steep = found["spikes"](np.array([0.0, 20.0, 2020.0]), np.array([0.0, 40.0, 40.0]))
+    assert ((steep <= 20.0).sum(), (steep > 20.0).sum()) == (2, 59)
+    assert (steep[0], steep[-1]) == (pytest.approx(12.197205, abs=0.05), pytest.approx(1963.067494, abs=0.2))
+    fast, slow = (np.diff(found["fired"][name]).min() for name in ("in 50 ms", "in 500 ms"))
+    assert fast < slow
+    assert found["stimulus"]["trace"].shape[1] == len(found["stimulus"]["location"])
     assert not list(folder.iterdir())

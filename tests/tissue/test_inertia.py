@@ -146,9 +146,12 @@ def test_what_the_steps_lose_beside_viscosity_and_branches_falls_with_the_square
     assert 3.2 < lost[0] / lost[1] < 4.8
 
 
-def test_the_tangent_and_the_potential_are_those_of_the_forces_after_an_uneven_part():
+@pytest.mark.parametrize("compiled", [True, False])
+def test_the_tangent_and_the_potential_are_those_of_the_forces_after_an_uneven_part(compiled):
     """Central differences in one direction; everything that time adds, at finite strain."""
     chain = Chain(0.1, BRANCHES, size=0.1)
+    if not compiled:
+        chain.dynamics.loops = None
     term, rng = chain.dynamics, np.random.default_rng(2)
     rates = np.stack([rng.normal(size=chain.u.shape) for _ in range(2)])
     term.begin(0.2 * chain.u, 0.3 * rates[0], 0.07, term.at_rest, Past(0.05, 0.1 * rates))
@@ -234,9 +237,9 @@ def test_a_bar_that_hits_a_wall_is_in_contact_for_two_crossings_and_rebounds(sha
     assert bar.state.velocity[:, 1].mean() / bar.SPEED == pytest.approx(1.0, abs=0.05 * share)
 
 
-def slid(way, hand=None):
+def slid(way, hand=None, E=0.1):
     """A round block of heavy tissue that is pressed, slides along +x or -x, and waits."""
-    law = ev.NeoHookean(E=0.1, nu=0.4, density=1e-6, relaxation=((0.5, 2e-3),))
+    law = ev.NeoHookean(E=E, nu=0.4, density=1e-6, relaxation=((0.5, 2e-3),))
     finger = ev.MeshedFinger(block(8, 3, sag=0.4), {"tissue": law}, viscosity=1e-3)
     motion = [
         ev.Press(indentation=0.2, steps=4, speed=100.0),
@@ -273,3 +276,14 @@ def test_a_resumed_run_gives_the_same_numbers(step, tmp_path):
     again = ev.simulate(scene, resume=file.read(scene.digest()))
     for name in ("applied_force", "applied_tangential_force", "kinetic_energy", "integrator_dissipation"):
         np.testing.assert_array_equal(again[name], whole[name], err_msg=name)
+
+
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
+def test_sensitivities_count_the_part_before():
+    """Beside central differences of two runs."""
+    key = "finger.materials.tissue.E"
+    found = ev.sensitivities(slid(1.0), [key])
+    ends = [ev.simulate(slid(1.0, E=0.1 * (1.0 + way))) for way in (-1e-4, 1e-4)]
+    for name in ("applied_force", "applied_tangential_force", "kinetic_energy"):
+        expected = (ends[1][name] - ends[0][name]) / 2e-5
+        np.testing.assert_allclose(found[name, key], expected, atol=1e-6 * np.abs(expected).max())
