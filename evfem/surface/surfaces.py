@@ -31,7 +31,7 @@ from evfem.electrostatics.laws import FILM, Layer
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
 from evfem.surface.elastic import ELASTIC, elastic_of
-from evfem.surface.ways import ANGLE, FrictionMap, OneWay, Steps, direction
+from evfem.surface.ways import ANGLE, FrictionMap, OneWay, direction
 from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
@@ -48,6 +48,8 @@ TERMS = (
 #: what a surface may be at most: rows of a table, sines of a sum, samples of a profile; positions (mm),
 #: heights and amplitudes (mm), wavenumbers (rad/mm), coefficients of friction; how near samples may be (mm)
 MOST_ROWS, MOST_TERMS, MOST_SAMPLES = 10_000, 1_000, 1_000_000
+#: values that a sum of sines has at once
+MOST_VALUES = 1_000_000
 FARTHEST, HIGHEST, FASTEST, ROUGHEST, NEAREST = 1e6, 1e3, 1e6, 100.0, 1e-9
 #: Equation (25) of the paper, 0.025 (sin 6x + cos 12x - 1) in mm, as rows amplitude, wavenumber, phase.
 EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
@@ -88,29 +90,6 @@ class RigidSurface(OneWay, Checked):
         if isinstance(self.friction, FrictionMap):
             return bool(np.max(self.friction.friction) > 0.0)
         return bool(np.max(np.atleast_2d(self.friction)[:, -1]) > 0.0)
-
-    @property
-    def crosses(self) -> bool:
-        """Whether a finger in the plane cannot have it."""
-        return super().crosses or isinstance(self.friction, FrictionMap)
-
-    def friction_at(self, place: Array) -> Array:
-        """Coefficients of friction (...) at places (..., d)."""
-        if isinstance(self.friction, FrictionMap):
-            return self.friction.at(place)
-        return super().friction_at(place)
-
-    def friction_gradient(self, place: Array) -> Array:
-        """Derivatives (..., d) of the coefficient along x and z, in 1/mm, jumps left out."""
-        if isinstance(self.friction, FrictionMap):
-            return self.friction.gradient(place)
-        return super().friction_gradient(place)
-
-    def friction_steps(self, short: float) -> tuple[Steps, ...]:
-        """Jumps of the coefficient, in tables over x also ramps shorter than `short` (mm)."""
-        if isinstance(self.friction, FrictionMap):
-            return self.friction.steps
-        return super().friction_steps(short)
 
     @property
     def _rows(self) -> Array:
@@ -292,15 +271,32 @@ class Sinusoid(RigidSurface):
 
     def relief(self, place: Array) -> tuple[Array, Array, Array]:
         """Heights, slopes and curvatures of all terms, each along its own direction."""
-        parts = []
-        for a, k, phase, *own in self._all:
-            way = np.array(direction(self.angle + sum(own))[: place.shape[-1]])
-            at = k * (place @ way) + phase
-            wave = a * np.sin(at)
-            slope = (a * k * np.cos(at))[..., None] * way
-            parts.append((wave, slope, (-(k**2) * wave)[..., None, None] * np.outer(way, way)))
-        height, slope, curvature = (sum(each) for each in zip(*parts, strict=True))
-        return np.asarray(height), np.asarray(slope), np.asarray(curvature)
+        d = place.shape[-1]
+        amplitude, wave, phase = self._waves
+        wave, rows = wave[:, :d], place.reshape(-1, d)
+        square = (wave[:, :, None] * wave[:, None, :]).reshape(-1, d * d)
+        kind = np.result_type(place, float)  # complex in a complex step
+        height, slope, curvature = (np.zeros((len(rows), size), kind) for size in (1, d, d * d))
+        block = max(MOST_VALUES // max(len(rows), 1), 1)
+        for first in range(0, len(wave), block):
+            some = slice(first, first + block)
+            at = rows @ wave[some].T + phase[some]
+            sine, cosine = amplitude[some] * np.sin(at), amplitude[some] * np.cos(at)
+            height += sine.sum(axis=1, keepdims=True)
+            slope += cosine @ wave[some]
+            curvature -= sine @ square[some]
+        return (
+            height.reshape(place.shape[:-1]),
+            slope.reshape(place.shape),
+            curvature.reshape(*place.shape, d),
+        )
+
+    @cached_property
+    def _waves(self) -> tuple[Array, Array, Array]:
+        """Amplitudes (T,) in mm, wave vectors (T, 2) in rad/mm and phases (T,) of the terms."""
+        terms = np.array([[a, k, phase, sum(own)] for a, k, phase, *own in self._all])
+        ways = np.array([direction(self.angle + own) for own in terms[:, 3].tolist()])
+        return terms[:, 0], terms[:, 1:2] * ways, terms[:, 2]
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -48,8 +48,13 @@ class OneWay:
 
     @property
     def crosses(self) -> bool:
-        """Whether x is not the direction in which it varies, so that a finger in the plane cannot have it."""
-        return self.angle != 0.0
+        """Whether it does not vary along x alone, so that a finger in the plane cannot have it."""
+        return self.angle != 0.0 or self._map is not None
+
+    @property
+    def _map(self: Any) -> FrictionMap | None:
+        """Its coefficients over x and z, or None."""
+        return self.friction if isinstance(self.friction, FrictionMap) else None
 
     def relief(self: Any, place: Floats) -> tuple[Floats, Floats, Floats]:
         """Heights (...) in mm at places (..., d), slopes (..., d) along x and z, and curvatures (..., d, d)
@@ -66,18 +71,24 @@ class OneWay:
 
     def friction_at(self: Any, place: Floats) -> Floats:
         """Coefficients of friction (...) at places (..., d)."""
+        if self._map is not None:
+            return np.asarray(self._map.at(place))
         return np.asarray(self.friction_coefficient(place[..., 0]))
 
     def friction_gradient(self: Any, place: Floats) -> Floats:
         """Derivatives (..., d) of the coefficient along x and z, in 1/mm, jumps left out."""
+        if self._map is not None:
+            return np.asarray(self._map.gradient(place))
         found = np.zeros(place.shape)
         found[..., 0] = self.friction_slope(place[..., 0])
         return found
 
     def friction_steps(self: Any, short: float) -> tuple[Steps, ...]:
-        """Jumps of the coefficient, and ramps shorter than `short` (mm): a node that crosses such a ramp in
-        one iteration sees a jump at its rougher end.
+        """Jumps of the coefficient, in tables over x also ramps shorter than `short` (mm): a node that
+        crosses such a ramp in one iteration sees a jump at its rougher end.
         """
+        if self._map is not None:
+            return tuple(self._map.steps)
         jumps, ramps = self.friction_jumps, getattr(self, "friction_ramps", np.zeros((0, 4)))
         begin, end, before, behind = ramps[ramps[:, 1] - ramps[:, 0] < short].T
         place = np.where(behind > before, end, begin)
