@@ -155,8 +155,11 @@ class Attraction:
         """Parts of closed nodes' attraction (P,) in MPa that a core takes away, and leaves; or None."""
         if not hasattr(self.law, "withheld") or voltage == 0.0:
             return None
-        found = np.broadcast_arrays(*self.law.withheld(voltage, self.layers), np.zeros(self.pad.nodes.size))
-        return found[0], found[1]
+        withheld, left = self.law.withheld(voltage, self.layers)
+        if not np.any(left):  # closed faces are out of its reach
+            return None
+        size = self.pad.nodes.shape
+        return np.broadcast_to(withheld, size), np.broadcast_to(left, size)
 
     def tangent_factor(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None

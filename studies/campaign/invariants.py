@@ -82,7 +82,7 @@ def largest_energy(result: ev.Result) -> float:
 
 def remainder(result: ev.Result) -> Floats:
     """Works less what is stored, moving and dissipated, over the largest of all of them (rows,)."""
-    given = result.external_work + result.electrostatic_work
+    given = result.external_work + result.electrostatic_work + result.adhesive_work
     names = [name for name in COLUMNS if name.endswith(("_energy", "_dissipation"))]
     kept = [getattr(result, name) for name in names if name not in ELECTRIC]
     return (given - np.sum(kept, axis=0)) / largest_energy(result)
@@ -109,10 +109,11 @@ def forces(scene: ev.Scene, result: ev.Result) -> Found:
     if scene.solver.dynamics != "inertial":  # as a vector
         x = result.applied_tangential_force_x - result.tangential_force_x + result.electrostatic_force_x
         z = result.applied_tangential_force_z - result.tangential_force_z + result.electrostatic_force_z
-        y = -result.applied_force + result.normal_force - result.electrostatic_force
+        y = -result.applied_force + result.normal_force - result.electrostatic_force - result.adhesive_force
         allowed = max(TOLERANCE, 1e2 * scene.solver.tolerance)
         yield _worst("balance", np.hypot(np.hypot(x, z), y) / force, allowed, step)
-    if scene.ground.is_flat and isinstance(scene.friction_law, ev.Coulomb):
+    level = scene.ground.is_flat and scene.ground.elastic is None
+    if level and isinstance(scene.friction_law, ev.Coulomb):
         # on a level surface the sums lie within the cone of the largest coefficient
         friction = scene.surface.friction  # type: ignore[attr-defined]
         mu = float(np.max(getattr(friction, "friction", np.atleast_2d(friction)[:, -1:])))
@@ -148,6 +149,8 @@ def motions(scene: ev.Scene, result: ev.Result) -> Found:
         elif last[row] and motion.kind == "voltage":
             missed[row] = abs(result.voltage[row] - motion.voltage)
         if row and getattr(motion, "hold", None) == "force":
+            if scene.adhesion is not None and not result.normal_force[row - 1 : row + 1].any():
+                continue  # it came off, and keeps its height
             drifted[row] = abs(load[row] - load[row - 1]) / force[row]
         elif row and getattr(motion, "hold", None) == "indentation":
             drifted[row] = abs(depth[row] - depth[row - 1])
@@ -208,8 +211,11 @@ def _relative(values: Any, frame: ev.Frame) -> float:
 def _beyond_the_cone(scene: ev.Scene, result: ev.Result, frame: ev.Frame) -> float:
     """How far shear is outside the cone at any node's place; where it slips, how far from it.
 
-    At a jump, and within a steep ramp, any coefficient within `NEAR` will do.
+    At a jump, and within a steep ramp, any coefficient within `NEAR` will do. Where coefficients are carried
+    along by an elastic surface a frame does not say which.
     """
+    if scene.ground.elastic is not None and not isinstance(scene.surface.friction, float):  # type: ignore[attr-defined]
+        return 0.0
     place = (result.mesh.points + frame.displacement)[:, ::2]
     shifts = [NEAR * np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=place.shape[1])]
     coefficients = [scene.ground.friction_at(place + shift) for shift in shifts]

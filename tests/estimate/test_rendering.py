@@ -193,8 +193,13 @@ def test_exact_encoding_reproduces_a_texture(texture):
     lowest = wish.minimum(after=texture.full_slip)
     assert 0.1 < lowest < 0.12 < wish.friction.max()
     found = exact(texture, Display(friction=lowest), Kaczmarek())
-    assert compare(texture.result, found.result).relative_l2 < 1e-6
-    assert found.result.voltage.max() > 1000.0
+    error, voltage = compare(texture.result, found.result).error, found.result.voltage[3:]
+    rubs = voltage > 0.0
+    assert np.abs(error[rubs]).max() < 1e-6 * np.abs(wish.tangential_force).max()
+    # the pad that still sticks resists more than it may without a voltage
+    assert (error[~rubs] > 0.0).all()
+    assert found.result.position[3:][~rubs].max(initial=0.0) < texture.full_slip
+    assert voltage.max() > 1000.0
     # the reference held its indentation; the display is pressed to the load that this took
     assert found.scene.motion[0] == Press(force=texture.result.applied_force[2], steps=3)
     assert found.scene.motion[1] == texture.scene.motion[1]

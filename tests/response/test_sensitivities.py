@@ -296,7 +296,7 @@ def test_what_is_no_parameter_is_refused_in_a_sentence(key, said):
 
 def test_an_elastic_surface_is_refused():
     soft = replace(block().surface, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
-    with pytest.raises(ev.InputError, match="a rigid one, to be differentiated"):
+    with pytest.raises(ev.InputError, match="a rigid one: derivatives know no other"):
         ev.sensitivities(block(surface=soft), "surface.friction")
 
 

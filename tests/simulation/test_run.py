@@ -183,8 +183,8 @@ def test_a_resumed_run_goes_on_with_everything(at):
     assert saved["time"] > 0.0
     assert saved["factorised"]
     assert saved["duration"] > 0.0
-    assert (saved["sums"][:5] != 0.0).all()
-    assert not saved["sums"][5:].any()  # nothing snaps or leaks
+    assert (saved["sums"][[0, 1, 3, 4, 5]] != 0.0).all()
+    assert not saved["sums"][[2, *range(6, saved["sums"].size)]].any()  # nothing adheres, snaps or leaks
     assert np.abs(saved["internal_forces"]).max() > 1e-3
     assert kept[1]["substep"] < 1.0
     run = Run(scene, Saved(saved, rows[:at]))

@@ -89,7 +89,9 @@ def test_a_loose_finger_is_lifted_by_crests_and_stays_there():
 def test_a_finger_that_just_touches_is_loose():
     """Its force is rounding, which would be held in the next motion."""
     going = Run(scene(PRESS, ev.Wait(0.1), voltage=0.0), None)
-    row = dict.fromkeys(("position", "indentation", "applied_force", "voltage", "electrostatic_force"), 0.0)
+    row = dict.fromkeys(
+        ("position", "indentation", "applied_force", "voltage", "electrostatic_force", "adhesive_force"), 0.0
+    )
     for force, loose in ((0.0, True), (1e-17, True), (-1e-17, True), (1e-8, False)):
         going.rows = [row | {"normal_force": force}]
         assert going.start_of(1)["loose"] == loose
