@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 #: rooms whose tests get the mark `solver`; files elsewhere say it themselves
-SOLVER = {"contact", "response", "simulation", "solver", "tissue"}
+SOLVER = {"contact", "newton", "response", "simulation", "solver", "tissue"}
 #: compiled loops are built with a C compiler
 collect_ignore = [] if find_spec("evfem.tissue.kernels.loops") else ["tissue/kernels"]
 
