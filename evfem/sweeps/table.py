@@ -136,7 +136,7 @@ class SweepResult:
         >>> rows = [{"point": i, "surface.friction": mu} for i, mu in enumerate((0.1, 0.2, 0.6))]
         >>> table = SweepResult(("point", "surface.friction"), rows, {})
         >>> found = table.statistics()
-        >>> found["column"][0], [round(float(found[name][0]), 3) for name in ("mean", "deviation")]
+        >>> str(found["column"][0]), [round(float(found[name][0]), 3) for name in ("mean", "deviation")]
         ('surface.friction', [0.3, 0.265])
         """
         if not all(isinstance(q, (int, float)) and 0.0 <= q <= 1.0 for q in quantiles):
