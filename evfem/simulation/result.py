@@ -305,7 +305,7 @@ class Result(History):
     def to_xarray(self) -> Any:
         """The result as an `xarray.Dataset`: every column over `step`, the fields kept over `frame` (the
         number of its step) and `node` or `cell`, with `units` and `long_name`; places of the undeformed
-        nodes (mm) are the coordinates x, y and z.
+        nodes (mm) are the coordinates x, y and z. A field with the name of a column ends in `_of_nodes`.
 
         Raises InputError where xarray is not installed (the extra `xarray`).
         """
@@ -318,7 +318,7 @@ class Result(History):
             values = np.stack([np.asarray(getattr(frame, name)) for frame in self.frames])
             dims = ("frame", *(DIMENSIONS[size] for size in shape))
             words = {"units": FIELD_UNITS.get(name, "MPa"), "long_name": name.replace("_", " ")}
-            variables[name] = (dims, values, words)
+            variables[f"{name}_of_nodes" if name in variables else name] = (dims, values, words)
         axes = "xyz"[: self.mesh.dim]
         places = zip(axes, self.mesh.points.T, strict=True)
         coordinates = {
