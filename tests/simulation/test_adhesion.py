@@ -129,6 +129,20 @@ def test_friction_sees_adhesion_as_a_load():
     assert result.adhesive_force[-1] == pytest.approx(covered, rel=0.15)
 
 
+def test_rough_faces_out_of_reach_do_not_adhere():
+    """Closed faces 2 um apart, a law that ends at 1 um: the friction is that without adhesion."""
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    motion = [ev.Press(indentation=0.3, steps=1), ev.Slide(0.3, steps=1)]
+    with_it, without = (
+        ev.simulate(
+            ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 100.0, motion, roughness_gap=2e-3, adhesion=one)
+        )
+        for one in (ev.Dugdale(stress=0.1, reach=1e-3), None)
+    )
+    assert with_it.adhesive_force.tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(with_it.tangential_force, without.tangential_force, rtol=1e-7, atol=1e-12)
+
+
 def test_a_scene_with_adhesion_is_written_and_read():
     for law in LAWS:
         scene = ev.Scene(PAD, ev.Flat(), motion=[ev.Press(force=0.05)], adhesion=law)
