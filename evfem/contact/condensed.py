@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import DenseSolver, Floats, Ints, inverse
 from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
@@ -156,13 +156,14 @@ class CondensedTangent:
     schur: Floats
     compliance: Floats
     dim: int = 2
+    dense: DenseSolver = field(default_factory=DenseSolver, repr=False)
     _last: dict[bytes, Floats] = field(default_factory=dict, repr=False)
 
     @classmethod
     def make(cls, schur: Floats, coupling: Floats | None, dim: int = 2) -> CondensedTangent:
         """From S (m, m) and the attraction's stiffness between nodes (m - dim, m - dim), or None."""
         inner = schur[:-dim, :-dim] if coupling is None else schur[:-dim, :-dim] - coupling
-        return cls(schur, _inverse(inner, symmetric=coupling is None), dim)
+        return cls(schur, inverse(inner, symmetric=coupling is None), dim)
 
     def rows(self, near: Ints) -> Ints:
         """Rows of these candidates, (y, x[, z]) node by node."""
@@ -220,7 +221,7 @@ class LinearContactStep:
     displacement comes back.
 
     `residual` g (m,) of the forward solve; `bone` (dim,) the bone's known increment; `unknowns` what
-    else moves the body.
+    else moves the body; `tolerance` as in `ContactProblem`.
     """
 
     body: CondensedTangent
@@ -229,6 +230,7 @@ class LinearContactStep:
     bone: Floats
     unknowns: tuple[ExtraUnknown, ...] = ()
     bed: CandidatesBed | None = None
+    tolerance: float = ROUNDING
 
     @cached_property
     def seen(self) -> Floats:
@@ -378,6 +380,8 @@ class LinearContactStep:
             chords=known.by_chords(near, compliance),
             cohesion=None if known.cohesion is None else known.cohesion[near],
             give=known.interface_compliance[near].ravel() if known.interface_compliance.any() else None,
+            tolerance=self.tolerance,
+            dense=self.body.dense,
         )
 
     def _bone_balance(
@@ -424,19 +428,3 @@ class LinearContactStep:
         floor = SMALLEST_PIVOT * np.abs(S[:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
         return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
-
-
-def _inverse(matrix: Floats, symmetric: bool) -> Floats:
-    """Inverse; a positive definite one by Cholesky, which takes half of the time."""
-    from scipy.linalg import lapack
-
-    if symmetric:
-        factor, failed = lapack.dpotrf(matrix, lower=True)
-        if not failed:
-            lower, _ = lapack.dpotri(factor, lower=True)
-            return lower + np.tril(lower, -1).T
-    factor, pivots, failed = lapack.dgetrf(matrix)
-    if failed:
-        raise np.linalg.LinAlgError("singular compliance")
-    # solving with the unit matrix, as numpy does, takes 1.6 times as long
-    return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])

@@ -48,8 +48,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import DISC_OWN
+from evfem.common.arrays import DenseSolver, Floats, Ints
+from evfem.common.constants import DISC_OWN, ROUNDING
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,8 @@ class ContactProblem:
     (n, t[, t2]), friction coefficients (k,), optional extra_unknowns and attraction, the shear force that
     friction has without a pressing one, `cohesion` (k,) in N/mm (N in three dimensions), and how far the
     interface itself gives way to contact forces, not to attraction, `give` (m,) in mm per N/mm.
-    `chords` (k,): coefficients that take the place of tangents and cohesion of a friction law.
+    `chords` (k,): coefficients that take the place of tangents and cohesion of a friction law. The laws hold
+    to `tolerance`, relative to the largest force; `dense` solves.
     """
 
     start: Floats
@@ -161,6 +162,8 @@ class ContactProblem:
     cohesion: Floats | None = None
     give: Floats | None = None
     chords: Floats | None = None
+    tolerance: float = ROUNDING
+    dense: DenseSolver = field(default_factory=DenseSolver)
 
     @property
     def by_chords(self) -> ContactProblem:
@@ -278,13 +281,13 @@ def sizes(vectors: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Unknowns:
-    """Those of nodes with statuses: at `place` (u,) of the m components first the pressing forces of the
-    `closed` nodes, which the body feels as `felt` (c, 1 + d), the shear forces of those that stick, and
-    the drops of the `attracted` open ones; then the shear forces of the `turned` nodes (t,) along `aside`
-    (t, d), which keep the share `kept` (t,), the slip across counting `turns` (t,).
+    """Those of nodes with statuses, at `place` of the m components: first the pressing forces of the `closed`
+    nodes, which the body feels as `felt` (c, 1 + d), the shear forces of those that stick, and the drops
+    of the `attracted` open ones; then the shear forces of the `turned` nodes (t,) along `aside` (t, d), of
+    which the share `kept` (t,) stays, the slip across counting `turns` (t,). All components that act with
+    them are `whole` (w,), found again by their `index` (m,).
     """
 
-    place: Ints
     closed: Ints
     attracted: Ints
     felt: Floats
@@ -292,6 +295,9 @@ class _Unknowns:
     aside: Floats
     kept: Floats
     turns: Floats
+    place: Ints
+    whole: Ints
+    index: Ints
 
     @classmethod
     def of(
@@ -306,31 +312,37 @@ class _Unknowns:
             turned = np.flatnonzero((status == SLIP) & problem.resists)
             aside = turning[0][turned, ::-1] * np.array([-1.0, 1.0])
             kept, turns = 1.0 - turning[1][turned], turning[1][turned] / problem.own[1][turned]
-        held = (n * stick[:, None] + np.arange(1, n)).ravel()
+        felt, tangents = (known.sheared - known.gain)[closed], np.arange(1, n)
+        sheared = closed[(status[closed] != STICK) & felt[:, 1:].any(axis=1)]
+        beside = turned if np.array_equal(sheared, turned) else np.append(turned, np.setdiff1d(sheared, turned))
+        held = (n * stick[:, None] + tangents).ravel()
         place = np.concatenate([n * closed, held, n * attracted])
-        return cls(place, closed, attracted, (known.sheared - known.gain)[closed], turned, aside, kept, turns)
+        whole = np.append(place, (tangents[:, None] + n * beside).ravel())
+        index = np.zeros(n * problem.size, dtype=np.int64)
+        index[whole] = np.arange(whole.size)
+        return cls(closed, attracted, felt, turned, aside, kept, turns, place, whole, index)
 
     def columns(self, C: Floats) -> Floats:
-        """Their effect on the rows of C, (q, m)."""
-        found, n = C[:, self.place], self.felt.shape[1]
-        first = found[:, : self.closed.size]
+        """Their effect (q, u) from that of the `whole` (q, w), which is overwritten."""
+        n, size = self.felt.shape[1], self.place.size
+        first = C[:, : self.closed.size]
         if (self.felt[:, 0] != 1.0).any():
             first *= self.felt[:, 0]
         for a in range(1, n):
             if (some := np.flatnonzero(self.felt[:, a])).size:
-                first[:, some] += C[:, n * self.closed[some] + a] * self.felt[some, a]
-        if not self.turned.size:
-            return found
-        across = (C[:, n * self.turned + 1 + a] * self.aside[:, a] for a in range(n - 1))
-        return np.hstack([found, sum(across)])
+                first[:, some] += C[:, self.index[n * self.closed[some] + a]] * self.felt[some, a]
+        return self._across(C.T, self.aside).T if self.turned.size else C[:, :size]
 
     def rows(self, v: Floats) -> Floats:
-        """Their equations' part of gaps and slips v (m, q)."""
-        if not self.turned.size:
-            return v[self.place]
-        n, weight = self.felt.shape[1], self.turns[:, None] * self.aside
-        across = (v[n * self.turned + 1 + a] * weight[:, a, None] for a in range(n - 1))
-        return np.vstack([v[self.place], sum(across)])
+        """Their equations' part (u, q) from gaps and slips of the `whole` (w, q), which are overwritten."""
+        return self._across(v, self.turns[:, None] * self.aside) if self.turned.size else v[: self.place.size]
+
+    def _across(self, v: Floats, weight: Floats) -> Floats:
+        """v (w, q) with the tangential components of turned nodes as one, by a `weight` (t, 2) of each."""
+        n, size, end = self.felt.shape[1], self.place.size, self.place.size + self.turned.size
+        v[size:end] *= weight[:, :1]
+        v[size:end] += v[self.index[n * self.turned + 2]] * weight[:, 1:]
+        return v[:end]
 
 
 @dataclass(frozen=True, eq=False)
@@ -376,32 +388,36 @@ def solve_statuses(
     k, n, extra = problem.size, problem.dim, problem.extra_unknowns
     known = _Known.of(problem, status, along)
     unknowns = _Unknowns.of(problem, known, status, None if turning is None else (along, turning))
-    place, closed, attracted = unknowns.place, unknowns.closed, unknowns.attracted
-    rows = unknowns.rows(problem.compliance)
-    matrix, right = unknowns.columns(rows), -unknowns.rows(problem.start[:, None])[:, 0]
+    place, closed, attracted, whole = unknowns.place, unknowns.closed, unknowns.attracted, unknowns.whole
+    steady = (known.drop + known.shear).ravel()
+    start = problem.start + problem.compliance @ steady if steady.any() else problem.start
+    right = -unknowns.rows(start[whole, None])
+    matrix = unknowns.rows(unknowns.columns(problem.compliance[np.ix_(whole, whole)]))
     pressed, own = np.split(np.arange(place.size), [place.size - attracted.size])
-    last, steady = np.arange(place.size, right.size), (known.drop + known.shear).ravel()
+    last = np.arange(place.size, len(right))
     matrix[last, last] += unknowns.kept
     if problem.give is not None:
         matrix[pressed, pressed] += problem.give[place[pressed]]
-    if steady.any():
-        right -= rows @ steady
     if attracted.size:
         assert problem.attraction is not None
         matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
-        right[own] += problem.attraction.reference_gap[attracted]
-    if extra is not None:
-        moved, balance = unknowns.rows(extra.columns), unknowns.columns(extra.rows)
-        matrix = np.block([[matrix, moved], [balance, extra.pivot]])
-        right = np.append(right, extra.right - extra.rows @ steady)
-    x: Any = np.linalg.solve(matrix, right)
+        right[own, 0] += problem.attraction.reference_gap[attracted]
+    names = whole.tobytes(), last.size
+    if extra is None:
+        x, d = problem.dense.solve(matrix, right, names)[:, 0], np.zeros(0)
+    else:
+        balance, rest = unknowns.columns(extra.rows[:, whole]), extra.right - extra.rows @ steady
+        right = np.hstack([right, unknowns.rows(extra.columns[whole])])
+        both = problem.dense.solve(matrix, right, names)
+        d = np.linalg.solve(extra.pivot - balance @ both[:, 1:], rest - balance @ both[:, 0])
+        x = both[:, 0] - both[:, 1:] @ d
     pressing = np.zeros((k, 1))
     pressing[closed, 0] = x[: closed.size]
     force, drop = known.shear + pressing * known.sheared, known.drop - pressing * known.gain
     force.ravel()[place[closed.size : pressed.size]] = x[closed.size : pressed.size]
     force[unknowns.turned, 1:] += x[last, None] * unknowns.aside.reshape(-1, n - 1)
     drop[attracted, 0] += x[own]
-    return Forces(force.ravel(), drop.ravel(), x[place.size + last.size :])
+    return Forces(force.ravel(), drop.ravel(), d)
 
 
 def linearised(problem: ContactProblem, found: Projected) -> Forces:

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
+from evfem.common.constants import ACTIVE_SET_LIMIT, STABLE
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
@@ -62,7 +62,7 @@ def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = 
         total += solves
         if forces is not None:
             return ContactSolution.of(problem, forces, found.status, total)
-    keep = int((found.miss > ROUNDING).sum())
+    keep = int((found.miss > problem.tolerance).sum())
     raise ContactNotSolved(f"{keep} of {problem.size} nodes keep changing", softest)
 
 
@@ -99,7 +99,7 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
         rest = changed if problem.dim == 2 else changed | (after.status == SLIP)
         if not np.isfinite(after.miss).all():
             break
-        if not (after.miss[rest] > ROUNDING).any():
+        if not (after.miss[rest] > problem.tolerance).any():
             return forces, found, solves, softest
         if changed.any():
             softest = np.where(changed, OPEN, found.status)

@@ -24,6 +24,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     FAR,
     FIRST_CANDIDATES,
+    LARGE_SCHUR,
     LEFT_OVER,
     LONGER,
     SHORTER,
@@ -181,12 +182,13 @@ class Linearisation:
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
-        self._outdated, self._drag_rate = False, self.body.drag_rate
+        self._outdated, self._drag_rate, self.tangent = False, self.body.drag_rate, None
         if self.factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             # static condensation keeps candidates and bone
             kept = np.concatenate([unknowns, self.body.bone])
-            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
+            single = kept.size >= LARGE_SCHUR
+            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, single)
             self.record.backend = type(self.factor).__name__
         pressure = state.pressure if state.pressure.size else None
         upper = self.body.tangent(state.u, pressure)
