@@ -25,9 +25,11 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     CANDIDATE_GROWTH,
     CANDIDATE_ROUNDS,
+    INNER,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
     REACH,
+    ROUNDING,
     SHORTEST_FRACTION,
     SMALLEST_FORCE,
     SMALLEST_J,
@@ -254,6 +256,7 @@ class FactorisedBody:
             bone=target.bone(state.bone) - state.bone,
             unknowns=self._unknowns(state, target),
             bed=self._bed(state, c),
+            tolerance=max(ROUNDING, INNER * self.record.residuals[-1]) if self.interface.follows else ROUNDING,
         )
 
     def _bed(self, state: State, c: Ints) -> CandidatesBed | None:
