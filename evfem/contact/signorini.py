@@ -279,98 +279,73 @@ def sizes(vectors: Floats) -> Floats:
     return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1] if vectors.shape[1] > 1 else 0.0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Unknowns:
-    """Those of nodes with statuses, at `place` of the m components: first the pressing forces of the `closed`
-    nodes, which the body feels as `felt` (c, 1 + d), the shear forces of those that stick, and the drops
-    of the `attracted` open ones; then the shear forces of the `turned` nodes (t,) along `aside` (t, d), of
-    which the share `kept` (t,) stays, the slip across counting `turns` (t,). All components that act with
-    them are `whole` (w,), found again by their `index` (m,).
+class _Equations:
+    """Unknowns and equations of nodes that have these statuses (k,).
+
+    Per node, (k, 1 + d), are known: the force of a closed one that presses with 1, `sheared`, the attraction
+    that this adds, `gain`, and the `drop` and `shear` that no unknown changes. Unknown are, at `place` of the
+    m components, first the pressing forces of the `closed` nodes, which the body feels as `felt` (c, 1 + d),
+    the shear forces of those that stick, and the drops of the `attracted` open ones; then the shear forces
+    of the `turned` nodes (t,) along `aside` (t, 2), of which the fraction `kept` (t,) stays, the slip across
+    counting `turns` (t,). All components that act with them are `whole` (w,), at `index` (m,) of these.
     """
 
-    closed: Ints
-    attracted: Ints
-    felt: Floats
-    turned: Ints
-    aside: Floats
-    kept: Floats
-    turns: Floats
-    place: Ints
-    whole: Ints
-    index: Ints
+    def __init__(
+        self, problem: ContactProblem, status: Ints, along: Floats, turning: Floats | None = None
+    ) -> None:
+        n, opened, resists = problem.dim, (status == OPEN)[:, None], problem.resists
+        along = np.where((status >= SLIP)[:, None], along, 0.0)
+        self.sheared = np.hstack([np.ones(opened.shape), problem.friction[:, None] * along])
+        self.gain, self.drop, self.shear = np.zeros((3, *self.sheared.shape))
+        if problem.cohesion is not None:
+            self.shear[:, 1:] = problem.cohesion[:, None] * along
+        attracted = np.zeros(0, dtype=np.int64)
+        if (attraction := problem.attraction) is not None:
+            attracted = np.flatnonzero(opened[:, 0] & (attraction.negative_stiffness > 0.0))
+            self.drop[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
+            if (rough := attraction.roughness) is not None:
+                self.gain = rough.gain
+                self.drop += np.where(opened, rough.loss_on_opening, rough.gain * rough.present[:, None])
+        turned = np.flatnonzero((status == SLIP) & resists & (turning is not None))
+        share = np.ones(status.size) if turning is None else turning
+        self.attracted, self.turned, self.closed = attracted, turned, np.flatnonzero(status != OPEN)
+        self.aside = along[turned, ::-1] * np.array([-1.0, 1.0]) if turned.size else np.zeros((0, n - 1))
+        self.kept, self.turns = 1.0 - share[turned], share[turned] / problem.own[1][turned]
+        self._find(n, status)
 
-    @classmethod
-    def of(
-        cls, problem: ContactProblem, known: _Known, status: Ints, turning: tuple[Floats, Floats] | None
-    ) -> _Unknowns:
-        n, closed, stick = problem.dim, np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
-        attracted = turned = np.zeros(0, dtype=np.int64)
-        aside = kept = turns = np.zeros(0)
-        if problem.attraction is not None:
-            attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
-        if turning is not None:
-            turned = np.flatnonzero((status == SLIP) & problem.resists)
-            aside = turning[0][turned, ::-1] * np.array([-1.0, 1.0])
-            kept, turns = 1.0 - turning[1][turned], turning[1][turned] / problem.own[1][turned]
-        felt, tangents = (known.sheared - known.gain)[closed], np.arange(1, n)
-        sheared = closed[(status[closed] != STICK) & felt[:, 1:].any(axis=1)]
-        beside = turned if np.array_equal(sheared, turned) else np.append(turned, np.setdiff1d(sheared, turned))
-        held = (n * stick[:, None] + tangents).ravel()
-        place = np.concatenate([n * closed, held, n * attracted])
-        whole = np.append(place, (tangents[:, None] + n * beside).ravel())
-        index = np.zeros(n * problem.size, dtype=np.int64)
-        index[whole] = np.arange(whole.size)
-        return cls(closed, attracted, felt, turned, aside, kept, turns, place, whole, index)
+    def _find(self, n: int, status: Ints) -> None:
+        """Where among the m components the unknowns are, and what acts with them."""
+        closed, tangents = self.closed, np.arange(1, n)
+        self.felt = (self.sheared - self.gain)[closed]
+        sheared = closed[(status[closed] != STICK) & self.felt[:, 1:].any(axis=1)]
+        beside = np.append(self.turned, np.setdiff1d(sheared, self.turned))
+        held = (n * np.flatnonzero(status == STICK)[:, None] + tangents).ravel()
+        self.place = np.concatenate([n * closed, held, n * self.attracted])
+        self.whole = np.append(self.place, (tangents[:, None] + n * beside).ravel())
+        self.index = np.zeros(n * status.size, dtype=np.int64)
+        self.index[self.whole] = np.arange(self.whole.size)
 
     def columns(self, C: Floats) -> Floats:
-        """Their effect (q, u) from that of the `whole` (q, w), which is overwritten."""
-        n, size = self.felt.shape[1], self.place.size
-        first = C[:, : self.closed.size]
+        """Effect of the unknowns (q, u) from that of the `whole` (q, w), which is overwritten."""
+        n, first = self.felt.shape[1], C[:, : self.closed.size]
         if (self.felt[:, 0] != 1.0).any():
             first *= self.felt[:, 0]
         for a in range(1, n):
             if (some := np.flatnonzero(self.felt[:, a])).size:
                 first[:, some] += C[:, self.index[n * self.closed[some] + a]] * self.felt[some, a]
-        return self._across(C.T, self.aside).T if self.turned.size else C[:, :size]
+        return self._across(C.T, self.aside).T
 
     def rows(self, v: Floats) -> Floats:
-        """Their equations' part (u, q) from gaps and slips of the `whole` (w, q), which are overwritten."""
-        return self._across(v, self.turns[:, None] * self.aside) if self.turned.size else v[: self.place.size]
+        """The equations' part (u, q) of gaps and slips of the `whole` (w, q), which are overwritten."""
+        return self._across(v, self.turns[:, None] * self.aside)
 
     def _across(self, v: Floats, weight: Floats) -> Floats:
         """v (w, q) with the tangential components of turned nodes as one, by a `weight` (t, 2) of each."""
-        n, size, end = self.felt.shape[1], self.place.size, self.place.size + self.turned.size
-        v[size:end] *= weight[:, :1]
-        v[size:end] += v[self.index[n * self.turned + 2]] * weight[:, 1:]
+        size, end = self.place.size, self.place.size + self.turned.size
+        if self.turned.size:
+            v[size:end] *= weight[:, :1]
+            v[size:end] += v[self.index[self.felt.shape[1] * self.turned + 2]] * weight[:, 1:]
         return v[:end]
-
-
-@dataclass(frozen=True, eq=False)
-class _Known:
-    """Per node, (k, 1 + d): the force of a closed one that presses with 1, what attraction that adds
-    (`gain`), and the drops and shear forces that no unknown changes.
-    """
-
-    sheared: Floats
-    gain: Floats
-    drop: Floats
-    shear: Floats
-
-    @classmethod
-    def of(cls, problem: ContactProblem, status: Ints, along: Floats) -> _Known:
-        k, attraction, opened = problem.size, problem.attraction, (status == OPEN)[:, None]
-        along = np.where((status >= SLIP)[:, None], along, 0.0)
-        sheared = np.hstack([np.ones((k, 1)), problem.friction[:, None] * along])
-        gain, drop, shear = np.zeros_like(sheared), np.zeros_like(sheared), np.zeros_like(sheared)
-        if problem.cohesion is not None:
-            shear[:, 1:] = problem.cohesion[:, None] * along
-        if attraction is None:
-            return cls(sheared, gain, drop, shear)
-        drop[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
-        if (rough := attraction.roughness) is not None:
-            gain = rough.gain
-            drop += np.where(opened, rough.loss_on_opening, gain * rough.present[:, None])
-        return cls(sheared, gain, drop, shear)
 
 
 def solve_statuses(
@@ -385,17 +360,15 @@ def solve_statuses(
 
     with m given as `turning` (k,); at the solution r drops out.
     """
-    k, n, extra = problem.size, problem.dim, problem.extra_unknowns
-    known = _Known.of(problem, status, along)
-    unknowns = _Unknowns.of(problem, known, status, None if turning is None else (along, turning))
-    place, closed, attracted, whole = unknowns.place, unknowns.closed, unknowns.attracted, unknowns.whole
-    steady = (known.drop + known.shear).ravel()
+    extra, system = problem.extra_unknowns, _Equations(problem, status, along, turning)
+    place, closed, attracted, whole = system.place, system.closed, system.attracted, system.whole
+    steady = (system.drop + system.shear).ravel()
     start = problem.start + problem.compliance @ steady if steady.any() else problem.start
-    right = -unknowns.rows(start[whole, None])
-    matrix = unknowns.rows(unknowns.columns(problem.compliance[np.ix_(whole, whole)]))
+    right = -system.rows(start[whole, None])
+    matrix = system.rows(system.columns(problem.compliance[np.ix_(whole, whole)]))
     pressed, own = np.split(np.arange(place.size), [place.size - attracted.size])
     last = np.arange(place.size, len(right))
-    matrix[last, last] += unknowns.kept
+    matrix[last, last] += system.kept
     if problem.give is not None:
         matrix[pressed, pressed] += problem.give[place[pressed]]
     if attracted.size:
@@ -406,16 +379,16 @@ def solve_statuses(
     if extra is None:
         x, d = problem.dense.solve(matrix, right, names)[:, 0], np.zeros(0)
     else:
-        balance, rest = unknowns.columns(extra.rows[:, whole]), extra.right - extra.rows @ steady
-        right = np.hstack([right, unknowns.rows(extra.columns[whole])])
+        balance, rest = system.columns(extra.rows[:, whole]), extra.right - extra.rows @ steady
+        right = np.hstack([right, system.rows(extra.columns[whole])])
         both = problem.dense.solve(matrix, right, names)
         d = np.linalg.solve(extra.pivot - balance @ both[:, 1:], rest - balance @ both[:, 0])
         x = both[:, 0] - both[:, 1:] @ d
-    pressing = np.zeros((k, 1))
+    pressing = np.zeros((problem.size, 1))
     pressing[closed, 0] = x[: closed.size]
-    force, drop = known.shear + pressing * known.sheared, known.drop - pressing * known.gain
+    force, drop = system.shear + pressing * system.sheared, system.drop - pressing * system.gain
     force.ravel()[place[closed.size : pressed.size]] = x[closed.size : pressed.size]
-    force[unknowns.turned, 1:] += x[last, None] * unknowns.aside.reshape(-1, n - 1)
+    force[system.turned, 1:] += x[last, None] * system.aside
     drop[attracted, 0] += x[own]
     return Forces(force.ravel(), drop.ravel(), d)
 

@@ -21,22 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    CANDIDATE_GROWTH,
-    CANDIDATE_ROUNDS,
-    INNER,
-    KILOVOLT,
-    LARGEST_BONE_INCREMENT,
-    REACH,
-    ROUNDING,
-    SHORTEST_FRACTION,
-    SMALLEST_FORCE,
-    SMALLEST_J,
-    TURNED,
-)
+from evfem.common import constants
+from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
-from evfem.contact.condensed import CandidatesBed, ExtraUnknown, LinearContactStep, StepSolution
+from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import PadState
@@ -81,7 +69,7 @@ class FactorisedBody:
         self.linearisation = Linearisation(body, interface, attraction, limits)
         self.pressure = Pressure(body.tissue, self.linearisation)
         self.record = self.linearisation.record
-        longest = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
+        longest = constants.LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
         self._renewed = False
@@ -94,7 +82,7 @@ class FactorisedBody:
         self.linearisation.begin(old, frozen)
         state = replace(self._first_guess(start, target), pressure=self.pressure.begin(start.u))
         travel = abs(target.bone(old.bone)[1] - old.bone[1])
-        self.linearisation.choose_candidates(state, REACH * travel)
+        self.linearisation.choose_candidates(state, constants.REACH * travel)
         self.linearisation.start_clock(old, target.duration)
         self._anderson.reset()
         self._renewed = False
@@ -115,11 +103,11 @@ class FactorisedBody:
         last, ahead = state.last_increment[node], target.increment(state.bone)
         axis = int(np.argmax(np.abs(ahead)))
         # where the bone turns off, its last increment along the new way is rounding of either sign
-        if ahead[axis] * last[axis] <= TURNED * ahead[axis] ** 2:
+        if ahead[axis] * last[axis] <= constants.TURNED * ahead[axis] ** 2:
             return state
         fraction = min(float(ahead[axis] / last[axis]), self.limits.strategy.reach)
         u = state.u + fraction * state.last_increment
-        if not self.body.tissue.smallest_J(u) > SMALLEST_J:
+        if not self.body.tissue.smallest_J(u) > constants.SMALLEST_J:
             return state
         return replace(state, u=u, bone=u[node].copy())
 
@@ -149,7 +137,7 @@ class FactorisedBody:
         """The largest of the out-of-balance forces (n,), relative to the reaction in them."""
         reaction = forces[self.body.bone]
         rounding = self._rounding(state) / self.limits.tolerance
-        largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
+        largest = max(np.abs(reaction).max(), constants.SMALLEST_FORCE, rounding)
         dim = state.bone.size
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
@@ -205,19 +193,19 @@ class FactorisedBody:
     def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
         """Whether a combination turns cells inside out, or takes away a bone that nothing holds."""
         travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
-        return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J
+        return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > constants.SMALLEST_J
 
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
         """The next iterate; nodes that sank in become candidates, many of them start the way again."""
         if not self.interface.follows:
             return after
-        for _ in range(CANDIDATE_ROUNDS):
+        for _ in range(constants.CANDIDATE_ROUNDS):
             known = self.linearisation.candidates.size
             gap = self.interface.shallowest_penetration(after)
             if gap is None:
                 break
             self.add_candidates(after, gap)
-            if self.linearisation.candidates.size < CANDIDATE_GROWTH * known:
+            if self.linearisation.candidates.size < constants.CANDIDATE_GROWTH * known:
                 break
             self.linearisation.factorise(state)
             self._anderson.reset()
@@ -249,23 +237,17 @@ class FactorisedBody:
         known = self.interface.candidates(old, state, c, weakening, gain)
         if rough is not None:
             known = replace(known, roughness=rough.of(c))
+        # as exact as the iterate is worth, where contact takes many solves
+        inner = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
         return LinearContactStep(
             body=linearisation.tangent,
             candidates=known,
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
             unknowns=self._unknowns(state, target),
-            bed=self._bed(state, c),
-            tolerance=max(ROUNDING, INNER * self.record.residuals[-1]) if self.interface.follows else ROUNDING,
+            bed=None if self.interface.bed is None else self.interface.bed_of(state, c),
+            tolerance=max(constants.ROUNDING, inner),
         )
-
-    def _bed(self, state: State, c: Ints) -> CandidatesBed | None:
-        """The elastic surface below the candidates c, if there is one."""
-        if self.interface.bed is None:
-            return None
-        below = self.interface.below(state)
-        pulled = (below.given(state.attraction) - state.given)[c]
-        return CandidatesBed(below.among(c), pulled.ravel())
 
     def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
         """Travels of the bone that are not given: first along y, then along x[, z]."""
@@ -299,7 +281,7 @@ class FactorisedBody:
             still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
             return row, still, own
 
-        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.unit)
+        squared, unit = (state.voltage / constants.KILOVOLT) ** 2, lambda: pushed(pad.unit)
         return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
@@ -335,9 +317,9 @@ class FactorisedBody:
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:
         """Largest fraction 1, 1/2, 1/4 ... of an update that keeps every sampled volume."""
         fraction = 1.0
-        while not self.body.tissue.smallest_J(u + fraction * delta) > SMALLEST_J:
+        while not self.body.tissue.smallest_J(u + fraction * delta) > constants.SMALLEST_J:
             fraction *= 0.5
-            if fraction < SHORTEST_FRACTION:
+            if fraction < constants.SHORTEST_FRACTION:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
 
@@ -402,7 +384,7 @@ class FactorisedBody:
 
     def discard(self) -> None:
         """Drop the factorisation, so that the next step starts from a fresh one."""
-        self.linearisation.discard()
+        self.linearisation.factor = None
 
     def findings(self, state: State, balance: Balance) -> str:
         """The largest out-of-balance forces, the state of contact and the smallest volume ratio."""

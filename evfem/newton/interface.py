@@ -16,17 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    CHANGES,
-    NEIGHBOURS,
-    PIN_OFFSET,
-    SHORT_RAMP,
-    SHORTEST_LENGTH,
-    SMALLEST_FORCE,
-)
 from evfem.contact.bed import Bed, Yielding
-from evfem.contact.condensed import COMPONENTS, Candidates
+from evfem.contact.condensed import COMPONENTS, Candidates, CandidatesBed
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.contact.slipping import OscillatingNodes
 from evfem.newton.state import State
@@ -81,7 +74,7 @@ class FrictionJumps:
             side = self._sides(steps, place)
             moved = touching & (side != self._side[number]) & ~self._released
             self._changes[number] += moved
-            new = np.flatnonzero(moved & (self._changes[number] >= CHANGES) & ~self.held)
+            new = np.flatnonzero(moved & (self._changes[number] >= constants.CHANGES) & ~self.held)
             self._hold(steps, new, np.maximum(side, self._side[number])[new] - 1, place)
             self._side[number] = side
 
@@ -93,7 +86,7 @@ class FrictionJumps:
         crossed = begin + way * ((steps.place[which] - begin[:, axis]) / whole)[:, None]
         across = crossed[:, 1 - axis] if crossed.shape[1] > 1 else np.zeros(new.size)
         before, behind = steps.sides(which, across)
-        inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
+        inside = np.where(behind > before, constants.PIN_OFFSET, -constants.PIN_OFFSET)
         crossed[:, axis] = steps.place[which] + inside
         from_smoother = (steps.place[which] - begin[:, axis]) * inside > 0.0
         new = new[from_smoother]
@@ -136,8 +129,10 @@ class Interface:
         self.follows = self.dim == 3
         self.length = pad.spacing(self.points)
         self._down = pad.facing(self.points)
-        self.jumps = FrictionJumps(surface.friction_steps(SHORT_RAMP * self.length), self.points[:, ::2])
-        elastic, least = getattr(surface, "elastic", None), SHORTEST_LENGTH * self.length
+        self.jumps = FrictionJumps(
+            surface.friction_steps(constants.SHORT_RAMP * self.length), self.points[:, ::2]
+        )
+        elastic, least = getattr(surface, "elastic", None), constants.SHORTEST_LENGTH * self.length
         self.bed: Bed | None = None
         if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
             self.bed = Bed(elastic, pad, self.length, least)
@@ -145,7 +140,7 @@ class Interface:
         self.restored: Restored = nothing_restored
         self._oscillating = OscillatingNodes(pad.nodes.size)
         self.duration = 0.0
-        self.neighbourhood = NEIGHBOURS * self.length
+        self.neighbourhood = constants.NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
@@ -182,6 +177,11 @@ class Interface:
         assert self.bed is not None
         position = self.positions(state.u)
         return self.bed.below(self.places(state), surface_state(self.surface, position).gap)
+
+    def bed_of(self, state: State, c: Ints) -> CandidatesBed:
+        """The same below the candidates c."""
+        below = self.below(state)
+        return CandidatesBed(below.among(c), (below.given(state.attraction) - state.given)[c].ravel())
 
     def tilted(self, state: State, force: Floats) -> Floats:
         """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
@@ -295,7 +295,7 @@ class Interface:
 
     def tributary_of(self, position: Floats) -> Floats:
         """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
-        least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
+        least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
         return np.maximum(self.pad.tributary(position), least)
 
     def tributary(self, state: State) -> Floats:
@@ -324,8 +324,7 @@ class Interface:
         (P,).
         """
         old, new = part
-        nodes = np.arange(len(place))
-        mu = self.friction(old, nodes, place)
+        mu = self.friction(old, nodes := np.arange(len(place)), place)
         if self.law is None:
             return np.asarray(mu * normal)
         nodal = self.slipping(old, new, nodes, mu, slip)
@@ -335,11 +334,14 @@ class Interface:
         """Bounds of friction (P,) in N/mm of the pad nodes of `state` at places (P, d), slipping by `way`
         (P,).
         """
-        nodes = np.arange(len(place))
-        mu = self.friction(old, nodes, place)
+        mu = self.friction(old, nodes := np.arange(len(place)), place)
+        return self._bound(old, state, nodes, mu, way)
+
+    def _bound(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
+        """The same of some nodes (k,) with the coefficients mu (k,), slipping by (k,)."""
         if self.law is None:
-            return np.asarray(mu * state.contact_force[:, 0])
-        return self.slipping(old, state, nodes, mu, way).bound(self.law)
+            return np.asarray(mu * state.contact_force[nodes, 0])
+        return self.slipping(old, state, nodes, mu, slip).bound(self.law)
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
@@ -368,20 +370,20 @@ class Interface:
         pinned = self.friction(old, nodes, self.jumps.at(place))
         here, slips = self.friction(old, nodes, place), state.status >= FORWARD
         yielded = sizes(place - self.jumps.at(place)) > self.tolerance * self.length
-        beyond = sizes(state.contact_force[:, 1:]) > self._resting_limit(old, state, here) + self._weak(state)
+        resting = self._bound(old, state, nodes, here, np.zeros(nodes.size))
+        beyond = sizes(state.contact_force[:, 1:]) > resting + self._weak(state)
         return self.jumps.held & (pinned != here) & (slips | (yielded & beyond))
 
     def _weak(self, state: State) -> float:
         """Forces (N/mm) below which a law of contact or friction holds."""
-        return self.tolerance * max(float(np.abs(state.contact_force).max()), SMALLEST_FORCE)
+        return self.tolerance * max(float(np.abs(state.contact_force).max()), constants.SMALLEST_FORCE)
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
         place, surface = self.on_display(state), self.surface_at(state)
-        short = self.tolerance * self.length
-        active = state.status != OPEN
-        weak = self._weak(state)
-        lower = self._resting_limit(old, state, self.jumps.lower)
+        short, weak, active = self.tolerance * self.length, self._weak(state), state.status != OPEN
+        every, resting = np.arange(len(place)), np.zeros(len(place))
+        lower = self._bound(old, state, every, self.jumps.lower, resting)
         if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
         if self.jumps.let_go(self._strayed(old, state, place)):
@@ -391,10 +393,8 @@ class Interface:
         slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
         status, nodes = state.status[active], np.flatnonzero(active)
         way, size = sizes(slip), sizes(shear)
-        limit = (mu := self.friction(old, nodes, self.jumps.at(place)[active])) * normal
-        if self.law is not None:
-            moving = np.where(status == STICK, 0.0, way)
-            limit = self.slipping(old, state, nodes, mu, moving).bound(self.law)
+        mu = self.friction(old, nodes, self.jumps.at(place)[active])
+        limit = self._bound(old, state, nodes, mu, np.where(status == STICK, 0.0, way))
         sticks = (way <= short) & (size <= limit + weak)
         # a slip is known to `short`, and its direction accordingly
         against = sizes(shear + (limit / np.maximum(way, 1e-300))[:, None] * slip)
@@ -403,12 +403,6 @@ class Interface:
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & np.where(status == STICK, sticks, slips)).all())
-
-    def _resting_limit(self, old: State, state: State, mu: Floats) -> Floats:
-        """Shear forces (P,) that hold pad nodes with the coefficients mu (P,)."""
-        if self.law is None:
-            return np.asarray(mu * state.contact_force[:, 0])
-        return self.slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
 
 
 class PenaltyInterface(Interface):
