@@ -83,7 +83,5 @@ class WithAdhesion(Attraction):
         )
         return np.asarray(sum(each))
 
-    def stiffness(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Any:
+    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
         return sum(part.stiffness(position, at, touching, pressing) for part, at in self._parts(voltage))

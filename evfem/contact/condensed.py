@@ -1,10 +1,8 @@
 r"""The linearised body condensed onto its contact candidates, and the contact problem on that compliance.
 
-The compliance :math:`C = S_{cc}^{-1}` (`evfem.solver`) is kept with the factorisation.
-On a curved profile the contact force turns with the node, a follower force:
-:math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes
-in every iteration but touches only the nodes near contact, so it is put into their small block alone
-(`evfem.contact.follower`). On a relief over x and z it turns with both (`evfem.surface.pad.SurfaceState`).
+The compliance :math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved surface contact forces turn
+with the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`. That changes in
+every iteration, and is put into the small block of the nodes near contact alone (`evfem.contact.follower`).
 
 Algorithm (`LinearContactStep.solve`)::
 
@@ -29,8 +27,6 @@ from evfem.common.arrays import DenseSolver, Floats, Ints, inverse
 from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
-    BACKWARD,
-    FORWARD,
     OPEN,
     SLIP,
     AttractionStiffness,
@@ -40,6 +36,7 @@ from evfem.contact.signorini import (
     ExtraUnknowns,
     Roughness,
     Unstable,
+    side,
 )
 from evfem.contact.solve import solve_with_attraction
 from evfem.surface.pad import SurfaceState
@@ -86,7 +83,7 @@ class Candidates:
     def shear_direction(self) -> Floats:
         """Unit vectors (c, d) of the friction of slipping nodes, 0 of others."""
         if self.force.shape[1] == 2:
-            return np.subtract(self.status == BACKWARD, self.status == FORWARD, dtype=float)[:, None]
+            return side(self.status)
         shear = np.hypot(*self.force[:, 1:].T)
         slips = (self.status == SLIP) & (shear > 0.0)
         return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
@@ -105,11 +102,8 @@ class Candidates:
 
     def friction_growth(self, own: Floats) -> Floats:
         """That part of it which is friction: change of the shear force (a) per displacement of the node along
-        x[, z] (j), (c, d, d).
-
-        `own` (c, d) are each node's compliances along them. Where friction falls faster than the tissue
-        stiffens, a node snaps forward: its friction stays at the present coefficient. Friction that rises
-        along the way holds in any case.
+        x[, z] (j), (c, d, d). Where it falls faster than the tissue stiffens, a node snaps forward: its
+        friction stays at the present coefficient.
         """
         way = self.shear_direction
         growth = way[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
@@ -151,7 +145,9 @@ class CandidatesBed:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """Condensed tangent on (candidates, bone x, y[, z]) and compliance of the candidates, with attraction."""
+    """Condensed tangent on (candidates, bone x, y[, z]) and compliance of the candidates, with attraction;
+    `dense` solves what is asked of it.
+    """
 
     schur: Floats
     compliance: Floats
@@ -217,11 +213,8 @@ class ExtraUnknown:
 
 @dataclass(frozen=True, eq=False)
 class LinearContactStep:
-    """One linear step of the condensed body: contact is solved on it, and the candidates'
-    displacement comes back.
-
-    `residual` g (m,) of the forward solve; `bone` (dim,) the bone's known increment; `unknowns` what
-    else moves the body; `tolerance` as in `ContactProblem`.
+    """One linear step of the condensed body: `residual` g (m,) of the forward solve, the bone's known increment
+    (dim,), the `unknowns` that also move the body, and the `tolerance` of `ContactProblem`.
     """
 
     body: CondensedTangent
@@ -257,7 +250,8 @@ class LinearContactStep:
             found, pushed = self._solve_near(near, free, alone, status[near])
             solves += found.solves
             status[near] = found.status
-            whole = self._whole(near, pushed)
+            whole = np.zeros(free.shape[0])
+            whole[self.body.rows(near)] = pushed
             moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
             gap = normal_gap + self._along_normal(moved)
             gap[near] = 0.0  # the dense problem has settled theirs
@@ -318,21 +312,14 @@ class LinearContactStep:
         force = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.surface.axes)
         return force[:, COMPONENTS[: self.body.dim]].ravel()
 
-    def _whole(self, near: Ints, pushed: Floats) -> Floats:
-        """Forces on all candidates (dim c,), of those on the near ones in `CondensedTangent.rows`."""
-        force = np.zeros(self.body.dim * self.candidates.status.size)
-        force[self.body.rows(near)] = pushed
-        return force
-
     def _solve_near(
         self, near: Ints, free: Floats, alone: Floats, status: Ints
     ) -> tuple[ContactSolution, Floats]:
         """Contact among the `near` nodes, by how they move `free` of contact forces, and the body `alone`:
-        solution in their frames, and the forces (dim k,) that move the
-        body, those of the follower stiffness included.
+        solution in their frames, and the forces (dim k,) on the body, those of the follower stiffness too.
 
-        What moves beyond the present forces `held` is small near the equilibrium: a steep stiffness, of
-        friction that rises with the speed for example, multiplies that and not the whole free motion.
+        That stiffness may be steep: it multiplies what moves beyond the present forces `held`, which is small
+        near the equilibrium, and not the whole free motion.
         """
         known, rows, dim = self.candidates, self.body.rows(near), self.body.dim
         follower = FollowerStiffness.of(known.follower_rate(self._own)[near])
@@ -400,9 +387,8 @@ class LinearContactStep:
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Equations of the p unknowns: what displacements (p, m) and unknowns (p, p) add, their right-hand
-        sides (p,), and what forces on the candidates add (p, m - dim); the bone's balance along their axes,
-        or a condition.
+        """Of the p unknowns, the bone's balance along their axes or a condition: what displacements (p, m) and
+        unknowns (p, p) add, right-hand sides (p,), and what forces on the candidates add (p, m - dim).
         """
         dim = self.body.dim
         S, carried, pushed, residual = (
@@ -418,7 +404,7 @@ class LinearContactStep:
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:
                 S[i], share[i], wanted[i] = condition.row, condition.share, condition.wanted
-                carried[i] = condition.row[: -self.body.dim] @ self.body.compliance
+                carried[i] = condition.row[:-dim] @ self.body.compliance
         return S, share, wanted, carried
 
     def _held(self, pivot: Floats, free: Floats) -> Floats:

@@ -3,25 +3,22 @@ r"""The attraction of the pad from the full field instead of column by column.
 Below the part of the outline that faces the display (its flanks keep the column law) Poisson's problem is
 solved in insulator, air and stratum corneum, in columns that stand at the pad nodes, on quadratic edges
 between them too, and move with them (`evfem.field.columns`). The electrode is at the voltage, living tissue
-at 0; the skin's layer is as thick above each node as it is undeformed. Nodes that touch keep `SERIES_GAP` of
-the insulator's reduced thickness, and what rough faces keep, as a gap in series. Nodal forces are derivatives
-of the discrete energy
+at 0. Nodes that touch keep `SERIES_GAP` of the insulator's reduced thickness, and what rough faces keep, as a
+gap in series. Nodal forces are derivatives of the discrete energy
 
-.. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)},
+.. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)}.
 
-with tangential parts. The outer iteration of a step takes them as they are; its tangent is that of
-the column law, which they are close to, so contact, friction and controls know nothing of the
-field; between rough faces it is scaled by the ratio of the forces (`tangent_factor`).
-Where that tangent leads nowhere, among ridges or steep waves close to a thin insulator, it is
-replaced by the field's own (`fringe_stiffness`), by differences: a node's field decays within a few
-nodes, so every `APART`-th one is moved at once, and the potential follows with the factor of
-where it began (`Columns.nearby`). In every accepted state C lies between its bounds (`certificate`).
+The tangent of a step is that of the column law, between rough faces scaled by the ratio of the forces
+(`tangent_factor`). Where it leads nowhere, among ridges or steep waves close to a thin insulator, it is the
+field's own by differences (`fringe_stiffness`): a node's field decays within a few nodes, so every
+`APART`-th one is moved at once, and the potential follows with the factor of where it began
+(`Columns.nearby`). In every accepted state C lies between its bounds (`certificate`).
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -147,11 +144,15 @@ class FieldAttraction(Attraction):
         return self.pad
 
     @cached_property
+    def column_law(self) -> Attraction:  # type: ignore[override]
+        """The column law on all edges, for the tangent."""
+        return Attraction(**{each.name: getattr(self, each.name) for each in fields(Attraction)})
+
+    @cached_property
     def flanks(self) -> Attraction:
         """The column law on the other edges."""
         others = np.setdiff1d(np.arange(len(self._plane.edges)), self.edges)
-        pad = replace(self._plane, edges=self._plane.edges[others])
-        return Attraction(self.law, self.layers, pad, self.surface, self.direction, True, self.roughness)
+        return replace(self.column_law, pad=replace(self._plane, edges=self._plane.edges[others]))
 
     @cached_property
     def _lines(self) -> Any:
@@ -159,9 +160,8 @@ class FieldAttraction(Attraction):
         ends = self._plane.edges[self.edges]
         if ends.shape[1] == 2:
             node = np.append(ends[:, 0], ends[-1, 1])
-            return sparse.csr_matrix(
-                (np.ones(node.size), (np.arange(node.size), node)), (node.size, self._size)
-            )
+            every = np.arange(node.size)
+            return sparse.csr_matrix((np.ones(node.size), (every, node)), (node.size, self._size))
         at = np.arange(PARTS) / PARTS
         shapes = np.stack([(1 - at) * (1 - 2 * at), at * (2 * at - 1), 4 * at * (1 - at)], axis=1)
         row = np.repeat(np.arange(PARTS * len(ends)), 3)
@@ -183,7 +183,7 @@ class FieldAttraction(Attraction):
         for k, (position, voltage) in enumerate(zip(positions, voltages.tolist(), strict=True)):
             if voltage != 0.0:
                 own = None if pressing is None else pressing[k]
-                forces[k] += voltage**2 * self._unit_forces(position, own)
+                forces[k] += voltage**2 * self._remembered(position, own)[1]
         return forces
 
     def weights(self, position: Floats) -> Floats:
@@ -193,19 +193,6 @@ class FieldAttraction(Attraction):
         own = lines.T @ (np.append(half, 0.0) + np.append(0.0, half))
         return np.asarray(own + self.flanks.pad.tributary(position))
 
-    def column_forces(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """The column law's forces (P, 2), for the tangent."""
-        pressed = None if pressing is None else pressing[None]
-        return self.way_forces(position[None], np.array([voltage]), touching, pressed)[0]
-
-    def way_forces(
-        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """The column law's forces (W, P, 2)."""
-        return Attraction.forces_along(self, positions, voltages, touching, pressing)
-
     has_fringes = True
     rounding = FIELD_ROUNDING
 
@@ -214,18 +201,13 @@ class FieldAttraction(Attraction):
         """Without rough faces, whose gap depends on the contact forces."""
         return self.roughness is None
 
-    def tangent_factor(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """Factor (P,) of the column law's derivatives: the squared share of the voltage below a node.
-
-        Between rough faces it is the ratio of the field's force to the columns', at most 1: on a summit the
-        field pulls less, and gains less. Without them a field may pull less and yet weaken faster with the
-        gap.
+    def tangent_factor(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
+        """Factor (P,) of the column law's derivatives: the squared share of the voltage below a node, between
+        rough faces the ratio of the field's force to the columns', at most 1: on a summit it gains less.
         """
         if self.roughness is None:
             return self.share(position[:, 0]) ** 2
-        columns = self.column_forces(position, voltage, touching, pressing)[:, 1]
+        columns = self.column_law.forces(position, voltage, touching, pressing)[:, 1]
         forces = self.forces(position, voltage, touching, pressing)[:, 1]
         pulled = columns < 0.0
         return np.where(pulled, np.clip(forces / np.where(pulled, columns, 1.0), 0.0, 1.0), 1.0)
@@ -249,21 +231,17 @@ class FieldAttraction(Attraction):
         before, after = self.solve(begin), self.solve(end)
         energy = 0.25 * sum(squared) * (after.value - before.value)
         ends = zip(squared, (begin, end), strict=True)
-        forces = sum(square * self._unit_forces(at, None) for square, at in ends)
+        forces = sum(square * self._remembered(at, None)[1] for square, at in ends)
         return energy - 0.5 * float(np.sum(forces * (end - begin)))
 
     def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
-        """The field under the pad at `position` (P, 2); the last solutions are remembered."""
+        """The field under the pad at `position` (P, 2)."""
         found = self._remembered(position, pressing)[0]
         assert found is not None
         return found
 
-    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
-        """Forces (P, 2) of the field at 1 V."""
-        return self._remembered(position, pressing)[1]
-
     def _remembered(self, position: Floats, pressing: Floats | None) -> tuple[Capacitance | None, Floats]:
-        """Field and forces, anew where they are not among the last `KEPT`."""
+        """Field and forces (P, 2) at 1 V, anew where they are not among the last `KEPT`."""
         key = position.tobytes()
         if self.roughness is not None and pressing is not None:
             key += pressing.tobytes()
@@ -279,9 +257,8 @@ class FieldAttraction(Attraction):
     ) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
         x, levels = self.outline(position, lines, pressing)
-        field, forces = self._solved(
-            x, levels, surface_state(self.surface, lines @ position).slope[:, 0], near
-        )
+        slope = surface_state(self.surface, lines @ position).slope[:, 0]
+        field, forces = self._solved(x, levels, slope, near)
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:

@@ -2,10 +2,9 @@ r"""Unilateral contact with Coulomb friction on the dense compliance of the cont
 its laws, and its equations where every node has a status.
 
 A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered
-per node (n, t) or (n, t1, t2). With the contact forces :math:`\lambda` the new gaps and slips are
-:math:`v = (g, s) = v_0 + C\lambda + e\,d`, where d are optional extra unknowns (the bone's travel under a
-prescribed force, the squared voltage under a prescribed friction force) with the equations
-:math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
+per node. With the contact forces :math:`\lambda` the new gaps and slips are
+:math:`v = (g, s) = v_0 + C\lambda + e\,d`, where d are extra unknowns (the bone's travel under a prescribed
+force) with the equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
 
 ======  ==============================  =====================================================
 status  equations                       stays if
@@ -21,16 +20,13 @@ e = z/abs(z), and the direction is an unknown of its own (`solve_statuses`). The
 .. math:: \lambda_n = \max(0, p), \quad \lambda_t = \mathrm{proj}_{\mu\lambda_n}(z), \qquad
           p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
 
-for any positive r; taken is the inverse of the node's own compliance. Where the attraction grows with
-areas that follow the nodes, that may vanish or be negative: r is then bounded by what is usual among the
-nodes, and g = 0 to rounding stays a small p.
+for any positive r; taken is the inverse of the node's own compliance, bounded by what is usual among the
+nodes where it vanishes or is negative.
 
-The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
-has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
-none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
-only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
-closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
-gained. For the tangent of a concave law one of the two statuses is always consistent.
+The attraction of an open node weakens with its gap, a negative stiffness k_e: its drop is one more unknown,
+f = k_e (g - g_ref). A closed node needs none, as its gap is known. Between rough faces the attraction also
+grows with what presses the node (`Roughness`): a closed node moves the body with (1 - kappa) lam_n, and one
+that opens loses what its contact force gained.
 
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
@@ -81,10 +77,9 @@ class AttractionStiffness:
 
 
 def feedback(compliance: Floats, held_by: Floats, gaps: Ints, held: Ints, stiffness: Floats) -> float:
-    """Largest factor by which the attraction of open nodes returns to itself: from 1 on they snap.
-
-    Their `gaps` (m,) are rows of the compliance, and the attraction weakens with them by `stiffness`
-    (m,). The rows `held` (h,) of closed nodes do not move; `held_by` is the compliance to their forces.
+    """Largest factor by which the attraction of open nodes returns to itself, from 1 on they snap: it weakens
+    with their `gaps` (m,), rows of the compliance, by `stiffness` (m,). The rows `held` (h,) of closed nodes
+    do not move; `held_by` is the compliance to their forces.
     """
     if not gaps.size:
         return 0.0
@@ -274,6 +269,11 @@ class Projected:
         return cls(p, z, status, np.abs(wanted - force).max(axis=1) / scale)
 
 
+def side(status: Ints) -> Floats:
+    """Side (k, 1) along which friction acts in the plane, against the slip; 0 where nothing slips."""
+    return np.subtract(status == BACKWARD, status == FORWARD, dtype=float)[:, None]
+
+
 def sizes(vectors: Floats) -> Floats:
     """Lengths (k,) of vectors (k, d) in the plane of contact."""
     return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1] if vectors.shape[1] > 1 else 0.0))
@@ -396,8 +396,7 @@ def solve_statuses(
 def linearised(problem: ContactProblem, found: Projected) -> Forces:
     """The forces that solve the equations linearised where the laws were projected."""
     if problem.dim == 2:
-        against = np.subtract(found.status == BACKWARD, found.status == FORWARD, dtype=float)
-        return solve_statuses(problem, found.status, against[:, None])
+        return solve_statuses(problem, found.status, side(found.status))
     size = np.maximum(sizes(found.z), 1e-200)
     limit = np.where(found.status == SLIP, np.maximum(problem.limit(found.p), 0.0), 0.0)
     return solve_statuses(problem, found.status, found.z / size[:, None], np.minimum(1.0, limit / size))

@@ -11,12 +11,9 @@ Newton's method on the laws as projections, a primal-dual active set::
         change all violated nodes; from the first statuses on that have been met before, the worst one
             alone; give up where these go round in a circle
 
-No constant has to be chosen. What has not converged is never used. In three dimensions it begins again from
-what the laws make of the last iteration's forces after the motion, then with the nodes that touched, and
-with all nodes, sticking: slips found by chance may drive it about, but nothing changes for nodes that stick.
-
-If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no solution, or
-the wrong one; its negative stiffness is then scaled to 0.9 of the critical value (`solve_with_attraction`).
+What has not converged is never used. In three dimensions it begins again from what the laws make of the last
+iteration's forces after the motion, then with the nodes that touched, and with all nodes, sticking: slips
+found by chance may drive it about, but nothing changes for nodes that stick.
 
 The projections' sources are in `evfem.contact.signorini`; primal-dual active set: S. Hueeber, G. Stadler,
 B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
@@ -121,12 +118,10 @@ def solve_with_attraction(
 ) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted, started from statuses (k,) and forces (m,).
 
-    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
-    linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
-    `STABLE` of the critical value, which gives small steps in the right direction: the critical value
-    with the closed nodes fixed, then with those fixed that no longer change, at last with all nodes
-    free. Friction is linearised by tangents first, then by chords: the tangent of a law that levels
-    off soon may be so steep that there is no solution.
+    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), its negative
+    stiffness is scaled to `STABLE` of the critical value, which gives small steps in the right direction:
+    with the closed nodes fixed, then those that no longer change, at last none. Friction is linearised by
+    tangents first, then by chords: the tangent of a law that levels off soon may be too steep.
     """
     laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:

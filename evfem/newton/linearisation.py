@@ -249,7 +249,7 @@ class Linearisation:
         # gaps now, and with every node in contact
         places = [self.interface.resting(s) for s in (state, everywhere)]
         at = (state.voltage, self.touching, state.contact_force[:, 0])
-        now, closed = (attraction.column_forces(place, *at)[:, 1] for place in places)
+        now, closed = (attraction.column_law.forces(place, *at)[:, 1] for place in places)
         return np.asarray(attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
@@ -261,7 +261,7 @@ class Linearisation:
             return None
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         unpressed, pressed = (
-            attraction.column_forces(place, state.voltage, self.touching, each)[:, 1]
+            attraction.column_law.forces(place, state.voltage, self.touching, each)[:, 1]
             for each in (None, pressing)
         )
         factor = attraction.tangent_factor(place, state.voltage, self.touching, pressing)

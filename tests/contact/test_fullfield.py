@@ -411,7 +411,7 @@ def test_harmonics_of_a_square_wave_add_up():
     given = {"edges": facing(pad, points), "skin": skin, "harmonics": attraction.harmonics}
     flat = type(attraction)(*of, pad, surface, "normal", **given)
     pulls = [forces[:, 1].sum() for forces in (flat.forces(points, 50.0, None),
-                                               flat.column_forces(points, 50.0, None))]  # fmt: skip
+                                               flat.column_law.forces(points, 50.0, None))]  # fmt: skip
     assert pulls[0] == pytest.approx(pulls[1], rel=1e-3)
 
 
