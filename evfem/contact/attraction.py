@@ -192,8 +192,8 @@ class Attraction:
     def negative_stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """Decrease of a node's attraction with its vertical gap, -dp/dg A (P,) in N/mm per mm; 0 where contact
-        holds the gap, and where losses make it grow with the gap, which stabilises.
+        """Decrease of a node's attraction with its vertical gap, -dp/dg A (P,) in N/mm per mm; 0 where
+        contact holds the gap, and where losses make it grow with the gap, which stabilises.
         """
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)

@@ -1,8 +1,9 @@
 r"""The linearised body condensed onto its contact candidates, and the contact problem on that compliance.
 
 The compliance :math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved surface contact forces turn
-with the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`. That changes in
-every iteration, and is put into the small block of the nodes near contact alone (`evfem.contact.follower`).
+with the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`. That
+changes in every iteration, and is put into the small block of the nodes near contact alone
+(`evfem.contact.follower`).
 
 Algorithm (`LinearContactStep.solve`)::
 
@@ -213,8 +214,8 @@ class ExtraUnknown:
 
 @dataclass(frozen=True, eq=False)
 class LinearContactStep:
-    """One linear step of the condensed body: `residual` g (m,) of the forward solve, the bone's known increment
-    (dim,), the `unknowns` that also move the body, and the `tolerance` of `ContactProblem`.
+    """One linear step of the condensed body: `residual` g (m,) of the forward solve, the bone's known
+    increment (dim,), the `unknowns` that also move the body, and the `tolerance` of `ContactProblem`.
     """
 
     body: CondensedTangent
@@ -387,8 +388,8 @@ class LinearContactStep:
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Of the p unknowns, the bone's balance along their axes or a condition: what displacements (p, m) and
-        unknowns (p, p) add, right-hand sides (p,), and what forces on the candidates add (p, m - dim).
+        """Of the p unknowns, the bone's balance along their axes or a condition: what displacements (p, m)
+        and unknowns (p, p) add, right-hand sides (p,), and what forces on the candidates add (p, m - dim).
         """
         dim = self.body.dim
         S, carried, pushed, residual = (

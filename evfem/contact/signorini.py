@@ -1,10 +1,10 @@
 r"""Unilateral contact with Coulomb friction on the dense compliance of the contact candidates: the problem,
 its laws, and its equations where every node has a status.
 
-A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered
-per node. With the contact forces :math:`\lambda` the new gaps and slips are
-:math:`v = (g, s) = v_0 + C\lambda + e\,d`, where d are extra unknowns (the bone's travel under a prescribed
-force) with the equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
+A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered per
+node. With the contact forces :math:`\lambda` the new gaps and slips are :math:`v = (g, s) = v_0 + C\lambda +
+e\,d`, where d are extra unknowns (the bone's travel under a prescribed force) with the equations
+:math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
 
 ======  ==============================  =====================================================
 status  equations                       stays if

@@ -31,17 +31,16 @@ from evfem.surface.ways import Steps
 
 
 class FrictionJumps:
-    """Nodes that a jump of the friction coefficient holds during a step; `place` (P, d) is nan for free ones.
+    """Nodes that a jump of the friction coefficient, along x and in space along z, holds during a step from
+    the places `begin` (P, d); `place` (P, d) is nan for free ones.
 
     A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
-    to the higher limit. At the jump the coefficient has no single value, and iterates alternate between its
-    two sides. Such a node is fixed where its way crosses the jump, `PIN_OFFSET` inside the rougher side,
-    where it sticks with the higher coefficient, and is released below the lower limit. A node that began the
-    step on the rougher side is not held.
+    to the higher limit; iterates alternate between its two sides. Such a node is fixed where its way crosses
+    the jump, `PIN_OFFSET` inside the rougher side, where it sticks with the higher coefficient, and is
+    released below the lower limit. A node that began the step on the rougher side is not held.
     """
 
     def __init__(self, steps: Sequence[Steps], begin: Floats) -> None:
-        """The jumps along x, and in space along z; where the nodes begin (P, d)."""
         self.steps = steps
         self.begin(begin)
 
@@ -104,22 +103,15 @@ class FrictionJumps:
         return bool(loose.any())
 
 
-#: from a voltage (V) to `Attraction.restored`
-Restored = Callable[[float], tuple[Floats, Floats] | None]
-
-
-def nothing_restored(voltage: float) -> None:
-    """From an attraction without a core."""
-
-
 class Interface:
-    """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh.
+    """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh; `restored`, from
+    a voltage (V) to `Attraction.restored`.
 
-    Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where each
-    has three unknowns in a dense compliance, the candidates follow the contact: those that are far by now
-    are dropped.
+    Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where the
+    dense compliance is large, the candidates follow the contact: those that are far by now are dropped.
     """
 
+    restored: Callable[[float], tuple[Floats, Floats] | None] = staticmethod(lambda voltage: None)
     _surfaces: tuple[tuple[Floats, Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
@@ -137,7 +129,6 @@ class Interface:
         if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
             self.bed = Bed(elastic, pad, self.length, least)
         self.law: FrictionLaw | None = None
-        self.restored: Restored = nothing_restored
         self._oscillating = OscillatingNodes(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = constants.NEIGHBOURS * self.length
@@ -161,7 +152,7 @@ class Interface:
         return self.places(state)[:, ::2]
 
     def surface_at(self, state: State) -> SurfaceState:
-        """The surface below the pad nodes, kept for the last two states, which many ask for."""
+        """The surface below the pad nodes, kept for the last two states."""
         for u, given, found in self._surfaces:
             if u is state.u and given is state.given:
                 return found
@@ -198,9 +189,7 @@ class Interface:
         return np.stack([along * (1.0 - shortened) - sunk * up, up], axis=1)
 
     def unyielded(self, state: State, force: Floats) -> float:
-        """By how much, over the tolerances' lengths, what an elastic surface gives way by misses what the
-        forces on the nodes (P, 2) ask for; 0 of a rigid one.
-        """
+        """By how much, relative, an elastic surface misses what forces on the nodes (P, 2) sink it by."""
         if self.bed is None:
             return 0.0
         below = self.below(state)
@@ -304,10 +293,7 @@ class Interface:
 
     def tributary_at(self, part: tuple[State, State], place: Floats) -> Floats:
         """Tributary lengths or areas (P,) at places (P, d) between two states; in space the mean of both."""
-        if self.dim == 2:
-            return self.tributary_of(place)
-        old, new = part
-        return 0.5 * (self.tributary(old) + self.tributary(new))
+        return self.tributary_of(place) if self.dim == 2 else 0.5 * sum(map(self.tributary, part))
 
     def age(self, old: State) -> Floats:
         """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
@@ -315,14 +301,10 @@ class Interface:
 
     def aged(self, old: State, state: State) -> State:
         """The accepted state, with contact times if a law of friction is given."""
-        if self.law is None:
-            return state
-        return replace(state, age=self.age(old))
+        return state if self.law is None else replace(state, age=self.age(old))
 
     def resistance(self, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats) -> Floats:
-        """Largest shear forces of the pad nodes (P,) at places (P, d) under contact forces (P,), slipping by
-        (P,).
-        """
+        """Largest shear forces of the pad nodes (P,) at places (P, d), pressed and slipping by (P,)."""
         old, new = part
         mu = self.friction(old, nodes := np.arange(len(place)), place)
         if self.law is None:
@@ -331,9 +313,7 @@ class Interface:
         return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
 
     def limit(self, old: State, state: State, place: Floats, way: Floats) -> Floats:
-        """Bounds of friction (P,) in N/mm of the pad nodes of `state` at places (P, d), slipping by `way`
-        (P,).
-        """
+        """Bounds of friction (P,) in N/mm of the pad nodes at places (P, d), slipping by `way` (P,)."""
         mu = self.friction(old, nodes := np.arange(len(place)), place)
         return self._bound(old, state, nodes, mu, way)
 
@@ -348,9 +328,8 @@ class Interface:
         return np.zeros_like(old.contact_force)
 
     def friction(self, old: State, nodes: Ints, place: Floats) -> Floats:
-        """Friction coefficient of these pad nodes (k,) at the places (k, d) in mm; `old` is the
-        last accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask
-        for it here; `FrictionJumps` alone takes the coefficients on both sides of a jump from the surface.
+        """Friction coefficient of these pad nodes (k,) at the places (k, d) in mm after the state `old`: the
+        one that contact problem and acceptance ask for.
         """
         return np.broadcast_to(np.asarray(self.surface.friction_at(place), dtype=float), len(place))
 

@@ -28,8 +28,8 @@ NO_CHARGES: Floats = np.zeros((2, 0))
 
 class StepFailed(ArithmeticError):
     """An equilibrium was not found: its `residuals`, the `reason`, `findings` of the last iterate;
-    `unstable`: the tangent was not positive definite. Of a step that was given up, `last` is its first
-    state and its target, `released` whether the body was released there.
+    `unstable`: the tangent was not positive definite. Of a step given up: its first state and target, `last`,
+    `released`.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
@@ -118,9 +118,7 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """Data that the next step reuses: contact candidates (numbers of pad nodes), the point of the
-    factorisation if there is one, and the last time step (s).
-    """
+    """What the next step reuses: candidates (pad nodes), the point of the factorisation, the time step (s)."""
 
     candidates: Ints
     tangent_point: TangentPoint | None
@@ -150,9 +148,8 @@ class Record:
 
 @dataclass(frozen=True)
 class MixedBalance:
-    """Residual of the mixed displacement-pressure problem (`evfem.newton.pressure`): the forces (n,)
-    as the older tangent takes them, the largest of them relative to the reaction, and the pressure of
-    the laws less the iterate's (E, Q) in MPa.
+    """Residual of the mixed problem (`evfem.newton.pressure`): the forces (n,) as the older tangent takes
+    them, the largest relative to the reaction, and the pressure of the laws less the iterate's (E, Q) in MPa.
     """
 
     forces: Floats
@@ -162,8 +159,8 @@ class MixedBalance:
 
 @dataclass(frozen=True)
 class Balance:
-    """Residual of an iterate: out-of-balance forces (n,) of the reduced unknowns in N/mm, the largest
-    relative to the reaction, the attraction (P, 2), and the mixed problem's residual if it is solved.
+    """Residual of an iterate: out-of-balance forces (n,) in N/mm, the largest relative to the reaction, the
+    attraction (P, 2), and the mixed problem's residual if it is solved.
     """
 
     forces: Floats
