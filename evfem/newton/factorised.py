@@ -24,7 +24,7 @@ import numpy as np
 from evfem.common import constants
 from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
-from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
+from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import PadState
@@ -67,13 +67,11 @@ class FactorisedBody:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.size, self.pad = body.space.size, interface.pad
         self.linearisation = Linearisation(body, interface, attraction, limits)
-        self.pressure = Pressure(body.tissue, self.linearisation)
-        self.record = self.linearisation.record
+        self.pressure, self.record = Pressure(body.tissue, self.linearisation), self.linearisation.record
         longest = constants.LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
-        self._renewed = False
-        self._scaled_down = False
+        self._renewed = self._scaled_down = False
 
     # -- a step begins
 
@@ -85,8 +83,7 @@ class FactorisedBody:
         self.linearisation.choose_candidates(state, constants.REACH * travel)
         self.linearisation.start_clock(old, target.duration)
         self._anderson.reset()
-        self._renewed = False
-        self._scaled_down = False
+        self._renewed = self._scaled_down = False
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
@@ -180,20 +177,21 @@ class FactorisedBody:
     def _mixed(self, state: State, after: State, target: Target) -> State:
         """Anderson's combination of `after` with iterates before; `after` if too far. Prescribed: exact."""
         mixed = self._anderson.next_iterate(state, after)
-        if mixed is not after and self._goes_too_far(state, mixed, target):
-            self._anderson.reset()
-            return after
+        if mixed is not after:
+            travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
+            # it may turn cells inside out, or take away a bone that nothing holds
+            if (
+                travel > self.travel.longest
+                or not self.body.tissue.smallest_J(mixed.u) > constants.SMALLEST_J
+            ):
+                self._anderson.reset()
+                return after
         bone = after.bone.copy()
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.voltage.free else after.voltage
         if target.hand is not None:
             bone[::2] = mixed.bone[::2]
         return replace(mixed, bone=bone, voltage=voltage)
-
-    def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
-        """Whether a combination turns cells inside out, or takes away a bone that nothing holds."""
-        travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
-        return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > constants.SMALLEST_J
 
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
         """The next iterate; nodes that sank in become candidates, many of them start the way again."""
@@ -231,31 +229,23 @@ class FactorisedBody:
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
-        linearisation = self.linearisation
+        linearisation, tangent = self.linearisation, self.linearisation.tangent
+        height = target.height.unknowns(tangent, float(state.bone[1]))
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
-        if rough is not None:
-            known = replace(known, roughness=rough.of(c))
+        known = known if rough is None else replace(known, roughness=rough.of(c))
         # as exact as the iterate is worth, where contact takes many solves
         inner = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
         return LinearContactStep(
-            body=linearisation.tangent,
+            body=tangent,
             candidates=known,
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
-            unknowns=self._unknowns(state, target),
+            unknowns=height if target.hand is None else (*height, *target.hand.unknowns(tangent, state.bone)),
             bed=None if self.interface.bed is None else self.interface.bed_of(state, c),
             tolerance=max(constants.ROUNDING, inner),
         )
-
-    def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
-        """Travels of the bone that are not given: first along y, then along x[, z]."""
-        tangent = self.linearisation.tangent
-        height = target.height.unknowns(tangent, float(state.bone[1]))
-        if target.hand is None:
-            return height
-        return (*height, *target.hand.unknowns(tangent, state.bone))
 
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
@@ -304,8 +294,8 @@ class FactorisedBody:
         return after if update.contact.given is None else self._sunk(state, after, update)
 
     def _sunk(self, state: State, after: State, update: Update) -> State:
-        """The iterate `after` with what the elastic surface below gives way by under its forces: below the
-        candidates that of the linear step, which knows how the attraction changed.
+        """The iterate `after` with what the elastic surface gives way by: below the candidates that of the
+        linear step, which knows how the attraction changed.
         """
         below = self.interface.below(state)
         force = self.interface.contact_forces(replace(after, u=state.u)) + state.attraction
@@ -324,8 +314,8 @@ class FactorisedBody:
         return fraction
 
     def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
-        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as
-        the curvature of a profile may jump. None in three dimensions.
+        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as the
+        curvature of a profile may jump. None in three dimensions.
         """
         if state.bone.size == 3:
             return None
@@ -342,10 +332,9 @@ class FactorisedBody:
     # -- a step ends
 
     def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
-        """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by
-        the tangent at hand and by the one there, else None: iterations may converge to such a state from
-        afar. Not tested for tissue in time, in three dimensions, and for the attraction, whose instability
-        the iterations show; a tangent of the tissue that is not positive definite is not detected.
+        """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by the
+        tangent at hand and by the one there, else None: iterations may come to such a state from afar. Not
+        tested in time, in three dimensions, and for the attraction, whose instability the iterations show.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
@@ -372,11 +361,10 @@ class FactorisedBody:
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity, its increment and what branches keep of it."""
-        velocity, increment = self.body.velocity(state.u), state.u - old.u
-        state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
-        rates = self.body.rates(state.u)
-        seconds = self.body.beginning[1] if rates.size else 0.0
-        return replace(state, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
+        body, u, rates = self.body, state.u, self.body.rates(state.u)
+        kept = {"velocity": body.velocity(u), "last_increment": u - old.u, "inner": body.inner(u)}
+        seconds = body.beginning[1] if rates.size else 0.0
+        return replace(state, **kept, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
 
     def add_candidates(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""
