@@ -32,7 +32,7 @@ class DenseSolver:
         self._unknowns: Hashable = None
         self._factors: tuple[Floats, Any, Any] | None = None
 
-    def solve(self, matrix: Floats, right: Floats, unknowns: Hashable = None) -> Floats:
+    def solve(self, matrix: Floats, right: Floats, unknowns: Hashable = None) -> Any:
         """Solution (n, q) of a matrix (n, n) for right-hand sides (n, q), named by its `unknowns`; raises
         `numpy.linalg.LinAlgError` where it is singular.
         """

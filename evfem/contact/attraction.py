@@ -175,9 +175,9 @@ class Attraction:
         """Contact pressure in MPa of the nodes at (..., P, dim)."""
         if pressing is None:
             return np.zeros(position.shape[:-1])
-        share = self.pad.tributary(position)
-        facing = share > 0.0
-        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, share, 1.0), 0.0)
+        length = self.pad.tributary(position)
+        facing = length > 0.0
+        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, length, 1.0), 0.0)
 
     def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
         """Growth of a node's attraction per contact force (P,): the rough faces come closer."""
@@ -213,7 +213,7 @@ class Attraction:
     def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
         """Derivative of `forces` by node positions, sparse (dim P, dim P), ordered (node, component)."""
         size, dim = position.shape
-        frame, ways = surface_state(self.surface, position), np.arange(0, dim, 2)
+        frame, horizontal = surface_state(self.surface, position), np.arange(0, dim, 2)
         on = 1.0 if self.air_layer else touching.astype(float)
         apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
         voltages = self._voltages(apart, voltage, position)
@@ -221,7 +221,7 @@ class Attraction:
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)
-        up, aside = dim * nodes + 1, dim * nodes[:, None] + ways
+        up, aside = dim * nodes + 1, dim * nodes[:, None] + horizontal
         blocks = [
             (up, up, -dp),
             (up[:, None], aside, dp[:, None] * frame.slope),
@@ -232,7 +232,7 @@ class Attraction:
             square = frame.slope[:, :, None] * frame.slope[:, None, :]
             own = w[:, None, None] * frame.curvature - dp[:, None, None] * square
             shared = (p[:, None] * frame.slope)[of] * value[:, None]
-            at = dim * of[:, None] + ways
+            at = dim * of[:, None] + horizontal
             blocks += [
                 (aside, up[:, None], dp[:, None] * frame.slope),
                 (aside[:, :, None], aside[:, None, :], own),

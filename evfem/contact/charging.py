@@ -1,12 +1,9 @@
 """Charges of the pad nodes under a voltage that is resolved in time: internal variables of the attraction.
 
 Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.relaxation`) on its
-tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them. In a step first
-the pad moves with its charges and voltage, r A of each node staying what it is while A changes; then charge
-flows for the seconds of the step while the voltage changes linearly to its new value. The charges at the end
-are a function of gap and voltage; contact and Newton's method need no further unknowns.
-
-The balance of a step, each term from its own integral::
+tributary length A: M = 2 charges, with their polarisations where dielectrics relax. In a step first the pad
+moves with its charges and voltage, then charge flows while the voltage changes linearly to its new value. The
+charges at the end are a function of gap and voltage. Each term of the balance has its own integral::
 
     source work = change of the field energy + leakage + work of the attraction while the pad moves
                   + work of the field on the tributary lengths, which a vertical traction leaves out

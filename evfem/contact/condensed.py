@@ -106,15 +106,17 @@ class Candidates:
         x[, z] (j), (c, d, d). Where it falls faster than the tissue stiffens, a node snaps forward: its
         friction stays at the present coefficient.
         """
-        way = self.shear_direction
-        growth = way[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
-        along = np.any(way, axis=1, keepdims=True)
+        direction = self.shear_direction
+        growth = direction[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
+        along = np.any(direction, axis=1, keepdims=True)
         if self.slip_stiffness is not None:
             # a node that slips is held along its slip, one that sticks either way
-            held = np.where(along[:, :, None], way[:, :, None] * way[:, None, :], np.eye(way.shape[1]))
+            held = np.where(
+                along[:, :, None], direction[:, :, None] * direction[:, None, :], np.eye(direction.shape[1])
+            )
             growth -= self.slip_stiffness[:, None, None] * (held @ self.surface.travel)
         steep = np.trace(growth, axis1=1, axis2=2)
-        gives = np.sum(np.where(along, way**2, 1.0 / way.shape[1]) * own, axis=1)
+        gives = np.sum(np.where(along, direction**2, 1.0 / direction.shape[1]) * own, axis=1)
         kept: Any = (steep < 0.0) | (steep * gives < STABLE)
         return np.asarray(np.where(kept[:, None, None], growth, 0.0))
 
@@ -183,10 +185,12 @@ class CondensedTangent:
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """`row` (m,) times displacements of candidates and bone plus `share` (p,) times unknowns is `wanted`."""
+    """`row` (m,) times displacements of candidates and bone plus `by_unknowns` (p,) times unknowns is
+    `wanted`.
+    """
 
     row: Floats
-    share: Floats
+    by_unknowns: Floats
     wanted: float
 
 
@@ -263,8 +267,8 @@ class LinearContactStep:
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
         # the shear of closed nodes also follows its place within the step, by the slope of their friction
-        way = moved.reshape(-1, self.body.dim)[:, ::2]
-        grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), way)
+        horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
+        grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
         given = None
         if self.bed is not None:
@@ -379,10 +383,10 @@ class LinearContactStep:
         if not self.unknowns:
             return None
         C, W = near
-        S, share, wanted, carried = self.equations
+        S, by_unknowns, wanted, carried = self.equations
         dim, row = self.body.dim, carried[:, rows]
         through = follower.transposed(row)
-        pivot = S[:, :-dim] @ free[:, 1:] + share + through @ W[:, 1:]
+        pivot = S[:, :-dim] @ free[:, 1:] + by_unknowns + through @ W[:, 1:]
         value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0] - through @ W[:, 0]
         return row + through @ C, self._held(pivot, free), value
 
@@ -401,12 +405,12 @@ class LinearContactStep:
                 self.residual[-dim:],
             )
         )
-        share, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
+        by_unknowns, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:
-                S[i], share[i], wanted[i] = condition.row, condition.share, condition.wanted
+                S[i], by_unknowns[i], wanted[i] = condition.row, condition.by_unknowns, condition.wanted
                 carried[i] = condition.row[:-dim] @ self.body.compliance
-        return S, share, wanted, carried
+        return S, by_unknowns, wanted, carried
 
     def _held(self, pivot: Floats, free: Floats) -> Floats:
         """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""

@@ -35,15 +35,15 @@ from evfem.field.bounds import columns_sum, least_upper_sum
 from evfem.field.columns import Capacitance, Columns, Nearby
 from evfem.surface.pad import Pad, surface_state
 
-#: gap of touching nodes, as a share of the insulator's reduced thickness
+#: gap of touching nodes, as a fraction of the insulator's reduced thickness
 SERIES_GAP = 1e-4
 #: outer edges steeper than this, ``|n_y|`` below it, belong to the flanks
 FLANK = 0.3
-#: rows as shares of the layers' heights: fine where insulator and skin meet the air
+#: rows as fractions of the layers' heights: fine where insulator and skin meet the air
 INSULATOR = 1.0 - np.linspace(1.0, 0.0, 5) ** 2
 AIR = np.linspace(0.0, 1.0, 5)
 SKIN = np.linspace(0.0, 1.0, 6) ** 2
-#: share by which a discrete capacitance may miss its bounds
+#: fraction by which a discrete capacitance may miss its bounds
 MARGIN = 1e-3
 #: columns follow an outline up to this slope
 STEEP = 6.0
@@ -79,16 +79,16 @@ def in_sight(places: Floats) -> Ints:
 
 def facing(pad: Pad, points: Floats) -> Ints:
     """Edges (K,), left to right, of the chain below the lowest node's flanks; `points` (P, 2) undeformed."""
-    way = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
+    edge = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
     after = {int(edge[0]): k for k, edge in enumerate(pad.edges)}
     before = {int(edge[1]): k for k, edge in enumerate(pad.edges)}
     start = int(np.argmin(points[pad.edges[:, :2], 1].min(axis=1)))
     chain = [start]
-    while (k := after.get(int(pad.edges[chain[-1], 1]))) is not None and way[k, 0] > 0.0 and k != start:
+    while (k := after.get(int(pad.edges[chain[-1], 1]))) is not None and edge[k, 0] > 0.0 and k != start:
         chain.append(k)
-    while (k := before.get(int(pad.edges[chain[0], 0]))) is not None and way[k, 0] > 0.0 and k != chain[-1]:
+    while (k := before.get(int(pad.edges[chain[0], 0]))) is not None and edge[k, 0] > 0.0 and k != chain[-1]:
         chain.insert(0, k)
-    flat = way[chain, 0] >= FLANK * np.hypot(*way[chain].T)
+    flat = edge[chain, 0] >= FLANK * np.hypot(*edge[chain].T)
     flat[chain.index(start)] = True
     ends = np.flatnonzero(flat)[[0, -1]]
     return np.array(chain[ends[0] : ends[1] + 1])
@@ -144,7 +144,7 @@ class FieldAttraction(Attraction):
         return self.pad
 
     @cached_property
-    def column_law(self) -> Attraction:  # type: ignore[override]
+    def column_law(self) -> Attraction:
         """The column law on all edges, for the tangent."""
         return Attraction(**{each.name: getattr(self, each.name) for each in fields(Attraction)})
 
@@ -178,8 +178,8 @@ class FieldAttraction(Attraction):
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
         """Forces (W, P, 2) at W places of a way, each from its own solution."""
-        share = self.share(positions[..., 0])[..., None]
-        forces = share**2 * self.flanks.forces_along(positions, voltages, touching, pressing)
+        fraction = self.voltage_fraction(positions[..., 0])[..., None]
+        forces = fraction**2 * self.flanks.forces_along(positions, voltages, touching, pressing)
         for k, (position, voltage) in enumerate(zip(positions, voltages.tolist(), strict=True)):
             if voltage != 0.0:
                 own = None if pressing is None else pressing[k]
@@ -202,11 +202,12 @@ class FieldAttraction(Attraction):
         return self.roughness is None
 
     def tangent_factor(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
-        """Factor (P,) of the column law's derivatives: the squared share of the voltage below a node, between
-        rough faces the ratio of the field's force to the columns', at most 1: on a summit it gains less.
+        """Factor (P,) of the column law's derivatives: the squared fraction of the voltage below a node,
+        between rough faces the ratio of the field's force to the columns', at most 1: on a summit it gains
+        less.
         """
         if self.roughness is None:
-            return self.share(position[:, 0]) ** 2
+            return self.voltage_fraction(position[:, 0]) ** 2
         columns = self.column_law.forces(position, voltage, touching, pressing)[:, 1]
         forces = self.forces(position, voltage, touching, pressing)[:, 1]
         pulled = columns < 0.0
@@ -267,14 +268,14 @@ class FieldAttraction(Attraction):
         nodes = in_line(self._plane, self.edges)
         closed, near = frame.gap <= TOUCHING, self._nearby(*self.outline(position, lines, pressing))
         start = self._above(position, lines, pressing, near)[1]
-        ways = np.zeros((2, self._size, 2))
-        ways[0, :, 0] = 1.0
-        ways[0, closed, 1], ways[1, ~closed, 1] = frame.slope[closed, 0], 1.0
+        directions = np.zeros((2, self._size, 2))
+        directions[0, :, 0] = 1.0
+        directions[0, closed, 1], directions[1, ~closed, 1] = frame.slope[closed, 0], 1.0
         triplets = []
         for axis, first in product(range(2), range(min(APART, nodes.size))):
             moved = nodes[first::APART]
             place = position.copy()
-            place[moved] += MOVED * ways[axis, moved]
+            place[moved] += MOVED * directions[axis, moved]
             rate = voltage**2 / MOVED * (self._above(place, lines, pressing, near)[1] - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
@@ -282,8 +283,8 @@ class FieldAttraction(Attraction):
         value, row, column = (np.concatenate(part) for part in zip(*triplets, strict=True))
         size = 2 * self._size
         outer = self.flanks.stiffness(position, voltage, np.ones(self._size, dtype=bool), pressing)
-        share = sparse.diags_array(np.repeat(self.share(position[:, 0]) ** 2, 2))
-        return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(share @ outer)
+        scale = sparse.diags_array(np.repeat(self.voltage_fraction(position[:, 0]) ** 2, 2))
+        return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(scale @ outer)
 
     def _nearby(self, x: Floats, levels: Floats) -> Nearby | None:
         """Start values of the fields of close outlines; None if each is solved anew."""
@@ -303,11 +304,11 @@ class FieldAttraction(Attraction):
         electrodes = getattr(self.surface, "electrodes", None)
         return None if electrodes is None else np.asarray(electrodes, dtype=float)
 
-    def share(self, x: Floats) -> Floats:
-        """Share of the voltage of the electrode below x (...); 0 where there is none."""
+    def voltage_fraction(self, x: Floats) -> Floats:
+        """Fraction of the voltage of the electrode below x (...); 0 where there is none."""
         if self._electrodes is None:
             return np.ones_like(x)
-        over = [np.where((x >= a) & (x <= b), share, 0.0) for a, b, share in self._electrodes]
+        over = [np.where((x >= a) & (x <= b), fraction, 0.0) for a, b, fraction in self._electrodes]
         return np.asarray(sum(over))
 
     @cached_property

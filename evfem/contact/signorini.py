@@ -76,22 +76,6 @@ class AttractionStiffness:
     roughness: Roughness | None = None
 
 
-def feedback(compliance: Floats, held_by: Floats, gaps: Ints, held: Ints, stiffness: Floats) -> float:
-    """Largest factor by which the attraction of open nodes returns to itself, from 1 on they snap: it weakens
-    with their `gaps` (m,), rows of the compliance, by `stiffness` (m,). The rows `held` (h,) of closed nodes
-    do not move; `held_by` is the compliance to their forces.
-    """
-    if not gaps.size:
-        return 0.0
-    free = compliance[np.ix_(gaps, gaps)]
-    if held.size:
-        back = np.linalg.solve(held_by[np.ix_(held, held)], compliance[np.ix_(held, gaps)])
-        free = free - compliance[np.ix_(gaps, held)] @ back
-    root = np.sqrt(stiffness)
-    gain = root[:, None] * free * root
-    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
-
-
 #: of a node; `FORWARD` or `BACKWARD` in the plane where it slips, `SLIP` in three dimensions
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 SLIP = 2
@@ -124,10 +108,10 @@ class ExtraUnknowns:
     conditioned: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
-    def followed(self) -> Floats:
-        """Reduction of the compliance (m, m) by the conditioned components."""
+    def followed(self) -> tuple[Floats, Any]:
+        """Factors (m, c), (c, m) of what the conditioned components take off the compliance."""
         some = self.conditioned
-        return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
+        return self.columns[:, some], np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,10 +291,10 @@ class _Equations:
                 self.gain = rough.gain
                 self.drop += np.where(opened, rough.loss_on_opening, rough.gain * rough.present[:, None])
         turned = np.flatnonzero((status == SLIP) & resists & (turning is not None))
-        share = np.ones(status.size) if turning is None else turning
+        m = np.ones(status.size) if turning is None else turning
         self.attracted, self.turned, self.closed = attracted, turned, np.flatnonzero(status != OPEN)
         self.aside = along[turned, ::-1] * np.array([-1.0, 1.0]) if turned.size else np.zeros((0, n - 1))
-        self.kept, self.turns = 1.0 - share[turned], share[turned] / problem.own[1][turned]
+        self.kept, self.turns = 1.0 - m[turned], m[turned] / problem.own[1][turned]
         self._find(n, status)
 
     def _find(self, n: int, status: Ints) -> None:

@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -42,7 +41,6 @@ from evfem.contact.signorini import (
     ContactSolution,
     Forces,
     Projected,
-    feedback,
     linearised,
 )
 
@@ -159,12 +157,32 @@ def _first(problems: Sequence[ContactProblem], status: Ints, force: Floats | Non
 
 
 def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
-    """`feedback` where the nodes have these statuses (k,)."""
+    """Largest factor by which the attraction of open nodes returns to itself where the nodes have these
+    statuses (k,), from 1 on they snap: it weakens with their gaps, and what is closed does not move.
+    """
     stiffness, opened, n = attraction.negative_stiffness, status == OPEN, problem.dim
-    gaps, stick = np.flatnonzero(opened & (stiffness > 0.0)), np.flatnonzero(status == STICK)
-    held = np.concatenate([n * np.flatnonzero(~opened), *(n * stick + a for a in range(1, n))])
-    taken: Any = 0.0 if problem.extra_unknowns is None else problem.extra_unknowns.followed
-    return feedback(problem.compliance - taken, problem.under_forces - taken, n * gaps, held, stiffness[gaps])
+    pulled, stick = np.flatnonzero(opened & (stiffness > 0.0)), np.flatnonzero(status == STICK)
+    if not pulled.size:
+        return 0.0
+    gaps, held = (
+        n * pulled,
+        np.concatenate([n * np.flatnonzero(~opened), *(n * stick + a for a in range(1, n))]),
+    )
+    left, right = np.zeros((problem.start.size, 0)), np.zeros((0, problem.start.size))
+    if problem.extra_unknowns is not None:
+        left, right = problem.extra_unknowns.followed
+
+    def block(compliance: Floats, rows: Ints, columns: Ints) -> Floats:
+        return np.asarray(compliance[np.ix_(rows, columns)] - left[rows] @ right[:, columns])
+
+    C, under_forces = problem.compliance, problem.under_forces
+    free = block(C, gaps, gaps)
+    if held.size:
+        back = np.linalg.solve(block(under_forces, held, held), block(C, held, gaps))
+        free = free - block(C, gaps, held) @ back
+    root = np.sqrt(stiffness[pulled])
+    gain = root[:, None] * free * root
+    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
 
 
 def _passing(before: Projected, after: Projected) -> Projected:
@@ -173,8 +191,8 @@ def _passing(before: Projected, after: Projected) -> Projected:
     """
     if after.z.shape[1] == 2:
         return after
-    way = after.z[:, 0]
-    enters = (before.status == OPEN) & (after.status == STICK) & (way != 0.0)
+    trial = after.z[:, 0]
+    enters = (before.status == OPEN) & (after.status == STICK) & (trial != 0.0)
     turns = (before.status >= SLIP) & (after.status >= SLIP) & (before.status != after.status)
-    slip = np.where(way < 0.0, FORWARD, BACKWARD)
+    slip = np.where(trial < 0.0, FORWARD, BACKWARD)
     return replace(after, status=np.where(enters, slip, np.where(turns, STICK, after.status)))

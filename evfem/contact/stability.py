@@ -1,20 +1,15 @@
 r"""Which force takes an equilibrium its stability, and how close it is.
 
-At an equilibrium the closed nodes are held along the normal, the sticking ones along the tangent
-too. What is left to move are the slips q of the slipping nodes and the gaps of the open ones. With
-the compliance C of body and bone, local frames, and :math:`m = \pm\mu` of the slipping nodes, forces
-:math:`t` along the slips move them by
+Closed nodes are held along the normal, sticking ones along the tangent too. What is left to move are the
+slips of the slipping nodes and the gaps of the open ones. With the compliance C of body and bone in local
+frames, and :math:`m = \pm\mu` of the slipping nodes, forces along the slips move them by
 
 .. math:: A = C_{tt} - (C_{tn} + C_{tt} m)\,(C_{nn} + C_{nt} m)^{-1} C_{nt},
 
-the held forces eliminated; gaps of open nodes likewise. Four forces grow with such a motion, by
-a stiffness D of their own:
-
-- contact forces that turn with the profile, :math:`D = -\lambda_n (1 + \mu^2)\,h''/(1 + h'^2)^{3/2}`, which
-  is positive on a crest; friction turns with the normal force that it needs,
-- friction whose coefficient falls along the way, :math:`D = -\lambda_n\,d\mu/ds`,
-- friction that falls with the speed, :math:`D = -(db/dv)/\Delta t`,
-- the attraction of open nodes, :math:`D = -A\,dp/dg` with their gaps.
+gaps of open nodes likewise. Four forces grow with such a motion, by a stiffness D of their own: contact
+forces that turn with the profile, :math:`D = -\lambda_n (1 + \mu^2)\,h''/(1 + h'^2)^{3/2}`, positive on a
+crest; friction whose coefficient falls along the path, :math:`D = -\lambda_n\,d\mu/ds`; friction that falls
+with the speed, :math:`D = -(db/dv)/\Delta t`; the attraction of open nodes, :math:`D = -A\,dp/dg`.
 
 `stability_ratio` is the ratio of destabilising to stabilising stiffness: the largest real eigenvalue
 of A D. At 1 stability is lost; the cause named is the force that works most in the eigenvector.
@@ -67,10 +62,10 @@ def stability_ratio(step: LinearContactStep) -> StabilityRatio:
         FASTER: np.concatenate([faster, far]),
         ATTRACTION: np.concatenate([none, known.negative_stiffness[opened]]),
     }
-    share, motion = _fastest(
+    largest, motion = _fastest(
         _freed(step, slipping, opened), sum(grows.values(), np.zeros(none.size + far.size))
     )
-    return StabilityRatio(share, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
+    return StabilityRatio(largest, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
 
 
 def _shear_ratio(step: LinearContactStep) -> Floats:
@@ -116,8 +111,8 @@ def _bone(step: LinearContactStep) -> ExtraUnknowns:
         return ExtraUnknowns(none.T, none, np.zeros((0, 0)), np.zeros(0))
     pushes = np.column_stack([unknown.push for unknown in step.unknowns])
     moved = step.body.compliance @ pushes[:-2]
-    S, share, wanted, carried = step.equations
-    pivot, carried = S[:, :-2] @ moved + share, local(axes, carried[:, rows].T).T
+    S, by_unknowns, wanted, carried = step.equations
+    pivot, carried = S[:, :-2] @ moved + by_unknowns, local(axes, carried[:, rows].T).T
     return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(wanted.size))
 
 

@@ -16,6 +16,7 @@ so a combination obeys them as long as no status has changed. Source: D. G. Ande
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,9 @@ def _vector(state: State) -> Floats:
 def _state(state: State, vector: Floats) -> State:
     parts = [getattr(state, name) for name in MIXED]
     *mixed, (signed,) = np.split(vector, np.cumsum([part.size for part in parts]))
-    changed = {n: one.reshape(part.shape) for n, one, part in zip(MIXED, mixed, parts, strict=True)}
+    changed: dict[str, Any] = {
+        n: one.reshape(part.shape) for n, one, part in zip(MIXED, mixed, parts, strict=True)
+    }
     squared = max(np.copysign(1.0, state.voltage) * signed, 0.0)
     voltage = float(np.copysign(KILOVOLT * np.sqrt(squared), state.voltage))
     return replace(state, **changed, voltage=voltage)

@@ -140,8 +140,8 @@ class Pardiso:
     def factorise(self, upper: Floats) -> None:
         """Factorise new values; raises `Singular` if even the indefinite factorisation fails."""
         shift = shift_of_kept(self.pattern, self.kept, upper)
-        ways: list[tuple[int, Any]] = [(2, np.float32), (2, np.float64), (-2, np.float64)]
-        for mtype, real in ways[ways.index((self.mtype, self.real)) :]:
+        kinds: list[tuple[int, Any]] = [(2, np.float32), (2, np.float64), (-2, np.float64)]
+        for mtype, real in kinds[kinds.index((self.mtype, self.real)) :]:
             if (mtype, real) != (self.mtype, self.real):
                 self.close()
                 self.real = real

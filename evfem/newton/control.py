@@ -37,7 +37,7 @@ from evfem.newton.state import State, StepFailed
 
 #: a voltage (V) that is none
 TINY = 1e-300
-#: a given speed that changes by this share of the larger one jumps
+#: a given speed that changes by this fraction of the larger one jumps
 JUMP = 0.25
 #: why no voltage makes a gap (mm)
 TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
@@ -278,13 +278,14 @@ class GivenGap(ConstrainedVoltage):
 
 @dataclass
 class FollowFriction(VoltageControl):
-    """The voltage, from 0 to `voltage` (V), makes the bone's force along a `way`, x[, z] of a unit vector,
-    `force` (N/mm). Friction of a pad that sticks hardly depends on the voltage, which then stays as it was.
+    """The voltage, from 0 to `voltage` (V), makes the bone's force along a `direction`, x[, z] of a unit
+    vector, `force` (N/mm). Friction of a pad that sticks hardly depends on the voltage, which then stays as
+    it was.
     """
 
     force: float
     voltage: float
-    way: tuple[float, ...] = (1.0,)
+    direction: tuple[float, ...] = (1.0,)
     _mode: str = field(default=UNKNOWN, repr=False, compare=False)
     follows = True
 
@@ -300,14 +301,14 @@ class FollowFriction(VoltageControl):
         return self._lacks(reaction) if self.free else 0.0
 
     def _lacks(self, reaction: Floats) -> float:
-        return float(self.force - reaction[::2] @ np.array(self.way))
+        return float(self.force - reaction[::2] @ np.array(self.direction))
 
     def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
         if not self.free:
             return VoltageStep(problem.solve(step))
         unit, push = problem.unit()
         along = np.zeros(step.bone.size)
-        along[::2] = self.way
+        along[::2] = self.direction
         unknown = ExtraUnknown(push, 0, self.force, along=along)
         found = problem.solve(replace(step, unknowns=(*step.unknowns, unknown)))
         most, change = (self.voltage / KILOVOLT) ** 2, float(found.extra[-1])
@@ -321,7 +322,7 @@ class FollowFriction(VoltageControl):
         """At a bound the force may miss `force` in its direction; else the voltage is unknown again."""
         if self.free:
             return True
-        forward = float(np.sign(travel @ np.array(self.way))) or 1.0
+        forward = float(np.sign(travel @ np.array(self.direction))) or 1.0
         lacking = forward * self._lacks(reaction)
         if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
             self._mode = UNKNOWN

@@ -314,8 +314,8 @@ class FactorisedBody:
         return fraction
 
     def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:
-        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as the
-        curvature of a profile may jump. None in three dimensions.
+        """The larger stability ratio of the equilibrium `state` and of its prediction towards `target`, as
+        the curvature of a profile may jump. None in three dimensions.
         """
         if state.bone.size == 3:
             return None
@@ -361,10 +361,10 @@ class FactorisedBody:
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity, its increment and what branches keep of it."""
-        body, u, rates = self.body, state.u, self.body.rates(state.u)
-        kept = {"velocity": body.velocity(u), "last_increment": u - old.u, "inner": body.inner(u)}
-        seconds = body.beginning[1] if rates.size else 0.0
-        return replace(state, **kept, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
+        velocity, increment, rates = self.body.velocity(state.u), state.u - old.u, self.body.rates(state.u)
+        state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
+        seconds = self.body.beginning[1] if rates.size else 0.0
+        return replace(state, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
 
     def add_candidates(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""

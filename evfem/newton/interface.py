@@ -80,9 +80,9 @@ class FrictionJumps:
     def _hold(self, steps: Steps, new: Ints, which: Ints, place: Floats) -> None:
         """Holds nodes `new` (k,) that come to the jumps `which` (k,) from their smoother side."""
         begin, axis = self._begin[new], steps.axis
-        way = place[new] - begin
-        whole = np.where(way[:, axis] == 0.0, 1.0, way[:, axis])
-        crossed = begin + way * ((steps.place[which] - begin[:, axis]) / whole)[:, None]
+        moved = place[new] - begin
+        whole = np.where(moved[:, axis] == 0.0, 1.0, moved[:, axis])
+        crossed = begin + moved * ((steps.place[which] - begin[:, axis]) / whole)[:, None]
         across = crossed[:, 1 - axis] if crossed.shape[1] > 1 else np.zeros(new.size)
         before, behind = steps.sides(which, across)
         inside = np.where(behind > before, constants.PIN_OFFSET, -constants.PIN_OFFSET)
@@ -210,8 +210,8 @@ class Interface:
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes (P, dim - 1) in mm, along the surface's tangents."""
-        way = self.on_display(state) - self.jumps.at(self.on_display(old))
-        return np.asarray(np.einsum("paj,pj->pa", self.surface_at(state).travel, way))
+        moved = self.on_display(state) - self.jumps.at(self.on_display(old))
+        return np.asarray(np.einsum("paj,pj->pa", self.surface_at(state).travel, moved))
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
@@ -242,8 +242,8 @@ class Interface:
         that does not grow with dx; with it, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
-        way = sizes(known.slip + give[:, None] * known.force[:, 1:])
-        slip = np.where(known.status >= FORWARD, way, 0.0)
+        size = sizes(known.slip + give[:, None] * known.force[:, 1:])
+        slip = np.where(known.status >= FORWARD, size, 0.0)
         moving = self.slipping(old, state, c, known.friction, slip)
         found = self._oscillating.linearised(law, moving, c, known.status, shear)
         if self.dim == 3:  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
@@ -278,9 +278,9 @@ class Interface:
         found = self.restored(state.voltage)
         if found is None:
             return np.zeros(len(self.points))
-        share = self.tributary(state)
-        pressure = np.maximum(state.contact_force[:, 0], 0.0) / share
-        return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
+        length = self.tributary(state)
+        pressure = np.maximum(state.contact_force[:, 0], 0.0) / length
+        return np.where(state.touching, with_core(pressure, *found) * length, 0.0)
 
     def tributary_of(self, position: Floats) -> Floats:
         """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
@@ -293,7 +293,9 @@ class Interface:
 
     def tributary_at(self, part: tuple[State, State], place: Floats) -> Floats:
         """Tributary lengths or areas (P,) at places (P, d) between two states; in space the mean of both."""
-        return self.tributary_of(place) if self.dim == 2 else 0.5 * sum(map(self.tributary, part))
+        if self.dim == 2:
+            return self.tributary_of(place)
+        return np.asarray(0.5 * sum(map(self.tributary, part)))
 
     def age(self, old: State) -> Floats:
         """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
@@ -312,10 +314,10 @@ class Interface:
         nodal = self.slipping(old, new, nodes, mu, slip)
         return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
 
-    def limit(self, old: State, state: State, place: Floats, way: Floats) -> Floats:
-        """Bounds of friction (P,) in N/mm of the pad nodes at places (P, d), slipping by `way` (P,)."""
+    def limit(self, old: State, state: State, place: Floats, slip: Floats) -> Floats:
+        """Bounds of friction (P,) in N/mm of the pad nodes at places (P, d), slipping by (P,)."""
         mu = self.friction(old, nodes := np.arange(len(place)), place)
-        return self._bound(old, state, nodes, mu, way)
+        return self._bound(old, state, nodes, mu, slip)
 
     def _bound(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
         """The same of some nodes (k,) with the coefficients mu (k,), slipping by (k,)."""
@@ -371,13 +373,13 @@ class Interface:
         compliance = self.compliance(old)[active]
         slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
         status, nodes = state.status[active], np.flatnonzero(active)
-        way, size = sizes(slip), sizes(shear)
+        slid, size = sizes(slip), sizes(shear)
         mu = self.friction(old, nodes, self.jumps.at(place)[active])
-        limit = self._bound(old, state, nodes, mu, np.where(status == STICK, 0.0, way))
-        sticks = (way <= short) & (size <= limit + weak)
+        limit = self._bound(old, state, nodes, mu, np.where(status == STICK, 0.0, slid))
+        sticks = (slid <= short) & (size <= limit + weak)
         # a slip is known to `short`, and its direction accordingly
-        against = sizes(shear + (limit / np.maximum(way, 1e-300))[:, None] * slip)
-        astray = np.where(way > short, against - limit * short / np.maximum(way, short), 0.0)
+        against = sizes(shear + (limit / np.maximum(slid, 1e-300))[:, None] * slip)
+        astray = np.where(slid > short, against - limit * short / np.maximum(slid, short), 0.0)
         slips = (limit == 0.0) | ((np.abs(size - limit) <= weak) & (astray <= weak))
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
@@ -398,9 +400,9 @@ def slipped(interface: Interface, old: State, new: State) -> Floats:
     """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left;
     along the mean of the surface's tangents.
     """
-    way = interface.on_display(new) - interface.on_display(old)
+    moved = interface.on_display(new) - interface.on_display(old)
     travel = 0.5 * (interface.surface_at(old).travel + interface.surface_at(new).travel)
-    slip = np.einsum("paj,pj->pa", travel, way)
+    slip = np.einsum("paj,pj->pa", travel, moved)
     status = np.where(new.touching | (old.status == STICK), new.status, old.status)
     # a node may stick at a jump of friction that it has slipped up to
     carried = (status == STICK) & (sizes(slip) > interface.tolerance * interface.length)

@@ -118,7 +118,7 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What the next step reuses: candidates (pad nodes), the point of the factorisation, the time step (s)."""
+    """What the next step reuses: candidates (pad nodes), point of the factorisation, time step (s)."""
 
     candidates: Ints
     tangent_point: TangentPoint | None
