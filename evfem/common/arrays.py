@@ -49,7 +49,8 @@ class DenseSolver:
         from scipy.linalg import lapack
 
         self._unknowns = self._factors = None  # their memory is free before that of new ones is taken
-        scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diagonal(matrix)), np.finfo(float).tiny))
+        own = np.abs(np.diagonal(matrix))
+        scale = 1.0 / np.sqrt(np.maximum(own, 1e-30 * (own.max() or 1.0)))  # within single precision
         single = (matrix * scale).astype(np.float32)
         single *= scale.astype(np.float32)[:, None]
         # the transposed is in LAPACK's order: nothing is copied

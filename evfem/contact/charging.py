@@ -68,7 +68,10 @@ class Charging:
 
     def carried(self, length: Floats) -> Floats:
         """The charges (M, P) of the beginning on other tributary lengths (P,)."""
-        return np.asarray(self.old.charges * np.where(length > 0.0, self.old.length / _positive(length), 1.0))
+        some = length > 0.0
+        return np.asarray(
+            self.old.charges * np.where(some, self.old.length / np.where(some, length, 1.0), 1.0)
+        )
 
     def after(self, gap: Any, voltage: float, length: Floats) -> Any:
         """The charges (M, P) at the end of the step, in the new place under the new voltage."""
@@ -163,7 +166,3 @@ class Charging:
         length = np.diff(ends)[:, None]
         at = np.array(ends[:-1])[:, None] + length * (0.5 + 0.5 * x)
         return at.ravel(), (0.5 * length * w).ravel()
-
-
-def _positive(length: Floats) -> Floats:
-    return np.where(length > 0.0, length, 1.0)

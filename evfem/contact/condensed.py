@@ -307,9 +307,8 @@ class LinearContactStep:
         """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1 + p)."""
         dim = self.body.dim
         right = self.residual[:-dim] - self._present - self.body.schur[:-dim, -dim:] @ self.bone
-        return self.body.compliance @ np.column_stack(
-            [right, *(unknown.push[:-dim] for unknown in self.unknowns)]
-        )
+        pushes = (unknown.push[:-dim] for unknown in self.unknowns)
+        return self.body.compliance @ np.column_stack([right, *pushes])
 
     @cached_property
     def _present(self) -> Floats:
@@ -333,12 +332,9 @@ class LinearContactStep:
         C, W = follower.apply(among, own)
         W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
         problem = self._problem(near, (C, W), self._bone_balance(rows, alone, (C, W), follower))
-        attraction = AttractionStiffness(
-            known.negative_stiffness[near],
-            known.surface.normal_gap[near],
-            known.gain_on_closing[near],
-            None if known.roughness is None else known.roughness.of(near),
-        )
+        rough = None if known.roughness is None else known.roughness.of(near)
+        gap, gain = known.surface.normal_gap[near], known.gain_on_closing[near]
+        attraction = AttractionStiffness(known.negative_stiffness[near], gap, gain, rough)
         touching = np.where((status != OPEN)[:, None], known.force[near], 0.0).ravel()
         try:
             found = solve_with_attraction(problem, attraction, status, touching)
@@ -396,15 +392,9 @@ class LinearContactStep:
         and unknowns (p, p) add, right-hand sides (p,), and what forces on the candidates add (p, m - dim).
         """
         dim = self.body.dim
-        S, carried, pushed, residual = (
-            np.stack([unknown.part(rows) for unknown in self.unknowns])
-            for rows in (
-                self.body.schur[-dim:],
-                self.body.bone_rows,
-                np.stack([unknown.push[-dim:] for unknown in self.unknowns], axis=1),
-                self.residual[-dim:],
-            )
-        )
+        pushes = np.stack([unknown.push[-dim:] for unknown in self.unknowns], axis=1)
+        bone = (self.body.schur[-dim:], self.body.bone_rows, pushes, self.residual[-dim:])
+        S, carried, pushed, residual = (np.stack([one.part(rows) for one in self.unknowns]) for rows in bone)
         by_unknowns, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:

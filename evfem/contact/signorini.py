@@ -217,11 +217,6 @@ class ContactSolution:
     solves: int
     reduced: bool = False
 
-    @classmethod
-    def of(cls, problem: ContactProblem, forces: Forces, status: Ints, solves: int) -> ContactSolution:
-        """These forces, with these statuses of the nodes, after so many dense solves."""
-        return cls(forces.contact, forces.drop, status, forces.extra, problem.state(forces), solves)
-
 
 @dataclass(frozen=True, eq=False)
 class Projected:

@@ -48,48 +48,35 @@ def stability_ratio(step: LinearContactStep) -> StabilityRatio:
     known, surface = step.candidates, step.candidates.surface
     slipping = np.flatnonzero(known.status >= FORWARD)
     opened = np.flatnonzero((known.status == OPEN) & (known.negative_stiffness > 0.0))
-    ratio, normal = _shear_ratio(step)[slipping], np.maximum(known.force[slipping, 0], 0.0)
+    ratio = (known.friction * known.shear_direction[:, 0])[slipping]
+    normal = np.maximum(known.force[slipping, 0], 0.0)
     turning = -normal * (1.0 + ratio**2) * (surface.curvature[:, 0, 0] / surface.stretch**3)[slipping]
     slope = known.friction_slope[slipping, 0] / surface.stretch[slipping]
-    falling = np.sign(ratio) * normal * slope
-    faster = np.zeros(slipping.size)
-    if known.slip_stiffness is not None:
-        faster = -known.slip_stiffness[slipping]
-    none, far = np.zeros(slipping.size), np.zeros(opened.size)
+    falling, none, far = np.sign(ratio) * normal * slope, np.zeros(slipping.size), np.zeros(opened.size)
+    faster = none if known.slip_stiffness is None else -known.slip_stiffness[slipping]
     grows = {
         SLOPES: np.concatenate([turning, far]),
         FALLING: np.concatenate([falling, far]),
         FASTER: np.concatenate([faster, far]),
         ATTRACTION: np.concatenate([none, known.negative_stiffness[opened]]),
     }
-    largest, motion = _fastest(
-        _freed(step, slipping, opened), sum(grows.values(), np.zeros(none.size + far.size))
-    )
+    stiffness = sum(grows.values(), np.zeros(none.size + far.size))
+    largest, motion = _fastest(_freed(step, slipping, opened), stiffness)
     return StabilityRatio(largest, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
-
-
-def _shear_ratio(step: LinearContactStep) -> Floats:
-    """Shear force per pressing force of the candidates (c,): against the slip, 0 unless they slip."""
-    return step.candidates.friction * step.candidates.shear_direction[:, 0]
 
 
 def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
     """Compliance (f, f) of these slips and gaps, contact held, the bone free where it is loaded."""
-    known = step.candidates
-    C, bone = _compliance(step), _bone(step)
+    known, bone, axes = step.candidates, _bone(step), step.candidates.surface.axes
+    C = local(axes, local(axes, step.among(np.arange(known.status.size))).T).T
+    C = C + np.diag(_yielding(known).ravel())
     closed, stick = np.flatnonzero(known.status != OPEN), np.flatnonzero(known.status == STICK)
     held, free = np.append(2 * closed, 2 * stick + 1), np.append(2 * slipping + 1, 2 * opened)
-    pushes, ratio = np.vstack([C, bone.rows])[:, held], _shear_ratio(step)[closed]
+    pushes, ratio = np.vstack([C, bone.rows])[:, held], (known.friction * known.shear_direction[:, 0])[closed]
     pushes[:, : closed.size] += np.vstack([C, bone.rows])[:, 2 * closed + 1] * ratio
     matrix = np.block([[pushes[held], bone.columns[held]], [pushes[len(C) :], bone.pivot]])
     moved = np.linalg.solve(matrix, np.vstack([C[np.ix_(held, free)], bone.rows[:, free]]))
     return C[np.ix_(free, free)] - np.hstack([pushes[free], bone.columns[free]]) @ moved
-
-
-def _compliance(step: LinearContactStep) -> Floats:
-    """Compliance of the candidates (2 c, 2 c) below a bone that stands still, in their frames."""
-    axes, C = step.candidates.surface.axes, step.among(np.arange(step.candidates.status.size))
-    return local(axes, local(axes, C).T).T + np.diag(_yielding(step.candidates).ravel())
 
 
 def _yielding(known: Candidates) -> Floats:

@@ -23,7 +23,7 @@ from contextvars import ContextVar
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sparse
@@ -40,18 +40,6 @@ PERTURBED = 13
 
 class Singular(ArithmeticError):
     """The matrix of the interior unknowns cannot be factorised."""
-
-
-class Condensation(Protocol):
-    """A factorised matrix: its Schur complement on the kept unknowns, and solves in two halves."""
-
-    schur: Floats
-
-    def forward(self, b: Floats) -> tuple[Floats, Floats]:
-        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side (m,))."""
-
-    def backward(self, state: Floats, kept: Floats) -> Floats:
-        """Solution (n,) once the kept unknowns (m,) are known."""
 
 
 @cache
@@ -176,6 +164,7 @@ class Pardiso:
         return bool(np.abs(moved(rest)).max() <= ACCURATE * np.abs(x).max())
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
+        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side (m,))."""
         # the entries of the kept unknowns go past the factor: the bone's reaction, in single precision,
         # would have a rounding larger than the forces that are left
         interior = b.astype(self.real)
@@ -187,6 +176,7 @@ class Pardiso:
         return y, g
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
+        """Solution (n,) once the kept unknowns (m,) are known."""
         given = state.astype(self.real)
         given[self.kept] = kept
         x = self._solve(333, given).astype(float)
@@ -268,6 +258,8 @@ class SuperLU:
         return state + self._solve(b)
 
 
+#: a factorised matrix: its Schur complement, and solves in two halves
+Condensation = Pardiso | SuperLU
 #: whether the sparse solver is the one that is not chosen by itself
 _OTHER = ContextVar("_OTHER", default=False)
 
@@ -290,9 +282,7 @@ def _has_pardiso() -> bool:
     return True
 
 
-def make_condensation(
-    pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False
-) -> Pardiso | SuperLU:
+def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
     """PARDISO where evfem[fast] is installed, else SuperLU, which has no factors of `single` precision."""
     if _has_pardiso() and not _OTHER.get():
         return Pardiso(pattern, kept, threads, single)

@@ -11,10 +11,9 @@ by backward Euler; beside tissue with mass by its differences of second order
 (`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts. In
 three dimensions the same holds along z. The motion prescribes the bone's height.
 
-Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
-100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
-kg, and the cut-off frequency of the friction, that of a first-order system, by 13.8 Hz
-(`Hand.of_finger`). In the plane all three are per mm of depth.
+Values for a finger (`Hand.of_finger`): Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid
+with 20 to 100 mm/s. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5 kg, and the
+cut-off frequency of the friction by 13.8 Hz. In the plane all three are per mm of depth.
 """
 
 from __future__ import annotations

@@ -46,9 +46,7 @@ class FrictionJumps:
 
     def begin(self, place: Floats) -> None:
         """Starts a step with the nodes at these places (P, d) in mm, none held."""
-        self.place = np.full(place.shape, np.nan)
-        self.lower = np.zeros(len(place))
-        self._begin = place
+        self.place, self.lower, self._begin = np.full(place.shape, np.nan), np.zeros(len(place)), place
         self._side = [self._sides(steps, place) for steps in self.steps]
         self._changes = np.zeros((len(self.steps), len(place)), dtype=np.int64)
         self._released = np.zeros(len(place), dtype=bool)
@@ -235,11 +233,9 @@ class Interface:
         return known if self.law is None else self._obeying(self.law, known, old, state, c)
 
     def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
-        """The candidates c under a law of friction other than Coulomb's.
-
-        Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
-        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem has the part of F
-        that does not grow with dx; with it, slip and yielding are (1 + K C) times as large.
+        """The candidates c under a law of friction other than Coulomb's. Where the interface yields by C, a
+        node that slips under F(s), dF/ds = K, and moves by dx slips by ds = dx - C dF: friction grows by K dx
+        / (1 + K C). With the part of F that does not grow, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
         size = sizes(known.slip + give[:, None] * known.force[:, 1:])

@@ -48,10 +48,9 @@ def no_progress(residuals: list[float], same: bool) -> bool:
 def limited_gain(gain: Floats) -> Floats:
     """Gains of the attraction per contact force (P,), limited for the tangent.
 
-    The net force of a contact force of 1 is 1 - gain. At a gain of 1 the node's equilibrium has a fold;
-    above, the force grows by itself until the rough faces are close. Iterations shall leave such a point,
-    and converge to one below 1 with its own tangent: above `STABLE` the tangent has abs(1 - gain), limited
-    to the range from `LEFT_OVER` to 1 - `STABLE`.
+    At a gain of 1 the node's equilibrium has a fold; above, the force grows by itself until the rough faces
+    are close. Iterations shall leave such a point, and converge to one below 1 with its own tangent: above
+    `STABLE` the tangent has abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
 
     >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
     [0.5, 0.95, 0.99, 0.95, 0.9]
@@ -253,9 +252,8 @@ class Linearisation:
         return np.asarray(attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
-        """Derivatives of the attraction of every pad node by its contact force, where rough faces come
-        closer under it, along normal and tangent: on a slope a vertical force has a tangential component.
-        None for smooth faces.
+        """Derivatives of the attraction of every pad node by its contact force, along normal and tangent,
+        where rough faces come closer under it; None for smooth faces.
         """
         if (attraction := self._acting(state)) is None or attraction.roughness is None:
             return None
@@ -278,10 +276,9 @@ class Linearisation:
         return Roughness(gain, lost[:, None] * along, pressing)
 
     def _coupling(self, state: State) -> Floats | None:
-        """The attraction's stiffness on the candidates but for the weakening with a node's own
-        gap, which belongs to the contact problem: what is left are changes of tributary lengths.
-        None without attraction, or where they are faint: a symmetric compliance takes a third of
-        the time. None with charges too, so that a factorisation does not depend on the step.
+        """The attraction's stiffness on the candidates but for the weakening with a node's own gap: what is
+        left are changes of tributary lengths. None where they are faint, as a symmetric compliance takes a
+        third of the time, and with charges, so that a factorisation does not depend on the step.
         """
         if (attraction := self._acting(state)) is None or attraction.charging:
             return None
@@ -304,7 +301,7 @@ class Linearisation:
             inner[index, dim * (index // dim) + a] += beyond
         normal = surface_state(self.interface.surface, position[c]).axes[:, 0, COMPONENTS[:dim]]
         own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
-        # weakening with a node's own gap belongs to the contact problem: not twice
+        # that belongs to the contact problem: not twice
         blocks = inner.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own
         stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
