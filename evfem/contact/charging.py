@@ -22,8 +22,7 @@ from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.relaxation import Sandwich
 from evfem.tensor import STEP
 
-#: pieces of a step, each so many times as long as the one before, from one relaxation of the fastest
-#: charge on; Gauss points of each
+#: pieces of a step, from the fastest charge's relaxation on, grow by this factor; Gauss points of each
 LONGER, POINTS = 3.0, 8
 #: positions at which the effective voltage is remembered
 REMEMBERED = 4

@@ -73,8 +73,8 @@ class Candidates:
     slip_stiffness: Floats | None = None
 
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z],
-        (c, 1 + d, d); `own` (c, d) are its compliances along them.
+        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z], (c, 1 + d, d),
+        of the own compliances (c, d) along them.
         """
         turned = self.surface.turned(self.force)
         grown = np.einsum("caj,cak->ckj", self.friction_growth(own), self.surface.axes[:, 1:])
@@ -148,9 +148,7 @@ class CandidatesBed:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """Condensed tangent on (candidates, bone x, y[, z]) and compliance of the candidates, with attraction;
-    `dense` solves what is asked of it.
-    """
+    """Condensed tangent on (candidates, bone x, y[, z]), compliance of the candidates, with attraction."""
 
     schur: Floats
     compliance: Floats

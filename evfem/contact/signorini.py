@@ -65,9 +65,8 @@ class Roughness:
 
 @dataclass(frozen=True)
 class AttractionStiffness:
-    """Linearised attraction of every node: it decreases by `negative_stiffness` (k,) per unit of gap from
-    its value at `reference_gap` (k,) while open, and is larger by `gain_on_closing` (k,) at g = 0.
-    `roughness` is its dependence on the contact force there.
+    """Linearised attraction of every node: it decreases by `negative_stiffness` (k,) per unit of gap from its
+    value at `reference_gap` (k,), is larger by `gain_on_closing` (k,) at g = 0, and depends on contact there.
     """
 
     negative_stiffness: Floats
@@ -77,8 +76,7 @@ class AttractionStiffness:
 
 
 #: of a node; `FORWARD` or `BACKWARD` in the plane where it slips, `SLIP` in three dimensions
-OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
-SLIP = 2
+OPEN, STICK, FORWARD, BACKWARD, SLIP = 0, 1, 2, 3, 2
 NO_NODES: Ints = np.zeros(0, dtype=np.int64)
 
 

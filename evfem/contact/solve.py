@@ -56,8 +56,8 @@ def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = 
         forces, found, solves, softest = _newton(problem, start)
         total += solves
         if forces is not None:
-            found_forces = forces.contact, forces.drop, found.status, forces.extra
-            return ContactSolution(*found_forces, problem.state(forces), total)
+            kept = forces.contact, forces.drop, found.status, forces.extra, problem.state(forces)
+            return ContactSolution(*kept, total)
     keep = int((found.miss > problem.tolerance).sum())
     raise ContactNotSolved(f"{keep} of {problem.size} nodes keep changing", softest)
 

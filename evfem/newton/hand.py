@@ -94,9 +94,7 @@ class Hand:
 
 
 def at_rest(dim: int) -> Floats:
-    """Along x[, z], (6, d), at the beginning of a run: the drive's place (mm), the bone's velocity (mm/s),
-    the drive's force (N/mm), and mean rates of both places and that velocity over the part before.
-    """
+    """What `State.hand` is at the beginning of a run: `HandControl.settled` says of what."""
     return np.zeros((6, dim - 1))
 
 
@@ -175,7 +173,9 @@ class HandControl:
         return tuple(found)
 
     def settled(self, state: State) -> State:
-        """The accepted state with what the hand keeps."""
+        """The accepted state with what the hand keeps along x[, z], (6, d): the drive's place (mm), the
+        bone's velocity (mm/s), the drive's force (N/mm), mean rates of both places and that velocity.
+        """
         x = state.bone[::2]
         ends = np.stack([self.drive, x, self.velocity(x)])
         changes = ends - self.before

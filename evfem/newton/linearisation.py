@@ -89,8 +89,7 @@ class Linearisation:
     def begin(self, old: State, frozen: bool) -> None:
         """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
         self.touching, self.frozen = old.status != OPEN, frozen
-        self._lets_go = True
-        self._outdated = self.fringes
+        self._lets_go, self._outdated = True, self.fringes
         if self.fringes:
             self.fringes, self._made_at = False, None
 
