@@ -61,17 +61,20 @@ STUCK = 8
 FALLING = 0.9
 #: earlier iterations that are combined [A, B]
 ANDERSON_DEPTH = 3
-#: dense systems of so many unknowns are factorised in single precision and refined [space]
+#: dense systems of so many unknowns are factorised in single precision and refined; half or twice of this, of
+#: the next, of `LARGE_SCHUR` or `INNER` changes the time of a small tip by less than the 10 % it varies [space]
 LARGE_SYSTEM = 300
-#: until the residual is so small a fraction of the right-hand side, in so many rounds [space]
-REFINED, REFINEMENTS = 1e-14, 14
-#: as long as each round leaves less than this fraction of it: of factors of an earlier matrix [space]
+#: factors of an earlier matrix serve while each round of refinement leaves less than this fraction of the
+#: residual, a matrix's own while it leaves less than twice that [space]
 OLD_FACTORS = 0.2
+#: refined is what leaves this fraction of the right-hand side, in at most so many rounds
+REFINED, REFINEMENTS = 1e-14, 14
 #: rows of a matrix that are copied at once
 BLOCK = 256
-#: a tangent with so many kept unknowns is factorised in single precision, [space]
+#: a tangent with so many kept unknowns is factorised in single precision, as few are in the plane, where that
+#: gains nothing [space]
 LARGE_SCHUR = 1000
-#: where that gives the motion under equal forces to this fraction [space]
+#: where factors of single precision give the motion under equal forces to this fraction [space]
 ACCURATE = 1e-3
 #: contact in space is solved to this fraction of the residual of the iterate [space]
 INNER = 0.1

@@ -295,7 +295,7 @@ class _Equations:
         closed, tangents = self.closed, np.arange(1, n)
         self.felt = (self.sheared - self.gain)[closed]
         sheared = closed[(status[closed] != STICK) & self.felt[:, 1:].any(axis=1)]
-        beside = np.append(self.turned, np.setdiff1d(sheared, self.turned))
+        beside = np.append(self.turned, np.setdiff1d(sheared, self.turned)) if self.turned.size else sheared
         held = (n * np.flatnonzero(status == STICK)[:, None] + tangents).ravel()
         self.place = np.concatenate([n * closed, held, n * self.attracted])
         self.whole = np.append(self.place, (tangents[:, None] + n * beside).ravel())
