@@ -61,8 +61,8 @@ STUCK = 8
 FALLING = 0.9
 #: earlier iterations that are combined [A, B]
 ANDERSON_DEPTH = 3
-#: dense systems of so many unknowns are factorised in single precision and refined; half or twice of this, the
-#: next, `LARGE_SCHUR` or `INNER` change the time of a small tip by less than the 10 % that it varies [space]
+#: dense systems of so many unknowns are factorised in single precision and refined; half or twice of this,
+#: `OLD_FACTORS`, `LARGE_SCHUR` or `INNER` change a small tip's time by less than the 10 % that it varies [space]
 LARGE_SYSTEM = 300
 #: factors of an earlier matrix serve while each round of refinement leaves less than this fraction of the
 #: residual, a matrix's own while it leaves less than twice that [space]
