@@ -59,7 +59,7 @@ ROOMS = {
         "strategy state hand control condensation interface linearisation pressure anderson travel "
         "factorised equilibrium",
     ),
-    "solver": ({"numpy"}, "relaxation hold path stepping"),
+    "solver": ({"numpy"}, "relaxation hold path stepping linearbody"),
     "scene": (
         {"numpy", "tomli_w"},
         "motion terms electrics keys probes options scene serialiser format schema file spatial",
