@@ -146,10 +146,10 @@ class _Problem:
             if not isinstance(one, (MeasuredCurve, MeasuredValues)):
                 raise InputError("data", quoted(one), "MeasuredCurve, MeasuredValues, or a list of them")
             one.check(len(self.tables.get("motion", ())))
-            for run in one.runs():
-                key = digest(dict(run.keys))
-                runs.setdefault(key, (run.keys, []))[1].append(run.question)
-                asked += [(key, name) for name in run.question.names]
+            for keys, question in one.runs():
+                key = digest(dict(keys))
+                runs.setdefault(key, (keys, []))[1].append(question)
+                asked += [(key, name) for name in question.names]
         self.runs = [(keys, tuple(questions)) for keys, questions in runs.values()]
         self.places = [(list(runs).index(key), name) for key, name in asked]
         self.measured = np.concatenate([[], *(np.asarray(one.values) for one in self.data)])

@@ -85,14 +85,8 @@ class Single:
 
 
 Question = Along | Single
-
-
-@dataclass(frozen=True)
-class Run:
-    """One run that a measurement needs: keys of the scene that it sets, and what is asked of it."""
-
-    keys: Mapping[str, Any]
-    question: Question
+#: a run that a measurement needs: keys of the scene that it sets, and what is asked of it
+Run = tuple[Mapping[str, Any], Question]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,11 +166,11 @@ class MeasuredCurve:
             given = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
             allowed = 'columns of the history, or columns={"indentation": %s, "normal_force": %s}'
             raise InputError("data", given, allowed % tuple(map(readable, (over, *others))))
-        found = [
-            table.column(f"data.columns.{name}", wanted[name], _bases(others[0] if name == "sd" else name))
-            for name in (over, *others, "sd")
-            if name in wanted
-        ]
+        found = []
+        for name, of in zip((over, *others, "sd"), (over, *others, *others), strict=True):
+            if name in wanted:  # per mm of depth, or in all
+                bases = UNITS.get(of), SPATIAL_UNITS.get(of)
+                found.append(table.column(f"data.columns.{name}", wanted[name], bases))
         at, values, *spread = _branch(np.column_stack(found), branch).T
         curve = cls(others[0], over, at - zero, values, motion, spread[0] if spread else sd, where or {})
         return curve if depth is None else curve._per_depth(DEPTH["check"]("data.depth", depth))
@@ -191,12 +185,12 @@ class MeasuredCurve:
     @property
     def names(self) -> tuple[str, ...]:
         """A name for each value."""
-        return self.runs()[0].question.names
+        return self.runs()[0][1].names
 
     def runs(self) -> list[Run]:
         """The one run."""
         at = tuple(np.asarray(self.at).tolist())
-        return [Run(self.where, Along(self.column, self.over, at, self.motion))]
+        return [(self.where, Along(self.column, self.over, at, self.motion))]
 
     def check(self, motions: int) -> None:
         """InputError for a motion that a scene with so many does not have."""
@@ -242,16 +236,15 @@ class MeasuredValues:
     @property
     def names(self) -> tuple[str, ...]:
         """A name for each value."""
-        rows = zip(*self.where.values(), strict=True)
-        told = (
-            ", ".join(f"{key} {shown(v)}" for key, v in zip(self.where, row, strict=True)) for row in rows
+        return tuple(
+            ", ".join([self.output, *(f"{key} {shown(value)}" for key, value in keys.items())])
+            for keys, _ in self.runs()
         )
-        return tuple(f"{self.output}, {row}" for row in told)
 
     def runs(self) -> list[Run]:
         """A run for each value."""
         rows = zip(*self.where.values(), strict=True)
-        return [Run(dict(zip(self.where, row, strict=True)), Single(self.output)) for row in rows]
+        return [(dict(zip(self.where, row, strict=True)), Single(self.output)) for row in rows]
 
     def check(self, motions: int) -> None:
         """InputError for an output that a scene with so many motions does not have."""
@@ -279,7 +272,8 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
         x, y = np.concatenate([[0.0], x]), np.concatenate([[0.0], y])
     if len(x) > 1 and x[-1] < x[0]:
         x, y = x[::-1], y[::-1]
-    slack = 0.0 if over == "time" else SOLVED * _tolerance(result) * float(np.abs(x).max())
+    tolerance = result.provenance.get("solver", {}).get("tolerance", Solver.tolerance)
+    slack = 0.0 if over == "time" else SOLVED * tolerance * float(np.abs(x).max())
     if len(x) < 2 or not (np.diff(x) > slack).all():
         which = "the run" if motion is None else f"motion {motion}"
         raise InputError("data.over", f"{over}, which does not advance in {which}", "one that does")
@@ -287,11 +281,6 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
         given = f"{over} from {at.min():g} to {at.max():g}"
         raise InputError("data.at", given, f"places within those of the run, {x[0]:g} to {x[-1]:g}")
     return PchipInterpolator(x, y)(np.clip(at, x[0], x[-1]))
-
-
-def _tolerance(result: Result) -> float:
-    """The solver's, of the run."""
-    return float(result.provenance.get("solver", {}).get("tolerance", Solver.tolerance))
 
 
 def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Floats | None]:
@@ -306,11 +295,6 @@ def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Float
     if len(spread) not in (1, count) or not (spread > 0.0).all():
         raise InputError("data.sd", shown(sd), rule)
     return {"values": found, "sd": np.broadcast_to(spread, count).copy()}
-
-
-def _bases(name: str) -> tuple[str | None, ...]:
-    """Units of a column of the history, per mm of depth and in all."""
-    return UNITS.get(name), SPATIAL_UNITS.get(name)
 
 
 def _branch(rows: Floats, branch: str | None) -> Floats:

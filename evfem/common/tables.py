@@ -140,6 +140,23 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
     return buffer.getvalue()
 
 
+def csv_rows(path: Path, key: str, allowed: str) -> list[list[str]]:
+    """The lines of a csv file, the names first, then as many values in each; InputError for others."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as lines:
+            names, *body = [row for row in csv.reader(lines, strict=True) if row] or [[]]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise InputError(key, f"{path.name} ({reason})", allowed) from None
+    odd = [row for row in body if len(row) != len(names)]
+    if odd or len(set(names)) < len(names):
+        reason = f"{','.join(odd[0])[:60]!r}" if odd else "a name twice"
+        raise InputError(key, f"{path.name} with {','.join(names)[:60]!r}, then {reason}", allowed)
+    if len(body) > MOST_ROWS:
+        raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
+    return [names, *body]
+
+
 def read_table(path: Path, key: str) -> dict[str, Any]:
     """All columns of a csv file by the names in its first line: arrays of numbers, or lists of words.
 
@@ -147,22 +164,11 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
     line, a name twice, or lines of another length.
     """
     allowed = "a readable csv file: names in the first line, as many values in each other line"
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as lines:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(lines) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise InputError(key, f"{path.name} ({reason})", allowed) from None
-    names, *body = rows or [[]]
-    odd = [row for row in body if len(row) != len(names)]
-    if odd or not body or len(set(names)) < len(names):
-        reason = f"{','.join(odd[0])[:60]!r}" if odd else "no line of values" if not body else "a name twice"
-        raise InputError(key, f"{path.name} with {','.join(names)[:60]!r}, then {reason}", allowed)
-    if len(body) > MOST_ROWS:
-        raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
-    return {
-        name: words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
-    }
+    names, *body = csv_rows(path, key, allowed)
+    if not body:
+        raise InputError(key, f"{path.name} with {','.join(names)[:60]!r}, then no line of values", allowed)
+    columns = zip(names, zip(*body, strict=True), strict=True)
+    return {name.strip(): words_or_numbers(map(str.strip, column)) for name, column in columns}
 
 
 @dataclass(frozen=True, eq=False)

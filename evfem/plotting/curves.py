@@ -7,8 +7,8 @@ along the abscissa: any column that grows or falls, by default the one that the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from itertools import cycle
+from itertools import cycle, groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -157,11 +157,10 @@ def _of_one_kind(
         if name == always or np.any(np.abs(drawn[name]) > least)
     ]
     ax = _marked(curves(ax, lines, "", axis_label(always, result.units)), over, result)
-    for name, (_, colour, _) in ((name, look) for name, look in texts.items() if name in sd):
-        middle, wide = np.asarray(result[name]), np.asarray(sd[name])
-        moved: list[dict[str, Any]] = [{name: middle - wide}, {name: middle + wide}]
-        ends = (along(replace(result, **one), name, over) for one in moved)
-        ax.fill_between(x, *ends, color=colour, alpha=0.2, linewidth=0)
+    for name in (name for name in texts if name in sd):
+        wide = np.asarray(sd[name])[_drawn(result, over)]
+        ends = drawn[name] - wide, drawn[name] + wide
+        ax.fill_between(x, *ends, color=texts[name][1], alpha=0.2, linewidth=0)
     ax.legend()
     return ax
 
@@ -204,27 +203,16 @@ def _mark_motions(ax: Axes, result: Result) -> None:
     """
     for last in np.flatnonzero(np.diff(result.motion_index)):
         ax.axvline(result.step[last] + 0.5, color="0.6", linewidth=0.8)
-    ends = [*np.flatnonzero(result.motion[1:] != result.motion[:-1]).tolist(), len(result.step) - 1]
     letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
     rows: list[float] = []  # where the last name of each row ends
-    start = 0
-    for end in ends:
-        if end < 0:
-            return
-        middle = 0.5 * (result.step[start] + result.step[end])
-        half = 0.5 * letter * (len(result.motion[end]) + 1)
+    for name, group in groupby(zip(result.motion, result.step, strict=True), key=itemgetter(0)):
+        steps = [step for _, step in group]
+        middle, half = 0.5 * (steps[0] + steps[-1]), 0.5 * letter * (len(name) + 1)
         row = next((row for row, last in enumerate(rows) if last <= middle - half), len(rows))
         rows[row:] = [middle + half, *rows[row + 1 :]]
-        ax.annotate(
-            result.motion[end],
-            (middle, 1.0),
-            (0.0, 2.0 + HIGH * row),
-            xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-        )
-        start = end + 1
+        place, above = ax.get_xaxis_transform(), (0.0, 2.0 + HIGH * row)
+        text = ax.annotate(name, (middle, 1.0), above, xycoords=place, textcoords="offset points")
+        text.set(ha="center", va="bottom")
 
 
 def history(result: Result, columns: Sequence[str], over: str | None = None) -> Panels:

@@ -12,60 +12,47 @@ down. Pressure and shear stand in the surface, attraction begins at the outline.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
+from evfem.errors import EvfemError, InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.figures import BOTH_SIGNS, EDGE, ONE_SIGN, STATUS, TISSUE
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-from collections.abc import Callable
-
-from evfem.errors import EvfemError
 
 Height = Callable[[Floats], Floats]
 
 
 def height_of(result: Result, frame: Frame) -> Height:
-    """Height (mm) of the surface at x (mm) of the laboratory, while the finger is as in `frame`."""
-    known = _from_scene(result)
-    if known is None:
-        return _from_gaps(result, frame)
-    return known if not frame.surface_sink.any() else _sunk(known, result, frame)
-
-
-def _sunk(height: Height, result: Result, frame: Frame) -> Height:
-    """The surface, which has sunk below the pad; beside it as the pad's last node has it."""
+    """Height (mm) of the surface at x (mm) of the laboratory, while the finger is as in `frame`: the scene's,
+    sunk where the pad's nodes say so, or else what their gaps say.
+    """
+    known, place = _from_scene(result), result.mesh.points + frame.displacement
     pad = np.flatnonzero(np.isfinite(frame.gap))
-    x, sink = (result.mesh.points + frame.displacement)[pad, 0], frame.surface_sink[pad]
-    order = np.argsort(x)
-    return lambda at: height(at) - np.interp(at, x[order], sink[order])
+    pad = pad[np.argsort(place[pad, 0])]
+    x, y, gap, sink = place[pad, 0], place[pad, 1], frame.gap[pad], frame.surface_sink[pad]
+    if known is None:
+        return lambda at: np.interp(at, x, y - gap)
+    return known if not sink.any() else lambda at: known(at) - np.interp(at, x, sink)
 
 
 def _from_scene(result: Result) -> Height | None:
     from evfem.scene.file import loads
     from evfem.simulation.model import placed
 
-    try:
+    with suppress(EvfemError):
         surface = loads(result.provenance.get("parameters", "")).ground
-        mesh = result.mesh
-        surface, _ = placed(surface, mesh.points[mesh.node_sets["pad"]])
-    except EvfemError:
-        return None
-    return lambda x: surface.y + surface.height(x)
-
-
-def _from_gaps(result: Result, frame: Frame) -> Height:
-    pad = np.flatnonzero(np.isfinite(frame.gap))
-    x, y = (result.mesh.points + frame.displacement)[pad].T
-    order = np.argsort(x)
-    return lambda at: np.interp(at, x[order], (y - frame.gap[pad])[order])
+        surface, _ = placed(surface, result.mesh.points[result.mesh.node_sets["pad"]])
+        return lambda x: surface.y + surface.height(x)
+    return None
 
 
 STRESSES = tuple(f"cauchy_stress_{c}" for c in ("xx", "yy", "zz", "xy"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -131,15 +132,10 @@ def side_by_side(
     """
     check_field(field)
     views = {name: View(one, frame_of(one, frame), field) for name, one in named(results).items()}
-    rows = [[view.window(None) for view in views.values()]]
-    if near is not None:
-        rows.append([view.window(near) for view in views.values()])
-    shown = [
-        shown_values(view.result.mesh, view.frame, field, window)
-        for row in rows
-        for view, window in zip(views.values(), row, strict=True)
-    ]
-    scale = scale_of(field, np.concatenate(shown), vmin, vmax)
+    levels = [None] if near is None else [None, near]
+    rows = [[view.window(level) for view in views.values()] for level in levels]
+    pairs = (pair for row in rows for pair in zip(views.values(), row, strict=True))
+    scale = scale_of(field, np.concatenate([view.shown(window) for view, window in pairs]), vmin, vmax)
     tall = [max(_height(window) for window in row) for row in rows]
     figure = new_figure(sum(tall) + 0.75 * len(rows), ACROSS * len(views) + 1.0)
     axes = figure.subplots(len(rows), len(views), squeeze=False, height_ratios=tall)
@@ -149,10 +145,8 @@ def side_by_side(
             ax.set_title(told(view.result, view.frame), fontsize="x-small")
     for ax, name in zip(axes[0], views, strict=True):
         ax.set_title(name, fontsize="medium")
-    for ax in axes[:, 1:].ravel():
-        ax.set_ylabel("")
-    for ax in axes[:-1].ravel():
-        ax.set_xlabel("")
+    for ax in axes.ravel():
+        ax.label_outer(remove_inner_ticks=False)
     bar = figure.colorbar(mapped, ax=axes, label=field_label(field), shrink=0.8, extend=scale.extend)
     label_bar(bar, field)
     return Panels(axes.ravel())
@@ -182,11 +176,7 @@ class View:
         """What is shown: left, right, bottom and top in mm."""
         if near is None:
             return _whole(self.points, height_of(self.result, self.frame))
-        if isinstance(near, str):
-            if near != "contact":
-                raise InputError(
-                    "near", quoted(near), "contact, or a window (left, right, bottom, top) in mm"
-                )
+        if near == "contact":
             flat = OF_PAD if self.field in POINT_FIELDS else OF_TISSUE
             return _close(self.points, self.frame, height_of(self.result, self.frame), flat)
         return checked_window(near)
@@ -227,14 +217,11 @@ def check_plane(mesh: Mesh) -> None:
 
 def checked_window(window: Any) -> Window:
     """A window of four numbers, left before right and bottom before top."""
-    allowed = "contact, or a window (left, right, bottom, top) in mm"
-    try:
+    with suppress(TypeError, ValueError):
         left, right, bottom, top = (float(value) for value in window)
-    except (TypeError, ValueError) as error:
-        raise InputError("near", quoted(window), allowed) from error
-    if not (left < right and bottom < top and np.isfinite([left, right, bottom, top]).all()):
-        raise InputError("near", quoted(window), allowed)
-    return left, right, bottom, top
+        if left < right and bottom < top and np.isfinite([left, right, bottom, top]).all():
+            return left, right, bottom, top
+    raise InputError("near", quoted(window), "contact, or a window (left, right, bottom, top) in mm")
 
 
 def _whole(points: Floats, height: Height) -> Window:
@@ -311,13 +298,9 @@ def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
     from matplotlib.collections import LineCollection
 
     edges = mesh.cell_edges.reshape(-1, mesh.cell_edges.shape[-1])
-    owner = np.repeat(mesh.region, mesh.corners)
-    number = mesh.edges[1].ravel()
-    low, high = np.full(number.max() + 1, np.inf), np.full(number.max() + 1, -np.inf)
-    np.minimum.at(low, number, owner)
-    np.maximum.at(high, number, owner)
-    first = np.unique(number, return_index=True)[1]
-    border = edges[first[(np.bincount(number) == 1) | (low < high)]]
+    owner, number = np.repeat(mesh.region, mesh.corners), mesh.edges[1].ravel()
+    _, first, count = np.unique(number, return_index=True, return_counts=True)
+    border = edges[first[(count == 1) | (np.bincount(number, owner) != count * owner[first])]]
     order = [0, 2, 1] if mesh.order == 2 else [0, 1]
     ax.add_collection(LineCollection(list(points[border[:, order]]), colors=EDGE, linewidths=0.5))
 
@@ -342,13 +325,8 @@ def _mark_probes(ax: Axes, result: Result, frame: Frame, window: Window) -> None
             ax.plot(*place, "o", color=look["color"], markersize=6.0, markeredgecolor="white", zorder=3.0)
         if shown:
             box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-            at: dict[str, Any] = {
-                "textcoords": "offset points",
-                "va": "center",
-                "fontsize": "small",
-                "zorder": 3.0,
-            }
-            ax.annotate(look["label"], shown[-1], (6.0, 0.0), color=look["color"], bbox=box, **at)
+            text = ax.annotate(look["label"], shown[-1], (6.0, 0.0), textcoords="offset points", bbox=box)
+            text.set(color=look["color"], va="center", fontsize="small", zorder=3.0)
 
 
 def _draw_surface(ax: Axes, height: Height, window: Window) -> None:

@@ -115,10 +115,8 @@ class SkinView:
         place = self.position[:, ::2]
         if near is None:
             return _around(place, MARGIN)
-        if not isinstance(near, str):
-            return checked_window(near)
         if near != "contact":
-            raise InputError("near", quoted(near), "contact, or a window (left, right, lower, upper) in mm")
+            return checked_window(near)
         touching = self.frame.contact_status[self.skin.nodes] > 0
         if not touching.any():
             gap = self.frame.gap[self.skin.nodes]

@@ -79,15 +79,18 @@ def sweep_histogram(table: SweepResult, column: str, ax: Axes | None = None) -> 
     Cells are as wide as Freedman and Diaconis or Sturges take them, whichever is less (numpy's "auto").
     Raises InputError for a column without numbers.
     """
-    values = _numbers_of(table, column)
-    ax = axes_or_new(ax)
+    found = [row[column] for row in _done(table, column)]
+    if not all(type(value) in (int, float) for value in found):
+        raise InputError("column", quoted(column), "a column of numbers")
+    values, ax = np.array(found, dtype=float), axes_or_new(ax)
     ax.hist(values, bins="auto", color=SKY, edgecolor="white")
     low, high = np.quantile(values, [0.05, 0.95])
     unit = key_unit(column, table.units).replace("mm2", "mm²")
-    mean, deviation = (f"{number:.4g} {unit}".rstrip() for number in (values.mean(), _deviation(values)))
-    ax.axvline(values.mean(), color=BLUE, label=f"mean {mean}, deviation {deviation}")
-    ends = f"{low:.4g} to {high:.4g} {unit}".rstrip()
-    ax.axvspan(low, high, color=ORANGE, alpha=0.25, zorder=0, label=f"90 % of the points: {ends}")
+    deviation = np.std(values, ddof=1) if values.size > 1 else 0.0
+    mean = f"mean {values.mean():.4g} {unit}".rstrip() + f", deviation {deviation:.4g} {unit}".rstrip()
+    ends = f"90 % of the points: {low:.4g} to {high:.4g} {unit}".rstrip()
+    ax.axvline(values.mean(), color=BLUE, label=mean)
+    ax.axvspan(low, high, color=ORANGE, alpha=0.25, zorder=0, label=ends)
     ax.set(xlabel=key_label(column, table.units), ylabel=f"points of {values.size}")
     ax.set_ylim(0.0, 1.35 * ax.get_ylim()[1])  # room for the legend
     ax.legend(loc="upper right")
@@ -114,18 +117,6 @@ def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = 
     return panels
 
 
-def _numbers_of(table: SweepResult, column: str) -> Any:
-    """The numbers in a column; InputError where it has others, or none."""
-    values = [row[column] for row in _done(table, column)]
-    if not all(type(value) in (int, float) for value in values):
-        raise InputError("column", quoted(column), "a column of numbers")
-    return np.array(values, dtype=float)
-
-
-def _deviation(values: Any) -> float:
-    return float(np.std(values, ddof=1)) if values.size > 1 else 0.0
-
-
 def _varied(table: SweepResult) -> list[str]:
     """Columns of several numbers that no run computed."""
     computed = {*FIRST, *LAST, *table.provenance.get("outputs", ())}
@@ -135,13 +126,11 @@ def _varied(table: SweepResult) -> list[str]:
 
 def _ranked(x: Any, y: Any) -> float:
     """Spearman's rank correlation, NaN where one does not change; equal values share the mean rank."""
-    ranks: list[Any] = []
-    for values in (x, y):
-        _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-        ranks.append((np.cumsum(count) - 0.5 * (count - 1))[place])
-    if any(np.ptp(rank) == 0.0 for rank in ranks):
+    from scipy.stats import rankdata
+
+    if not (np.ptp(x) and np.ptp(y)):
         return math.nan
-    return float(np.corrcoef(ranks)[0, 1])
+    return float(np.corrcoef(rankdata(x), rankdata(y))[0, 1])
 
 
 def _check_log(log: str, rows: Sequence[dict[str, Any]], keys: dict[str, str | None]) -> None:
@@ -217,4 +206,4 @@ def _edges(places: Any) -> Any:
     if places.size == 1:
         return places[0] + np.array([-0.5, 0.5])
     middles = 0.5 * (places[1:] + places[:-1])
-    return np.concatenate([[2.0 * places[0] - middles[0]], middles, [2.0 * places[-1] - middles[-1]]])
+    return np.r_[2.0 * places[0] - middles[0], middles, 2.0 * places[-1] - middles[-1]]

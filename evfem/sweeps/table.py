@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections import Counter
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.storage import disk, write_text
-from evfem.common.tables import frame
+from evfem.common.tables import csv_rows, frame
 from evfem.errors import InputError, quoted, readable, unknown
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.fingertip import Fingertip
@@ -148,12 +147,9 @@ class SweepResult:
             if isinstance(values, list):
                 raise InputError("columns", quoted(name), f"columns of numbers: {', '.join(self._numeric)}")
             values = values[~np.isnan(values)]
-            row = {
-                "column": name,
-                "unit": self.units.get(name, ""),
-                "points": values.size,
-                **_moments(values),
-            }
+            row = {"column": name, "unit": self.units.get(name, ""), "points": values.size}
+            row["mean"] = np.mean(values) if values.size else math.nan
+            row["deviation"] = np.std(values, ddof=1) if values.size > 1 else math.nan
             row |= {f"q{q:g}": np.quantile(values, q) if values.size else math.nan for q in quantiles}
             for key, value in row.items():
                 found.setdefault(key, []).append(value)
@@ -174,14 +170,6 @@ class SweepResult:
         return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
 
 
-def _moments(values: Any) -> dict[str, float]:
-    """Mean and standard deviation of a sample."""
-    if not values.size:
-        return {"mean": math.nan, "deviation": math.nan}
-    deviation = float(np.std(values, ddof=1)) if values.size > 1 else math.nan
-    return {"mean": float(np.mean(values)), "deviation": deviation}
-
-
 def is_table(path: Path) -> bool:
     """Whether a file begins as the table of a sweep does."""
     begin = f"{FIRST[0]},".encode()
@@ -200,11 +188,15 @@ def read(path: Path) -> SweepResult:
     if table.suffix == ".json":
         told, table = table, table.parent / TABLE
     provenance = _provenance(told) if told.is_file() else {}
-    names, units, body = _cells(table)
+    head, *body = csv_rows(table, "path", f"{TABLE} of a sweep, a point in each line")
+    parts = [cell.removesuffix(")").partition(" (") for cell in head]
+    names, units = [name for name, _, _ in parts], {name: unit for name, _, unit in parts if unit}
+    if names[:1] != [*FIRST] or not set(LAST) <= set(names):
+        given = f"{path.name}, which starts with {','.join(head)[:60]!r}"
+        raise InputError("path", given, f"{TABLE} of a sweep, a point in each line")
     known = {name: _kept(provenance, name) for name in names}
-    rows = [
-        {name: _value(name, cell, known[name]) for name, cell in zip(names, row, strict=True)} for row in body
-    ]
+    cells = (zip(names, row, strict=True) for row in body)
+    rows = [{name: _value(name, cell, known[name]) for name, cell in row} for row in cells]
     counted = Counter(str(row["status"]) for row in rows)
     points = {"requested": len(rows), **{name: counted[name] for name in STATUS}}
     return SweepResult(tuple(names), rows, {"points": points, **provenance}, units)
@@ -220,23 +212,6 @@ def _provenance(path: Path) -> dict[str, Any]:
     return dict(found)
 
 
-def _cells(path: Path) -> tuple[list[str], dict[str, str], list[list[str]]]:
-    """Names, units and rows of text."""
-    allowed = f"{TABLE} of a sweep, a point in each line"
-    try:
-        with path.open(newline="", encoding="utf-8") as lines:
-            head, *body = list(csv.reader(lines, strict=True))
-    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "not a table"
-        raise InputError("path", f"{path.name} ({reason})", allowed) from None
-    parts = [cell.removesuffix(")").partition(" (") for cell in head]
-    names = [name for name, _, _ in parts]
-    odd = [row for row in body if len(row) != len(names)]
-    if odd or names[:1] != [*FIRST] or not set(LAST) <= set(names):
-        raise InputError("path", f"{path.name}, which starts with {','.join(head)[:60]!r}", allowed)
-    return names, {name: unit for name, _, unit in parts if unit}, body
-
-
 def _kept(provenance: Mapping[str, Any], name: str) -> dict[str, Any]:
     """The values of a column that the sweep was given, by their text in the table."""
     given = (provenance.get("grid") or {}).get(name, ())
@@ -249,12 +224,8 @@ def _value(name: str, cell: str, known: Mapping[str, Any]) -> Any:
     """The value in a cell; None where there is none."""
     if name in ("status", "message"):
         return cell
-    if cell in known:
-        return known[cell]
-    if not cell:
-        return None
     try:
-        return json.loads(cell)
+        return known[cell] if cell in known else json.loads(cell) if cell else None
     except ValueError:
         return cell
 
