@@ -160,9 +160,7 @@ class _Problem:
         self._check_scenes()
 
     def _check_scenes(self) -> None:
-        """Whether the scene can be read with every parameter at its start, and at its bounds; `exact` are the
-        parameters that have derivatives.
-        """
+        """Whether the scene can be read at start and bounds; `exact` are keys that have derivatives."""
         start = self.parameters.values(np.zeros(len(self.parameters.free)))
         scenes = [loads(self.text(keys, start), self.paths) for keys, _ in self.runs]
         self.exact = []
@@ -223,9 +221,7 @@ class _Residuals:
         return [answers[i : i + count] for i in range(0, len(answers), count)]
 
     def predicted(self, points: Sequence[Floats], by: Sequence[str] = ()) -> list[Floats]:
-        """What the runs, differentiated `by` these keys, say for each measured value at each point; NaN where
-        a scene is not solved.
-        """
+        """What the runs, differentiated `by` keys, say for each value at each point; NaN where unsolved."""
         found = self._answers(points, by)
         for one in (one for answers in found for one in answers if one.status != "done"):
             self.failed = one.message
@@ -289,9 +285,7 @@ class _Residuals:
         return columns
 
     def roughness(self, z: Floats, residuals: Floats, jacobian: Floats) -> list[str]:
-        """A sentence for every unknown whose `residuals` (N,) at z change otherwise over `FAR` steps than
-        the `jacobian` (N, P) says; one run each.
-        """
+        """A sentence for every unknown whose residuals change otherwise over `FAR` steps than over one."""
         low, high = self.problem.parameters.bounds
         up, down = (np.minimum(FAR * STEP, room) for room in (high - z, z - low))
         steps = np.where(high - z >= z - low, up, -down)

@@ -298,9 +298,7 @@ def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Float
 
 
 def _branch(rows: Floats, branch: str | None) -> Floats:
-    """Rows (n, 2 or 3) of a place, a value and perhaps its standard deviation: those of a branch, without
-    gaps, one for each place.
-    """
+    """Rows (n, 2 or 3) of place, value and perhaps sd: those of a branch, no gaps, one for each place."""
     rows = rows[np.isfinite(rows).all(axis=1)]
     if branch is not None and len(rows):
         choice("data.branch", branch, ("loading", "unloading"))

@@ -82,9 +82,7 @@ class FitResult:
         return {key: (float(one.value(low)), float(one.value(high))) for (key, one), low, high in ends}
 
     def table(self) -> Any:
-        """A row for each parameter, with its value, the ends of its 95 % interval, its bounds and
-        what it does to its key: a `pandas.DataFrame`, or a numpy record array.
-        """
+        """A row for each parameter: value, 95 % interval, bounds, `apply`; a DataFrame or record array."""
         ends, free = list(self.intervals().values()), self.parameters.values()
         return frame(
             {

@@ -76,10 +76,7 @@ def derivative_of(name: str, key: str) -> str:
 
 @dataclass
 class Runs:
-    """Answers to questions about scenes, computed by a pool, and kept in `folder` if there is one.
-
-    `paths`: where relative paths in the scenes start.
-    """
+    """Answers about scenes, whose paths start at `paths`, by a pool; kept in `folder` if there is one."""
 
     pool: Pool
     paths: Path
@@ -88,9 +85,7 @@ class Runs:
     computed: int = 0
 
     def ask(self, wanted: Sequence[tuple[str, Asked]], by: tuple[str, ...] = ()) -> list[Answer]:
-        """The answers to each pair of a scene's text and the questions about it, and where they have them,
-        their derivatives `by` keys of the scene (`derivative_of`).
-        """
+        """The answers to the questions about each scene, and if there are any their derivatives `by` keys."""
         keys = [self._key(text, questions, by) for text, questions in wanted]
         jobs: dict[str, Job] = {
             key: (text, str(self.paths), questions, by)

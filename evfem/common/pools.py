@@ -129,11 +129,7 @@ def _serve(line: Connection) -> None:
 
 @contextmanager
 def processes(workers: int) -> Iterator[Pool]:
-    """A pool of at most so many processes, started when there is work for them.
-
-    Raises InputError in a process of a pool, and the pool does where no process can start: it
-    begins by importing the script that it comes from.
-    """
+    """A pool of at most so many processes, started when needed; InputError where none can start."""
     if parent_process() is not None:
         raise InputError("workers", "processes inside a process", GUARD)
     pool = _Processes(workers)

@@ -86,11 +86,7 @@ def disk(doing: str) -> Iterator[None]:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Inside, this is the only process at work in `folder`, which is made, and removed if it is left empty.
-
-    The lock belongs to the opened folder, so that nothing is written for it and it ends with the
-    process, however that ends. Raises StorageError where another one has it, or the disk refuses.
-    """
+    """Inside, no other process works in `folder`, which is made, and removed if left empty; or StorageError."""
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     with disk(f"use {folder}"):
         folder.mkdir(parents=True, exist_ok=True)

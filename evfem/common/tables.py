@@ -91,9 +91,7 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
 
 
 def gridded(key: str, x: Floats, z: Floats, value: Floats) -> tuple[Floats, Floats, Floats]:
-    """Increasing x, increasing z and values (rows z, columns x) of rows x, z, value in any order; raises
-    `InputError` with `key` unless there is one row for every pair of at least two x and two z.
-    """
+    """Rising x and z, and values (rows z, columns x), of rows in any order; InputError if a pair is missing."""
     xs, zs = np.unique(x), np.unique(z)
     order = np.lexsort((x, z))
     full = len(xs) * len(zs) == len(x) and min(len(xs), len(zs)) > 1
@@ -158,11 +156,7 @@ def csv_rows(path: Path, key: str, allowed: str) -> list[list[str]]:
 
 
 def read_table(path: Path, key: str) -> dict[str, Any]:
-    """All columns of a csv file by the names in its first line: arrays of numbers, or lists of words.
-
-    Raises `InputError` with `key` for a file that cannot be read, has nothing below its first
-    line, a name twice, or lines of another length.
-    """
+    """Columns of a csv file by the names in its first line: arrays of numbers, or lists of words."""
     allowed = "a readable csv file: names in the first line, as many values in each other line"
     names, *body = csv_rows(path, key, allowed)
     if not body:
@@ -173,9 +167,7 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Headed:
-    """Columns of numbers, NaN where one is missing, with the names and units of their header: small
-    letters, and None where no unit is said. `commas`: whether numbers had decimal commas.
-    """
+    """Columns, NaN for gaps, with names and units; `commas`: whether numbers had decimal commas."""
 
     names: list[str]
     units: list[str | None]
@@ -197,9 +189,7 @@ class Headed:
 
 
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
-    """Columns of a text file (`read_headed`) with exactly the names `header` and a number everywhere, in
-    mm, s and V.
-    """
+    """Columns of a text with exactly the names `header` and a number everywhere, in mm, s and V."""
     allowed = f"a readable csv file with the header {','.join(header)}"
     table = read_headed(path, key, allowed, gaps=False)
     if table.names != header:

@@ -78,10 +78,7 @@ def table(title: str, rows: Sequence[tuple[str, str]], below: str = "") -> str:
 
 
 def curves(lines: Mapping[str, tuple[str, Sequence[float]]]) -> str:
-    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG.
-
-    Coordinates are number and value; the view box scales them. About one point for each pixel is drawn.
-    """
+    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG."""
     finite = [0.0, *(v for _, values in lines.values() for v in values if math.isfinite(v))]
     longest = max(len(values) for _, values in lines.values())
     step, height = max(longest // WIDTH, 1), max(finite) - min(finite) or 1.0

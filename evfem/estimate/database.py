@@ -100,9 +100,7 @@ class Database:
 def responses_of(
     textures: Sequence[Parametric], friction: Floats, linear: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Places (N, 6) of textures, the corrections (N, 3) that are interpolated, and how much each
-    counts (N, 3).
-    """
+    """Places (N, 6) of textures, their corrections (N, 3), and how much each of these counts (N, 3)."""
     points = np.array([texture.point() for texture in textures])
     wavelength, slope = np.array([[texture.wavelength, texture.slope] for texture in textures]).T
     curves = (friction, linear, wavelength, slope)
@@ -146,9 +144,7 @@ def shipped(ridged: bool) -> Database:
 
 @cache
 def reference_curves(ridged: bool) -> dict[str, tuple[Floats, Floats]]:
-    """Of each reference texture of heights, x (mm) and the model's friction of one finger at the
-    usual touch.
-    """
+    """x (mm) and the model's friction of one finger at the usual touch, for each reference texture."""
     table = read_table(DATA / CURVES, "references")
     of = table["ridged"] == float(ridged)
     return {name: (table["x"][of], table[name][of]) for name in REFERENCES}

@@ -163,9 +163,7 @@ def playback(profile: VoltageProfile, touch: Touch, device: Device) -> Playback:
 
 @dataclass(frozen=True, eq=False)
 class ExactCurve:
-    """The coupled model's own voltage (n,) in V over x (n,) mm, and the `friction` (n,) on the
-    display with it.
-    """
+    """The coupled model's own voltage (n,) in V over x (n,) mm, and the `friction` (n,) with it."""
 
     x: Floats
     voltage: Floats
@@ -188,10 +186,7 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
 
 
 def exact_voltage(reference: Recording, device: Device) -> tuple[ExactCurve, Comparison]:
-    """The display's voltage that gives the same friction force as a recorded slide of `touch_scene`
-    over a texture, step by step (`rendering.exact`), from where the texture begins, and how the forces
-    compare. Takes another run of the model.
-    """
+    """The voltage that gives a recorded slide's force in each step (`rendering.exact`), and how they compare."""
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
     result = exact(reference, display, FORCE_LAWS[device.law](), largest).result

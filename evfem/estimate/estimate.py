@@ -162,9 +162,7 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
 def _friction(
     texture: Texture, touch: Touch, near: Parametric, response: Floats
 ) -> tuple[Floats, Floats, float]:
-    """x (n,) in mm, the corrected friction (n,) there, and the share of it that was not found and is
-    interpolated.
-    """
+    """x (n,) in mm, the corrected friction (n,), and the share that was not found and is interpolated."""
     x, linear, period = linear_friction(texture, replace(touch, friction=near.friction, load=near.load))
     found = np.isfinite(linear)
     if not found.all():
@@ -175,9 +173,7 @@ def _friction(
 
 
 def known_error(name: str, ridged: bool) -> float:
-    """What an estimate of a reference texture of heights is off by at the usual touch: root mean
-    square, as a share of the range of the model's curve.
-    """
+    """Rms error of the estimate of a reference texture, as a share of the range of the model's curve."""
     x, friction = reference_curves(ridged)[choice("texture", name, tuple(REFERENCES))]
     curve = estimate(reference(name), Touch(ridged=ridged)).curve
     wrong = np.interp(x, curve.x, curve.friction) - friction
@@ -185,9 +181,7 @@ def known_error(name: str, ridged: bool) -> float:
 
 
 def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, float]:
-    """x (n,) in mm, the friction (n,) there of a pad that yields linearly, NaN where it is not
-    found, and after how many mm it repeats: the texture's period, or a little more than the slide.
-    """
+    """x (n,) in mm, the friction of a pad that yields linearly, NaN where not found, and its period in mm."""
     period = min(texture.period or np.inf, touch.length + 2.0 * BESIDE)
     steps = int(np.ceil(period * steps_over(touch.length) / touch.length))
     x = np.linspace(-BESIDE, period - BESIDE, steps, endpoint=False)

@@ -30,9 +30,7 @@ FIRST_SCALE, FIRST_SMOOTHING, MOST_TRIES = 2.0, 0.1, 600
 
 @dataclass(frozen=True, eq=False)
 class Estimator:
-    """Estimates responses (M,) at places in the box from points (N, 6) and their responses (N, M);
-    `scale` (6,) stretches the axes.
-    """
+    """Responses (M,) at places from those (N, M) of points (N, 6); `scale` (6,) stretches the axes."""
 
     points: Floats
     responses: Floats
@@ -50,9 +48,7 @@ class Estimator:
         return np.asarray(weight / weight.sum())
 
     def holds(self, place: Floats) -> bool:
-        """Whether a place is inside the hull of the points: a mean of them with weights that are not
-        negative.
-        """
+        """Whether a place is inside the hull of the points: a mean with weights that are not negative."""
         from scipy.optimize import linprog
 
         equations = np.concatenate([self.points.T, np.ones((1, len(self.points)))])

@@ -119,9 +119,7 @@ def scene(texture: Parametric) -> Scene:
 def sliding(
     surface: Any, finger: Any, slides: list[tuple[float, int]], speed: float = SPEED, **more: Any
 ) -> Scene:
-    """The coarse pad, viscous, is pressed to the `load` of a `ridged` or smooth finger and slid at that load:
-    lengths in mm and steps.
-    """
+    """The coarse viscous pad is pressed to a `finger`'s `load` and slid at it: lengths in mm and steps."""
     return Scene(
         FingerPad(resolution="coarse", ridges=finger.ridged, viscosity=VISCOSITY),
         surface,

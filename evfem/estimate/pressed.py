@@ -68,10 +68,7 @@ class Remembered:
     compliance: Any
 
     def at(self, load: float, friction: float) -> PressedPad:
-        """The pad under a load (N/mm) and a friction, those of its nodes that touch or nearly do.
-
-        Both are within `LOADS` and `FRICTIONS`.
-        """
+        """The pad under a load (N/mm) and friction within those stored: nodes that touch or nearly do."""
         weight = np.outer(_hats(np.log(LOADS), np.log(load)), _hats(FRICTIONS, friction)).ravel()
         n = len(self.points)
         force = weight @ self.force
@@ -131,9 +128,7 @@ def write(path: Path, pads: Mapping[bool, Remembered]) -> None:
 
 
 def remember(ridged: bool) -> Remembered:
-    """Run the model on a flat surface at `LOADS` and `FRICTIONS` until the whole contact slips, and keep
-    what is stored of it.
-    """
+    """Run the model on a flat surface at `LOADS` and `FRICTIONS` until all slips; what is stored of it."""
     cases = itertools.product(LOADS.tolist(), FRICTIONS.tolist())
     runs = [_slid(Parametric(friction=mu, load=load, ridged=ridged)) for load, mu in cases]
     mesh, pad = runs[0].model.mesh, runs[0].model.pad

@@ -34,10 +34,7 @@ NOISE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A scene, its result, and the position (mm) of the first step in which no touching node sticks.
-
-    `full_slip` is None if some node sticks in every step of the slides.
-    """
+    """A scene, its result, and the position (mm) of the first step in which no touching node sticks, or None."""
 
     scene: Scene
     result: Result
@@ -110,10 +107,7 @@ class ApparentFriction:
 
 
 def apparent_friction(result: Result) -> ApparentFriction:
-    """Applied forces over the slide of `result`, the state just before its first step included.
-
-    Raises InputError unless all slides go towards +x and follow each other.
-    """
+    """Applied forces over the slides towards +x, the state just before them included; else InputError."""
     rows = _slide_rows(result)
     first = rows[0]
     if first > 0:
@@ -286,11 +280,7 @@ class Comparison:
 
 
 def compare(reference: Result, rendered: Result) -> Comparison:
-    """Pearson's r and relative L2 error ||F - F_ref|| / ||F_ref|| of `applied_tangential_force`.
-
-    At equal positions, over all steps of the slide from its first one. Raises InputError if the
-    slides differ.
-    """
+    """Pearson's r and relative L2 error of `applied_tangential_force` over equal slides; else InputError."""
     rows, others = _slide_rows(reference), _slide_rows(rendered)
     x, y = reference.position[rows], rendered.position[others]
     if x.shape != y.shape or not np.allclose(x, y, rtol=0.0, atol=1e-9):

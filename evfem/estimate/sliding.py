@@ -49,9 +49,7 @@ class Ground(Protocol):
 
 
 def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, speed: float) -> Floats:
-    """The apparent friction (n,) at positions (n,) of the bone (mm), at an even spacing, for a speed
-    (mm/s), NaN where the pad is not found. `RUN_IN` steps go before.
-    """
+    """The friction (n,) at even positions (n,) of the bone (mm) and a speed (mm/s); NaN where none is found."""
     step = float(positions[1] - positions[0])
     lag = LAG * VISCOSITY * speed / step
     positions = np.concatenate([positions[0] - step * np.arange(RUN_IN, 0, -1), positions])
@@ -97,9 +95,7 @@ def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, sp
 def _balance(
     compliance: Floats, gap: Floats, slope: Floats, ways: Floats, touching: Any, load: float
 ) -> tuple[Floats, float]:
-    """Forces (2 n,) along `ways` (2 n,) on the nodes that touch, and the bone's height, that close
-    the `gap` (n,) of these nodes and carry the load.
-    """
+    """Forces (2 n,) along `ways` on touching nodes, and the bone's height, that close gaps and carry the load."""
     n = gap.size
     on = np.flatnonzero(touching)
     m = on.size

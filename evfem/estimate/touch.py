@@ -43,10 +43,7 @@ class Touch(Checked):
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Apparent friction F_t / F_n (n,) over the position (n,) mm, x = 0 where the texture begins.
-
-    `source` says where it is from; `error` is its band (half width), None where it is not known.
-    """
+    """Friction (n,) over x (n,) mm from the texture's begin, its `source`, and if known half its band, `error`."""
 
     x: Floats
     friction: Floats
@@ -55,10 +52,7 @@ class FrictionCurve:
 
 
 def touch_scene(texture: Texture, touch: Touch, *, every: int = 0) -> Scene:
-    """The scene of a slide over the texture; `every`: fields of every so many steps are kept.
-
-    The bone passes x = 0 when the second slide begins.
-    """
+    """The scene of a slide over the texture, whose x = 0 is where the second slide begins; fields of `every` n-th step."""
     before = max(SLIP_PER_FORCE * touch.friction * touch.load, 0.5)
     slides = [(before, STEPS_BEFORE), (touch.length, steps_over(touch.length))]
     output = Output(every=every) if every else Output()
@@ -88,10 +82,7 @@ def _file_name(name: str) -> str:
 
 
 def from_texture(result: Result) -> Result:
-    """A slide of `touch_scene` for pictures: its frames stand where the texture's x is that of the curve.
-
-    The surface below them is then that of their gaps.
-    """
+    """A slide of `touch_scene` for pictures: its frames stand where the texture's x is that of the curve."""
     before = _run_in(result)
     frames = [
         replace(one, position=one.position - before, displacement=one.displacement - [before, 0.0])

@@ -145,9 +145,7 @@ def _of_one_kind(
     over: str | None,
     sd: Mapping[str, Any],
 ) -> Axes:
-    """Lines of columns of one kind, with bands of their `sd`; those that are 0 throughout only if they must
-    `always` be there.
-    """
+    """Lines of columns of one kind, with bands of `sd`; only one of zeros must `always` be there."""
     over = checked_over(over, result)
     x, drawn = along(result, over, over), {name: along(result, name, over) for name in texts}
     least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
@@ -176,9 +174,7 @@ def checked_over(over: str | None, result: Result) -> str:
 
 
 def along(result: Result, name: str, over: str) -> Any:
-    """A column as it is drawn over another one; over the time, of the steps that take none only the
-    last.
-    """
+    """A column as it is drawn over another one; over the time, of steps that take none only the last."""
     return values_of(result, name)[_drawn(result, over)]
 
 
@@ -198,9 +194,7 @@ def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
-    """A thin line where a motion ends, its name above, once for neighbours of one name; names that would
-    collide stand in rows.
-    """
+    """A thin line where a motion ends, its name above; names that would collide stand in rows."""
     for last in np.flatnonzero(np.diff(result.motion_index)):
         ax.axvline(result.step[last] + 0.5, color="0.6", linewidth=0.8)
     letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
@@ -216,10 +210,7 @@ def _mark_motions(ax: Axes, result: Result) -> None:
 
 
 def history(result: Result, columns: Sequence[str], over: str | None = None) -> Panels:
-    """Any columns of the history over `over` (see `forces`), a panel for each kind of quantity.
-
-    Raises InputError for what is no column of numbers.
-    """
+    """Columns of the history over `over` (see `forces`), a panel for each kind of quantity."""
     if isinstance(columns, str) or not columns:
         raise InputError("columns", quoted(columns), "a list of at least one column of the history")
     over = checked_over(over, result)
@@ -295,10 +286,7 @@ def contact_area(results: Results, ax: Axes | None = None) -> Axes:
 
 
 def friction(results: Results, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Apparent friction coefficient, tangential over normal force on the bone, over `over` (`forces`).
-
-    Steps without a load on the bone are left out.
-    """
+    """Tangential over normal force on the bone, of steps with a load, over `over` (see `forces`)."""
     found, over = _over(results, over)
     lines = []
     for result, look in styled(found):

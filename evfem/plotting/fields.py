@@ -32,9 +32,7 @@ Height = Callable[[Floats], Floats]
 
 
 def height_of(result: Result, frame: Frame) -> Height:
-    """Height (mm) of the surface at x (mm) of the laboratory, while the finger is as in `frame`: the scene's,
-    sunk where the pad's nodes say so, or else what their gaps say.
-    """
+    """Height (mm) of the surface at x (mm): the scene's, sunk as the pad's nodes say, or by their gaps."""
     known, place = _from_scene(result), result.mesh.points + frame.displacement
     pad = np.flatnonzero(np.isfinite(frame.gap))
     pad = pad[np.argsort(place[pad, 0])]
@@ -249,10 +247,7 @@ def half_edges(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
 
 
 def draw_arrows(ax: Axes, mesh: Mesh, frame: Frame, field: str, height: Height, window: Window) -> Any:
-    """The tractions on the finger as arrows (a Quiver), the longest ones where they are largest.
-
-    Of neighbouring nodes only the one with the largest traction has an arrow.
-    """
+    """Tractions on the finger as arrows (a Quiver), of neighbouring nodes that of the largest traction."""
     values, place = values_of(frame, field), mesh.points + frame.displacement
     nodes = _thinned(place, np.where(within(place, window), np.abs(values), 0.0), window)
     if not nodes.size:

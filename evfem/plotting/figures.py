@@ -40,10 +40,7 @@ SLENDER = 25.0  # height of a colour bar over its width
 
 
 class Panels(tuple["Axes", ...]):
-    """The axes of a picture with several panels, from the top; `figure` is the figure of all.
-
-    In a notebook it shows itself as its picture.
-    """
+    """Axes of several panels, from the top, and their `figure`; a notebook shows them as its picture."""
 
     @property
     def figure(self) -> Figure:
@@ -96,10 +93,7 @@ def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:
 def curves(
     ax: Axes | None, lines: Sequence[tuple[Any, Any, Mapping[str, Any]]], xlabel: str, ylabel: str
 ) -> Axes:
-    """Lines, each with x, y and its look, on a grid, with a legend where there are several.
-
-    Few points are marked: one alone would not be seen.
-    """
+    """Lines of x, y and look on a grid, with a legend where there are several; few points are marked."""
     ax = axes_or_new(ax)
     for x, y, look in lines:
         ax.plot(x, y, **{"marker": "o" if len(x) < 3 else None, **look})

@@ -162,10 +162,7 @@ def key_label(key: str, units: Units = UNITS) -> str:
 
 
 def values_of(result: Result, name: str) -> Any:
-    """A column of the history (steps,).
-
-    Raises InputError for what is no column of numbers.
-    """
+    """A column of the history (steps,); InputError for what is no column of numbers."""
     names = [column for column in result.columns if column != "motion"]
     if name not in names:
         raise InputError("column", quoted(name), " | ".join(names))

@@ -40,9 +40,7 @@ LOST = 0.02
 
 
 def with_choices(content: bytes) -> bytes:
-    """The page with what there is to choose from: force laws without parameters, insulators, and the
-    options of importers.
-    """
+    """The page with force laws without parameters, insulators and options of importers to choose from."""
     laws = {name: name for name, law in FORCE_LAWS.items() if not any(key.required for key in keys_of(law))}
     insulators = {name: f"{name}, {1e3 * one.thickness:g} um" for name, one in INSULATORS.items()}
     options = {key.name: key for one in IMPORTERS.values() for key in keys_of(one) if key.name != "name"}
@@ -170,9 +168,7 @@ def file(state: State, kind: str) -> bytes:
 
 
 def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
-    """The texture in an uploaded file, as the page keeps it; `options` are those of the importers, and
-    `mean` and `rms` of the friction of a recording.
-    """
+    """The texture in an uploaded file as the page keeps it; `options` are an importer's, `mean` and `rms`."""
     safe = "".join(c for c in Path(name).name if c.isalnum() or c in "._- ")[-80:] or "file"
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / safe

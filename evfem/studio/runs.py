@@ -31,9 +31,7 @@ _PLACES = threading.BoundedSemaphore(MOST_RUNS)
 
 
 def run(text: str, exact: bool, send: Callable[[dict[str, Any]], None]) -> None:
-    """Run the model for a state, and find the `exact` voltage of its display if that is wanted;
-    `send` what is said until it ends or `send` raises OSError.
-    """
+    """Run the model for a state, and find the `exact` voltage; `send` lines until it ends or raises OSError."""
     parse(text)
     with _place():
         worker = Worker(_work, text, exact)

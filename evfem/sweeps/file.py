@@ -319,10 +319,7 @@ class DistributionTable:
 
 
 def load(path: str | Path) -> Sweep:
-    """The sweep in a TOML file, named like the file; paths in it are relative to it.
-
-    Raises InputError for whatever cannot be used, StorageError when the disk refuses.
-    """
+    """The sweep in a TOML file, named like it, and paths in it relative to it; or InputError."""
     path = Path(path)
     return loads(read_text("sweep", path), path.parent, path.stem)
 

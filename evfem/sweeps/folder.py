@@ -65,11 +65,7 @@ class SweepFolder:
             raise InputError("overwrite", "resume and overwrite", "one of the two")
 
     def open(self, keys: Collection[str], plan: str) -> None:
-        """Make the folder of the sweep with these keys and the fingerprint `plan`, or clear it.
-
-        Raises InputError, with nothing touched, where files of others are in the way, or points
-        that this sweep does not have.
-        """
+        """Make or clear the folder of the sweep `plan`; InputError where files of others are in it."""
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
             listed, points = self._manifest, self._points()

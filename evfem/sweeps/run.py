@@ -285,10 +285,7 @@ def compute(
     pool: Pool,
     keep: Callable[[str, Answer], None],
 ) -> None:
-    """Give `function` and every job to a pool, and every answer to `keep` as soon as it is there.
-
-    A job whose process died is tried once more at the end, alone.
-    """
+    """Give every job to a pool, every answer to `keep`; a job whose process died is tried again, alone."""
     again = []
     for key, found in pool(function, waiting):
         if isinstance(found, Died):

@@ -178,11 +178,7 @@ def is_table(path: Path) -> bool:
 
 
 def read(path: Path) -> SweepResult:
-    """The table of a sweep, from its folder, its `sweep.json` or any of its csv files.
-
-    A csv file alone has neither provenance nor the kinds of its values: what looks like a number is one.
-    Raises InputError for what is no table of a sweep.
-    """
+    """The table of a sweep from its folder, its `sweep.json`, or a csv file, which alone has no provenance."""
     table = path / TABLE if path.is_dir() else path
     told = table.parent / PROVENANCE
     if table.suffix == ".json":

@@ -358,9 +358,7 @@ def spectrum_of(samples: Floats, rate: float, size: int) -> tuple[Floats, Floats
 
 
 def _lines(frequency: Floats, amplitude: Floats, longest: float) -> tuple[Floats, Floats]:
-    """At most `MOST_LINES` lines from waves of `longest` (mm) to `HIGHEST_FREQUENCY`, neighbours put
-    together by their power.
-    """
+    """At most `MOST_LINES` lines from waves of `longest` (mm) on, neighbours put together by their power."""
     lowest = (1.0 - 1e-9) / longest
     kept = (frequency >= lowest) & (frequency <= HIGHEST_FREQUENCY)
     if kept.sum() < 2:
@@ -376,9 +374,7 @@ def _lines(frequency: Floats, amplitude: Floats, longest: float) -> tuple[Floats
 
 
 def friction_profile(spectrum: Texture, mean: float, rms: float, length: float, seed: int = 0) -> Texture:
-    """A friction profile with this spectrum: `mean`, root mean square `rms` of what varies, over
-    `length` (mm), with phases drawn from `seed`; it never falls below 0.
-    """
+    """A profile over `length` (mm) with this spectrum, mean and rms, phases by `seed`, nowhere below 0."""
     if spectrum.quantity != "friction_spectrum":
         raise InputError("texture", f"{spectrum.name}, {spectrum.quantity}", "a friction spectrum")
     real("mean", mean, "a friction coefficient from 0 to 10", lambda mu: 0.0 <= mu <= 10.0)

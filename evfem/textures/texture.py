@@ -180,10 +180,7 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
 
 
 def read(path: str | Path) -> Texture:
-    """The texture in a `.json` with its `.csv`, or in a folder with both.
-
-    Raises InputError for anything missing, unknown, damaged or beyond the limits of this module.
-    """
+    """The texture in a `.json` with its `.csv`, or in a folder with both; InputError for anything else."""
     path = Path(path)
     path = path / NAME if path.is_dir() else path
     table = _table(path)
