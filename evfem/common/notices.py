@@ -11,8 +11,8 @@ import shutil
 import sys
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from typing import Any, TextIO
 
 from evfem.errors import InputError, StopRun, quoted
@@ -81,18 +81,11 @@ def shown(wanted: bool = True) -> Iterator[None]:
         yield
 
 
-class _NoBar:
+class _NoBar(ExitStack):
     """A progress bar that shows nothing."""
 
     leave = False
-
-    def __enter__(self) -> _NoBar:
-        return self
-
-    def __exit__(self, *reason: object) -> None:
-        return
-
-    update = set_postfix_str = close = staticmethod(lambda *told, **how: None)
+    update = set_postfix_str = staticmethod(lambda *told, **how: None)
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
@@ -146,10 +139,11 @@ def status(label: str) -> Iterator[None]:
 
 def check_observers(observers: Sequence[object]) -> None:
     """Raise InputError for an object that would be told of nothing."""
+    allowed = (
+        "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint) or finished(result)"
+    )
     for i, observer in enumerate(observers):
         if not any(hasattr(observer, event) for event in ("started", "step", "finished")):
-            allowed = "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint) "
-            allowed += "or finished(result)"
             raise InputError(f"observers[{i}]", quoted(observer), allowed)
 
 
@@ -157,11 +151,8 @@ def tell_observers(observers: Sequence[object], event: str, *arguments: Any) -> 
     """Tell every observer; the reasons of those who want the run to end."""
     reasons = []
     for observer in observers:
-        method: Callable[..., None] | None = getattr(observer, event, None)
-        if method is None:
-            continue
         try:
-            method(*arguments)
+            getattr(observer, event, lambda *_: None)(*arguments)
         except StopRun as stop:
             if event != "step":
                 raise

@@ -7,6 +7,7 @@ import io
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,23 +22,17 @@ from evfem.errors import InputError, quoted, unknown
 MOST_ROWS, MOST_BYTES = 1_000_000, 200_000_000
 #: unit -> the one that is meant without a word, and the number of these
 UNITS: Mapping[str, tuple[str, float]] = {
-    **{name: ("mm", size) for name, size in {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3}.items()},
-    "nm": ("mm", 1e-6),
-    "cm": ("mm", 10.0),
-    "m": ("mm", 1e3),
-    "s": ("s", 1.0),
-    "ms": ("s", 1e-3),
-    "us": ("s", 1e-6),
-    "V": ("V", 1.0),
-    "kV": ("V", 1e3),
-    "N": ("N", 1.0),
-    "mN": ("N", 1e-3),
-    "kN": ("N", 1e3),
-    "N/mm": ("N/mm", 1.0),
-    "mm2": ("mm2", 1.0),
-    "MPa": ("MPa", 1.0),
-    "kPa": ("MPa", 1e-3),
-    "Pa": ("MPa", 1e-6),
+    name: (base, size)
+    for base, sizes in {
+        "mm": {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "nm": 1e-6, "cm": 10.0, "m": 1e3},
+        "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+        "V": {"V": 1.0, "kV": 1e3},
+        "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+        "N/mm": {"N/mm": 1.0},
+        "mm2": {"mm2": 1.0},
+        "MPa": {"MPa": 1.0, "kPa": 1e-3, "Pa": 1e-6},
+    }.items()
+    for name, size in sizes.items()
 }
 #: name of a column -> what it is in
 IN = {"time": "s", "voltage": "V", **dict.fromkeys(("x", "y", "z", "height", "position"), "mm")}
@@ -91,7 +86,7 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
 
 
 def gridded(key: str, x: Floats, z: Floats, value: Floats) -> tuple[Floats, Floats, Floats]:
-    """Rising x and z, and values (rows z, columns x), of rows in any order; InputError if a pair is missing."""
+    """Rising x and z, and values (rows z, columns x), of rows in any order; no pair may be missing."""
     xs, zs = np.unique(x), np.unique(z)
     order = np.lexsort((x, z))
     full = len(xs) * len(zs) == len(x) and min(len(xs), len(zs)) > 1
@@ -197,6 +192,8 @@ def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
     return [table.column(f"{key}.{name}", name, (IN.get(name),)) for name in header]
 
 
+#: a cell of a line of units
+UNIT = re.compile(r"[\[(]?([cµμunm]?m|[mu]?s|[mk]?N|N/mm|mm2|k?V|[kM]?Pa|g|m/s\^?2|1/mm|1|-|)[\])]?")
 #: name and unit in a header: x [mm], x (mm), x/mm, "x, mm", x_mm
 NAMED = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\)|[/,]\s*([^/,]+)|_([µμunm]?m|[mu]?s))?")
 
@@ -230,7 +227,7 @@ def read_headed(
     above = [_cells(line.lstrip("#% "), separator) for n, line in lines if n < rows[0][0]]
     heads = [cells for cells in above if len(cells) == width] or above
     parts = [_named(cell) for cell in heads[-1]] if heads else []
-    if len(heads) > 1 and len(heads[-2]) == len(parts) and all(_is_unit(cell) for cell in heads[-1]):
+    if len(heads) > 1 and len(heads[-2]) == len(parts) and all(map(UNIT.fullmatch, heads[-1])):
         parts = [(name.lower(), unit.strip("[]()")) for name, unit in zip(*heads[-2:], strict=True)]
     parts = parts or [(str(i), None) for i in range(1, width + 1)]
     width = len(parts)
@@ -261,12 +258,9 @@ def _text(path: Path, key: str, allowed: str) -> str:
     data = read_bytes(path, key, allowed, MOST_BYTES, f"at most {MOST_BYTES // 10**6} MB")
     codings = ("utf-16",) if data.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "latin-1")
     for coding in codings:
-        try:
-            text = data.decode(coding)
-        except UnicodeDecodeError:
-            continue
-        if "\0" not in text:
-            return text
+        with suppress(UnicodeDecodeError):
+            if "\0" not in (text := data.decode(coding)):
+                return text
     raise InputError(key, f"{path.name} (not a text file)", allowed)
 
 
@@ -293,29 +287,16 @@ def _cells(line: str, separator: str | None) -> list[str]:
 def _numbers(cells: list[str]) -> list[float]:
     """Numbers of a line, NaN for gaps; none where one is something else."""
     try:
-        return [_real(cell) for cell in cells]
+        values = [float(cell.replace(",", ".") or "nan") for cell in cells]
     except ValueError:
         return []
-
-
-def _real(cell: str) -> float:
-    value = float(cell.replace(",", ".") or "nan")
-    if math.isinf(value):
-        raise ValueError(cell)
-    return value
+    return [] if any(map(math.isinf, values)) else values
 
 
 def _named(cell: str) -> tuple[str, str | None]:
     found = NAMED.fullmatch(cell)
     name, *units = found.groups() if found else (cell, None)
     return name.lower(), next((unit.strip() for unit in units if unit), None)
-
-
-def _is_unit(cell: str) -> bool:
-    return (
-        re.fullmatch(r"[\[(]?([cµμunm]?m|[mu]?s|[mk]?N|N/mm|mm2|k?V|[kM]?Pa|g|m/s\^?2|1/mm|1|-|)[\])]?", cell)
-        is not None
-    )
 
 
 def words_or_numbers(words: Iterable[str]) -> Any:

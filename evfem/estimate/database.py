@@ -36,7 +36,7 @@ from evfem.estimate.pressed import FILE as PADS
 from evfem.estimate.pressed import Remembered, remember, write
 from evfem.estimate.pressed import read as read_pad
 from evfem.estimate.sliding import slid
-from evfem.estimate.touch import Touch, steps_over, touch_scene
+from evfem.estimate.touch import Touch, friction_of, steps_over, touch_scene
 from evfem.scene.file import dump
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
@@ -68,11 +68,6 @@ class Database:
     smoothing: float
 
     @cached_property
-    def slope(self) -> Floats:
-        """Slopes (N,) of the first sines."""
-        return np.array([texture.slope for texture in self.textures])
-
-    @cached_property
     def responses(self) -> tuple[Floats, Floats, Floats]:
         """Places (N, 6), corrections (N, 3) and their importance (N, 3)."""
         return responses_of(self.textures, self.friction, self.linear)
@@ -86,15 +81,18 @@ class Database:
     @property
     def relative_errors(self) -> Floats:
         """The errors (N,) as shares of the range of each curve."""
-        return np.asarray(self.errors * self.slope / np.ptp(self.friction, axis=1))
+        slope = np.array([texture.slope for texture in self.textures])
+        return np.asarray(self.errors * slope / np.ptp(self.friction, axis=1))
 
     def errors_of(self, responses: Floats) -> Floats:
         """Root mean square error (N,) of the curves with these corrections (N, 3), over the slope."""
-        found = np.empty(len(self.textures))
-        for i, one in enumerate(self.textures):
-            curve = corrected(_samples(one), self.linear[i], responses[i], one.slope, one.wavelength)
-            found[i] = np.sqrt(np.mean((curve - self.friction[i]) ** 2)) / one.slope
-        return found
+        parts = zip(self.textures, self.friction, self.linear, responses, strict=True)
+        curves = [
+            corrected(_samples(one), linear, response, one.slope, one.wavelength) - friction
+            for one, friction, linear, response in parts
+        ]
+        slope = np.array([texture.slope for texture in self.textures])
+        return np.sqrt(np.mean(np.square(curves), axis=1)) / slope
 
 
 def responses_of(
@@ -163,17 +161,12 @@ def textures() -> list[Parametric]:
 
 def references() -> dict[tuple[str, bool], Scene]:
     """The scenes of the reference textures of heights, by their names and whether ridged."""
-    return {
-        (name, ridged): touch_scene(reference(name), Touch(ridged=ridged))
-        for name in REFERENCES
-        for ridged in (False, True)
-    }
+    both = itertools.product(REFERENCES, (False, True))
+    return {(name, ridged): touch_scene(reference(name), Touch(ridged=ridged)) for name, ridged in both}
 
 
 def _ask(result: Result) -> dict[str, float | None]:
-    last = result.motion_index == 2
-    mu = result.applied_tangential_force[last] / result.applied_force[last]
-    return {f"mu{i:02d}": value for i, value in enumerate(mu.tolist())}
+    return {f"mu{i:02d}": value for i, value in enumerate(friction_of(result).friction.tolist())}
 
 
 def _evaluate(text: str) -> Answer:
@@ -236,6 +229,7 @@ def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
 def _rows(database: Database, ridged: bool) -> list[list[str]]:
     """The rows of one finger, with the errors of points that are left out."""
     found = database.errors_of(database.estimator.left_out())
+    rows = zip(database.textures, database.friction, database.linear, found, strict=True)
     return [
         [
             *(f"{getattr(one, name):.6g}" for name in RANGES),
@@ -243,25 +237,19 @@ def _rows(database: Database, ridged: bool) -> list[list[str]]:
             *(f"{mu:.6f}" for mu in (*curve, *linear)),
             f"{error:.5g}",
         ]
-        for one, curve, linear, error in zip(
-            database.textures, database.friction, database.linear, found, strict=True
-        )
+        for one, curve, linear, error in rows
     ]
 
 
 def _write_references(folder: Path, done: Mapping[tuple[str, bool], Answer]) -> None:
-    """The model's curves of the reference textures."""
+    """The model's curves of the reference textures, NaN where a run has not converged."""
     rows: list[list[str]] = []
     length, steps = Touch().length, steps_over(Touch().length)
     for ridged in (False, True):
+        found = [done[name, ridged].outputs if (name, ridged) in done else {} for name in REFERENCES]
         for i in range(steps):
-            values = [_value(done.get((name, ridged)), i) for name in REFERENCES]
-            x = length * (i + 1) / steps
-            rows.append([f"{x:.6g}", str(int(ridged)), *(f"{mu:.6f}" for mu in values)])
+            values = np.array([outputs.get(f"mu{i:02d}") for outputs in found], dtype=float)
+            rows.append(
+                [f"{length * (i + 1) / steps:.6g}", str(int(ridged)), *(f"{mu:.6f}" for mu in values)]
+            )
     write_text(folder / CURVES, csv_text([["x", "ridged", *REFERENCES], *rows]))
-
-
-def _value(answer: Answer | None, step: int) -> float:
-    """The friction at a step, NaN where the run has not converged."""
-    value = None if answer is None else answer.outputs.get(f"mu{step:02d}")
-    return float("nan") if value is None else float(value)

@@ -186,7 +186,7 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
 
 
 def exact_voltage(reference: Recording, device: Device) -> tuple[ExactCurve, Comparison]:
-    """The voltage that gives a recorded slide's force in each step (`rendering.exact`), and how they compare."""
+    """The voltage that gives a recorded slide's force in each step (`rendering.exact`), and how well."""
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
     result = exact(reference, display, FORCE_LAWS[device.law](), largest).result

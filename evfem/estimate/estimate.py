@@ -38,7 +38,6 @@ TRIED, ENOUGH, BESIDE = 300, 0.9, 0.125
 MUCH = 0.5
 #: relative distance from the speed of the database that is said
 OTHER_SPEED = 0.05
-MODEL = "the model has no such limit"
 
 
 @dataclass(frozen=True)
@@ -151,12 +150,13 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
     x, mu, missing = _friction(texture, touch, near, response)
     notes = _notes(wanted, found, touch)
     if near.slope * error > MUCH * np.ptp(mu):
-        notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
+        notes.append("the error of the estimate is more than half of the range that it shows")
     if missing:
-        notes = (*notes, f"no equilibrium was found on {missing:.0%} of the slide: {MODEL}")
+        notes.append(f"no equilibrium was found on {missing:.0%} of the slide")
     if not database.estimator.holds(place):
-        notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
-    return Estimate(FrictionCurve(x, mu, "estimate", near.slope * error), notes, found)
+        notes.append("the texture is outside the hull of the database's points")
+    curve = FrictionCurve(x, mu, "estimate", near.slope * error)
+    return Estimate(curve, tuple(f"{note}: the model has no such limit" for note in notes), found)
 
 
 def _friction(
@@ -190,17 +190,16 @@ def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, flo
         return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
 
 
-def _notes(wanted: Parametric, found: Reduced, touch: Touch) -> tuple[str, ...]:
+def _notes(wanted: Parametric, found: Reduced, touch: Touch) -> list[str]:
     notes = [
-        f"{name.replace('_', ' ')} {getattr(wanted, name):.3g} is outside the database, "
-        f"{low:g} to {high:g}: {MODEL}"
+        f"{name.replace('_', ' ')} {getattr(wanted, name):.3g} is outside the database, {low:g} to {high:g}"
         for name, (low, high) in wanted.beyond().items()
     ]
     if found.explain < ENOUGH:
         notes.append(
             f"two harmonics of {found.wavelength:.3g} mm hold {found.explain:.0%} of the heights' variance, "
-            f"the rest is not corrected: {MODEL}"
+            "the rest is not corrected"
         )
     if abs(touch.speed / SPEED - 1.0) > OTHER_SPEED:
-        notes.append(f"the corrections were made at {SPEED:g} mm/s: {MODEL}")
-    return tuple(notes)
+        notes.append(f"the corrections were made at {SPEED:g} mm/s")
+    return notes

@@ -59,14 +59,8 @@ class Estimator:
     def _surface(self) -> Any:
         from scipy.interpolate import RBFInterpolator
 
-        return RBFInterpolator(
-            self.points * self.scale,
-            self.responses,
-            kernel="gaussian",
-            epsilon=np.sqrt(0.5),
-            smoothing=self.smoothing,
-            degree=1,
-        )
+        kernel: Any = {"kernel": "gaussian", "epsilon": np.sqrt(0.5), "degree": 1}
+        return RBFInterpolator(self.points * self.scale, self.responses, smoothing=self.smoothing, **kernel)
 
     def left_out(self) -> Floats:
         """Leave-one-out prediction of each point's response, (N, M)."""
@@ -76,11 +70,6 @@ class Estimator:
         """The same without point i."""
         points, responses = np.delete(self.points, i, 0), np.delete(self.responses, i, 0)
         return Estimator(points, responses, self.scale, self.smoothing)
-
-
-def _mean_error(errors: Floats, weights: Floats) -> float:
-    """Mean size of weighted errors (N, M), each of which counts as 1 where it is larger."""
-    return float(np.mean(np.minimum(np.sqrt(np.sum((weights * errors) ** 2, axis=1)), 1.0)))
 
 
 def best_kernel(points: Floats, responses: Floats, weights: Floats) -> tuple[Floats, float]:
@@ -95,7 +84,8 @@ def best_kernel(points: Floats, responses: Floats, weights: Floats) -> tuple[Flo
         square = np.sum((stretched[:, None] - stretched[None]) ** 2, axis=2)
         matrix = np.exp(-0.5 * square) + np.exp(logarithms[-1]) * np.eye(len(points))
         inverse = np.linalg.inv(matrix)
-        return _mean_error(inverse @ rest / np.diag(inverse)[:, None], weights)
+        sizes = np.linalg.norm(weights * (inverse @ rest) / np.diag(inverse)[:, None], axis=1)
+        return float(np.mean(np.minimum(sizes, 1.0)))
 
     begin = np.append(np.full(points.shape[1], np.log(FIRST_SCALE)), np.log(FIRST_SMOOTHING))
     found = minimize(error, begin, method="Nelder-Mead", options={"maxfev": MOST_TRIES})

@@ -76,12 +76,9 @@ class Parametric(Checked):
 
     def beyond(self) -> dict[str, tuple[float, float]]:
         """Parameters outside the database, with what it has: {} where it has all of them."""
-        slack = 1e-9
-        return {
-            name: (low, high)
-            for name, (low, high, _) in RANGES.items()
-            if not low - slack <= getattr(self, name) <= high + slack
-        }
+        ends = {name: (low - 1e-9, high + 1e-9) for name, (low, high, _) in RANGES.items()}
+        wrong = [name for name, (low, high) in ends.items() if not low <= getattr(self, name) <= high]
+        return {name: RANGES[name][:2] for name in wrong}
 
     def point(self) -> Floats:
         """Its place (6,) in the database, 0 to 1 along each axis where it is inside."""
@@ -111,8 +108,8 @@ def scene(texture: Parametric) -> Scene:
     """Viscous sliding of the coarse pad over the texture at a held load: a second slide of one
     period in `SAMPLES` steps, after a first one over whole periods until everything slips.
     """
-    periods = np.ceil(SLIP_PER_FORCE * texture.friction * texture.load / texture.wavelength)
-    slides = [(float(periods) * texture.wavelength, STEPS_BEFORE), (texture.wavelength, SAMPLES)]
+    periods = float(np.ceil(SLIP_PER_FORCE * texture.friction * texture.load / texture.wavelength))
+    slides = [(periods * texture.wavelength, STEPS_BEFORE), (texture.wavelength, SAMPLES)]
     return sliding(texture.surface(), texture, slides, name="texture")
 
 

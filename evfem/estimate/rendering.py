@@ -34,18 +34,11 @@ NOISE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A scene, its result, and the position (mm) of the first step in which no touching node sticks, or None."""
+    """A scene, its result, and the position (mm) of the first step without a sticking node, or None."""
 
     scene: Scene
     result: Result
     full_slip: float | None
-
-    @property
-    def peak_voltage(self) -> Array:
-        """Peak (V) of the waveform in every step, `result.voltage` being its effective value: that
-        of the scene's drive, or of a sine.
-        """
-        return np.asarray((self.scene.drive or Drive()).peak(self.result.voltage))
 
 
 def record(scene: Scene, observers: Sequence[Observer] = ()) -> Recording:
@@ -109,9 +102,7 @@ class ApparentFriction:
 def apparent_friction(result: Result) -> ApparentFriction:
     """Applied forces over the slides towards +x, the state just before them included; else InputError."""
     rows = _slide_rows(result)
-    first = rows[0]
-    if first > 0:
-        rows = np.concatenate([[first - 1], rows])
+    rows = np.arange(max(rows[0] - 1, 0), rows[-1] + 1)
     x = result.position[rows]
     if np.any(np.diff(x) <= 0.0):
         raise InputError("slide", "positions that do not grow from step to step", "a slide towards +x")
@@ -237,8 +228,8 @@ def exact(
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as its
     equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
     attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
-    was. The voltage found, an effective one, is in `result.voltage`, the peak of the `drive`'s waveform in
-    `peak_voltage`; `Comparison.unmet` says where the wish was out of reach.
+    was. The voltage found, an effective one, is in `result.voltage`; `Comparison.unmet` says where the wish
+    was out of reach.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)

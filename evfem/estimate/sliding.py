@@ -49,7 +49,7 @@ class Ground(Protocol):
 
 
 def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, speed: float) -> Floats:
-    """The friction (n,) at even positions (n,) of the bone (mm) and a speed (mm/s); NaN where none is found."""
+    """The friction (n,) at even positions (n,) of the bone (mm) and a speed (mm/s), NaN where not found."""
     step = float(positions[1] - positions[0])
     lag = LAG * VISCOSITY * speed / step
     positions = np.concatenate([positions[0] - step * np.arange(RUN_IN, 0, -1), positions])
@@ -95,7 +95,7 @@ def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, sp
 def _balance(
     compliance: Floats, gap: Floats, slope: Floats, ways: Floats, touching: Any, load: float
 ) -> tuple[Floats, float]:
-    """Forces (2 n,) along `ways` on touching nodes, and the bone's height, that close gaps and carry the load."""
+    """Forces (2 n,) along `ways` on touching nodes, and the bone's height: gaps close under the load."""
     n = gap.size
     on = np.flatnonzero(touching)
     m = on.size

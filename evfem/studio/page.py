@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Key, keys_of
-from evfem.common.tables import csv_text
+from evfem.common.checks import Key, choice, keys_of
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.electrostatics.signalfile import write_signal
-from evfem.errors import InputError
 from evfem.estimate.display import Device, Rendering, playback, render, render_exact, spectrum_of
 from evfem.estimate.estimate import estimate
 from evfem.estimate.touch import FrictionCurve, touch_scene
@@ -79,6 +77,7 @@ def answer(state: State) -> dict[str, Any]:
     wish, felt = (np.interp(x, found.curve.x, one) for one in (found.curve.friction, found.felt))
     frequency, wished = spectrum_of(x, wish, state.touch.speed)
     given = spectrum_of(x, felt, state.touch.speed)[1]
+    layers = state.device.encoding.layers
     return {
         "quantity": state.texture.quantity,
         "x": _short(x),
@@ -93,7 +92,7 @@ def answer(state: State) -> dict[str, Any]:
         "frequency": _short(frequency),
         "wish": _short(wished),
         "given": _short(given),
-        "numbers": _numbers(found) | {"laws": _ratio_of_laws(state)},
+        "numbers": _numbers(found) | {"laws": float(layers.thickness / layers.reduced)},
         "bands": [[None if value != value else round(value, 6) for value in band] for band in found.bands],
         "notes": [*notes, *_warnings(found)],
         "texture": repr(state.texture),
@@ -130,20 +129,11 @@ def _numbers(found: Rendering) -> dict[str, float | None]:
     return {name: None if value != value else value for name, value in told.items()}
 
 
-def _ratio_of_laws(state: State) -> float:
-    """How many times as hard as Kaczmarek's law Strong and Troxel's attracts touching skin."""
-    layers = state.device.encoding.layers
-    return float(layers.thickness / layers.reduced)
-
-
 def _warnings(found: Rendering) -> list[str]:
-    notes = []
-    if found.signal.share_not_renderable > LOST:
-        share = found.signal.share_not_renderable
-        notes.append(f"{share:.0%} of the slide is slipperier than the display: it cannot be rendered")
-    if found.signal.share_limited > LOST:
-        notes.append(f"the amplifier cannot follow on {found.signal.share_limited:.0%} of the slide")
-    return notes
+    below, limited = found.signal.share_not_renderable, found.signal.share_limited
+    told = f"{below:.0%} of the slide is slipperier than the display: it cannot be rendered"
+    slow = f"the amplifier cannot follow on {limited:.0%} of the slide"
+    return [*([told] if below > LOST else []), *([slow] if limited > LOST else [])]
 
 
 def _short(values: Floats) -> list[float]:
@@ -152,14 +142,12 @@ def _short(values: Floats) -> list[float]:
 
 def file(state: State, kind: str) -> bytes:
     """The file of a button, as bytes."""
-    if kind not in FILES:
-        raise InputError("file", repr(kind), ", ".join(FILES))
+    choice("file", kind, FILES)
     if kind == "toml":
         return dump(touch_scene(state.texture, state.touch)).encode()
     curve, _ = _curve(state)
     if kind == "friction":
-        both = zip(curve.x.tolist(), curve.friction.tolist(), strict=True)
-        return csv_text([["x", "friction"], *both]).encode()
+        return curve.rows().encode()
     profile = _rendering(state, curve).signal.profile
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"file.{kind}"

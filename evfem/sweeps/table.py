@@ -178,7 +178,7 @@ def is_table(path: Path) -> bool:
 
 
 def read(path: Path) -> SweepResult:
-    """The table of a sweep from its folder, its `sweep.json`, or a csv file, which alone has no provenance."""
+    """The table of a sweep from its folder, `sweep.json`, or a csv file, which alone has no provenance."""
     table = path / TABLE if path.is_dir() else path
     told = table.parent / PROVENANCE
     if table.suffix == ".json":

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import above, choice, set_frozen
+from evfem.common.checks import above, choice, real, set_frozen
 from evfem.common.storage import disk, write_text
-from evfem.common.tables import csv_text, numbers, read_columns
+from evfem.common.tables import csv_text, numbers, read_bytes, read_columns
 from evfem.common.views import plus
 from evfem.errors import InputError, quoted
 
@@ -33,11 +34,10 @@ QUANTITIES = {
     "friction_spectrum": (["frequency", "amplitude"], ["1/mm", "1"]),
 }
 KEYS = ("format", "name", "kind", "quantity", "period", "length", "units", "licence", "provenance", "data")
-#: what a texture may be at most: rows, mm of length, mm of height, friction coefficient, letters of
-#: a text, sentences of provenance, bytes of a `.json`
-MOST_ROWS, LONGEST, HIGHEST, ROUGHEST, MOST_LETTERS, MOST_NOTES, MOST_BYTES = (
-    200_000, 1e4, 10.0, 100.0, 400, 200, 200_000,
-)  # fmt: skip
+#: what a texture may be at most: rows, mm of length, letters of a text, sentences of provenance, bytes of a
+#: `.json`; and its least and largest values
+MOST_ROWS, LONGEST, MOST_LETTERS, MOST_NOTES, MOST_BYTES = 200_000, 1e4, 400, 200, 200_000
+ENDS = {"height": (-10.0, 10.0), "friction": (0.0, 100.0), "friction_spectrum": (0.0, 1.5)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,19 +133,9 @@ class Texture:
 
     def document(self, data: str) -> dict[str, Any]:
         """Content of its `.json`, whose rows are in the file `data`."""
-        header, units = QUANTITIES[self.quantity]
-        return {
-            "format": FORMAT,
-            "name": self.name,
-            "kind": self.kind,
-            "quantity": self.quantity,
-            "period": self.period,
-            "length": self.length,
-            "units": dict(zip(header, units, strict=True)),
-            "licence": self.licence,
-            "provenance": list(self.provenance),
-            "data": data,
-        }
+        units = dict(zip(*QUANTITIES[self.quantity], strict=True))
+        given = {"format": FORMAT, "units": units, "provenance": list(self.provenance), "data": data}
+        return {key: given[key] if key in given else getattr(self, key) for key in KEYS}
 
     def rows(self) -> str:
         """Content of its `.csv`."""
@@ -197,49 +187,36 @@ def read(path: str | Path) -> Texture:
     x, values = read_columns(path.with_name(data), header, "data")
     names = ("name", "kind", "licence", "quantity", "period", "provenance")
     found = Texture(x=x, values=values, **{name: table[name] for name in names})
-    if not _near(table["length"], found.length):
+    length = real("length", table["length"], "the length of the rows in mm")
+    if abs(length - found.length) > 1e-6 * max(found.length, 1.0):
         raise InputError("length", quoted(table["length"]), f"that of the rows, {found.length:g} mm")
     return found
 
 
 def is_texture(path: Path) -> bool:
     """Whether a `.json` says that it is a texture."""
-    try:
+    with suppress(InputError):
         return _table(path).get("format") == FORMAT
-    except InputError:
-        return False
+    return False
 
 
 def is_data(path: Path) -> bool:
     """Whether a `.csv` has the rows of the texture beside it."""
-    try:
+    with suppress(InputError):
         return _table(path.with_suffix(".json")).get("data") == path.name
-    except InputError:
-        return False
+    return False
 
 
 def _table(path: Path) -> Mapping[str, Any]:
     allowed = "a readable texture: a .json beside its .csv, or a folder with both"
+    data = read_bytes(path, "texture", allowed, MOST_BYTES, f"at most {MOST_BYTES} bytes")
     try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-        if len(data) > MOST_BYTES:
-            raise InputError("texture", f"{path}, which is too long", f"at most {MOST_BYTES} bytes")
         table = json.loads(data.decode("utf-8"))
-    except OSError as error:
-        raise InputError("texture", f"{path} ({error.strerror or error})", allowed) from None
-    except InputError:
-        raise
     except (ValueError, RecursionError):
         raise InputError("texture", f"{path}, which is no JSON", allowed) from None
     if not isinstance(table, dict):
         raise InputError("texture", f"{path}, whose JSON is no object", allowed)
     return table
-
-
-def _near(given: object, length: float) -> bool:
-    number = isinstance(given, (int, float)) and not isinstance(given, bool)
-    return number and abs(given - length) <= 1e-6 * max(length, 1.0)  # type: ignore[operator]
 
 
 def _text(key: str, value: object) -> None:
@@ -261,7 +238,7 @@ def _check_rows(x: Floats, values: Floats) -> None:
 
 def _check_range(texture: Texture) -> None:
     values, quantity = texture.values, texture.quantity
-    low, high = {"height": (-HIGHEST, HIGHEST), "friction": (0.0, ROUGHEST)}.get(quantity, (0.0, 1.5))
+    low, high = ENDS[quantity]
     if values.min() < low or values.max() > high:
         wrong = values[int(np.argmax(np.maximum(low - values, values - high)))]
         raise InputError(quantity, f"{wrong:g}", f"values from {low:g} to {high:g}, lengths in mm")
