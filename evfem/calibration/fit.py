@@ -246,9 +246,8 @@ class _Residuals:
         found = self._derivatives(z)
         self.exact = [name for name in self.exact if np.isfinite(found[name]).all()]
         rest = [i for i, name in enumerate(self.problem.parameters.names) if name not in self.exact]
-        columns = np.column_stack(
-            [found.get(name, self.problem.scale) for name in self.problem.parameters.names]
-        )
+        names = self.problem.parameters.names
+        columns = np.column_stack([found.get(name, self.problem.scale) for name in names])
         if rest:
             columns[:, rest] = np.column_stack(self._differences(z, rest))
         return columns / self.problem.scale[:, None]

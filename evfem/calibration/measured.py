@@ -112,9 +112,8 @@ class MeasuredCurve:
     where: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("column", "over"):
-            if getattr(self, name) not in NUMBERS:
-                given = str(getattr(self, name))
+        for name, given in (("column", str(self.column)), ("over", str(self.over))):
+            if given not in NUMBERS:
                 raise unknown(f"data.{name}", given, list(NUMBERS), f"{quoted(given)}, no column")
         set_frozen(self, at=numbers("data.at", self.at, f"a list of places, of {self.over}"))
         set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as places"))
@@ -257,19 +256,17 @@ Measured = MeasuredCurve | MeasuredValues
 def along(result: Result, column: str, over: str, at: Floats, motion: int | None = None) -> Floats:
     """Values of a column where the column `over` is `at` (N,), in a motion or in all.
 
-    Before the motion is the last state of the one before; before a first press without voltage it is zero.
-    Columns are known to `SOLVED` tolerances: a place that little beyond the end is at it. Raises InputError
-    where `over` turns round, and beyond it.
+    Before the motion is the last state of the one before, before a first press without voltage zero. A place
+    beyond the end by up to `SOLVED` tolerances is at it. InputError where `over` turns round, and beyond it.
     """
     from scipy.interpolate import PchipInterpolator
 
     rows = np.arange(len(result.step)) if motion is None else np.flatnonzero(result.motion_index == motion)
-    first = int(rows[0])
-    if first > 0:
-        rows = np.concatenate([[first - 1], rows])
-    x, y = (np.asarray(getattr(result, name), dtype=float)[rows] for name in (over, column))
-    if first == 0 and result.motion[0] == "press" and not result.voltage.any():
-        x, y = np.concatenate([[0.0], x]), np.concatenate([[0.0], y])
+    x, y = (
+        getattr(result, name)[max(rows[0] - 1, 0) : rows[-1] + 1].astype(float) for name in (over, column)
+    )
+    if rows[0] == 0 and result.motion[0] == "press" and not result.voltage.any():
+        x, y = np.append(0.0, x), np.append(0.0, y)
     if len(x) > 1 and x[-1] < x[0]:
         x, y = x[::-1], y[::-1]
     tolerance = result.provenance.get("solver", {}).get("tolerance", Solver.tolerance)
@@ -315,7 +312,8 @@ def _branch(rows: Floats, branch: str | None) -> Floats:
 def _setting(key: Any, value: Any) -> Any:
     check_key("data.where", str(key))
     found = plain_value(f"data.where.{key}", value)
-    each = found if isinstance(found, list) else [found]
-    if any(isinstance(one, float) and not math.isfinite(one) for one in each):
+    if any(
+        isinstance(one, float) and not math.isfinite(one) for one in np.ravel(np.array(found, dtype=object))
+    ):
         raise InputError(f"data.where.{key}", quoted(value), "finite numbers")
     return found

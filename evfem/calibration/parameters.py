@@ -107,9 +107,8 @@ class Parameters:
     @property
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest unknowns, (P,) each."""
-        low, high = (
-            [one.unknown(getattr(one, end)) for one in self.free.values()] for end in ("low", "high")
-        )
+        free = self.free.values()
+        low, high = ([one.unknown(getattr(one, end)) for one in free] for end in ("low", "high"))
         return np.array(low), np.array(high)
 
     def values(self, z: Floats) -> dict[str, float]:

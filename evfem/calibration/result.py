@@ -118,9 +118,8 @@ class FitResult:
         rows = []
         for (key, one), (low, high) in zip(self.parameters.items(), self.intervals().values(), strict=True):
             kind = "" if one.apply == "value" else f" as {one.apply}"
-            known = (
-                f"{low:.3g} to {high:.3g} with 95 % confidence" if math.isfinite(high) else "not determined"
-            )
+            told = f"{low:.3g} to {high:.3g} with 95 % confidence"
+            known = told if math.isfinite(high) else "not determined"
             rows.append((key, f"{self.values[key]:.4g}{kind} ({known})"))
         return rows
 

@@ -30,9 +30,8 @@ def wrapped(text: str, stream: TextIO) -> str:
     if not stream.isatty():
         return text
     columns = max(shutil.get_terminal_size().columns, 40)
-    return textwrap.fill(
-        text, columns - 1, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
-    )
+    whole: Any = {"break_long_words": False, "break_on_hyphens": False}
+    return textwrap.fill(text, columns - 1, subsequent_indent="  ", **whole)
 
 
 def warn(text: str) -> None:
@@ -140,7 +139,7 @@ def status(label: str) -> Iterator[None]:
 def check_observers(observers: Sequence[object]) -> None:
     """Raise InputError for an object that would be told of nothing."""
     allowed = (
-        "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint) or finished(result)"
+        "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint), finished(result)"
     )
     for i, observer in enumerate(observers):
         if not any(hasattr(observer, event) for event in ("started", "step", "finished")):

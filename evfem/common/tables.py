@@ -110,9 +110,7 @@ def frame(columns: Mapping[str, Any]) -> Any:
     return records
 
 
-def dataset(
-    variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Mapping[str, Any]
-) -> Any:
+def dataset(variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Any) -> Any:
     """An `xarray.Dataset`; InputError where xarray is not installed."""
     try:
         from xarray import Dataset

@@ -219,9 +219,8 @@ def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
         words = [f"{value:.4g}" for value in (*scale, smoothing)]
         kernels.append([str(int(ridged)), *words])
         written = np.array([float(word) for word in words])
-        rows += _rows(
-            Database(textures, friction, linear, np.zeros(0), written[:-1], float(written[-1])), ridged
-        )
+        known = Database(textures, friction, linear, np.zeros(0), written[:-1], float(written[-1]))
+        rows += _rows(known, ridged)
     write_text(folder / KERNELS, csv_text([["ridged", *RANGES, "smoothing"], *kernels]))
     write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *LINEAR, ERROR], *rows]))
 
@@ -249,7 +248,6 @@ def _write_references(folder: Path, done: Mapping[tuple[str, bool], Answer]) -> 
         found = [done[name, ridged].outputs if (name, ridged) in done else {} for name in REFERENCES]
         for i in range(steps):
             values = np.array([outputs.get(f"mu{i:02d}") for outputs in found], dtype=float)
-            rows.append(
-                [f"{length * (i + 1) / steps:.6g}", str(int(ridged)), *(f"{mu:.6f}" for mu in values)]
-            )
+            x = length * (i + 1) / steps
+            rows.append([f"{x:.6g}", str(int(ridged)), *(f"{mu:.6f}" for mu in values)])
     write_text(folder / CURVES, csv_text([["x", "ridged", *REFERENCES], *rows]))

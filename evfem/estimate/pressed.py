@@ -98,9 +98,8 @@ def shipped_pad(ridged: bool) -> Remembered:
 def read(path: Path, ridged: bool) -> Remembered:
     """The pad of one finger in a file that `write` wrote."""
     arrays = load_arrays(path, "pads", FORMAT)
-    points, moved, force, packed = (
-        arrays[f"{name}_{int(ridged)}"] for name in ("points", "moved", "force", "triangle")
-    )
+    names = ("points", "moved", "force", "triangle")
+    points, moved, force, packed = (arrays[f"{name}_{int(ridged)}"] for name in names)
     size = moved.shape[1]
     upper = np.triu_indices(size)
     compliance = np.zeros((len(moved), size, size), dtype=np.float32)

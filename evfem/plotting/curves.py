@@ -15,6 +15,7 @@ import numpy as np
 
 from evfem.calibration.result import FitResult
 from evfem.common.arrays import Floats
+from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
 from evfem.plotting.fields import frame_of
 from evfem.plotting.figures import (
@@ -38,10 +39,10 @@ from evfem.plotting.labels import (
     axis_label,
     column_label,
     column_text,
+    field_label,
     kind_of,
     named,
     on_lines,
-    quantity_label,
     units_of,
     values_of,
 )
@@ -148,11 +149,11 @@ def _of_one_kind(
     """Lines of columns of one kind, with bands of `sd`; only one of zeros must `always` be there."""
     over = checked_over(over, result)
     x, drawn = along(result, over, over), {name: along(result, name, over) for name in texts}
-    least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
+    sizes = {name: float(np.abs(y).max(initial=0.0)) for name, y in drawn.items()}
     lines = [
         (x, drawn[name], {"label": label, "color": colour, "linestyle": style})
         for name, (label, colour, style) in texts.items()
-        if name == always or np.any(np.abs(drawn[name]) > least)
+        if name == always or sizes[name] > ZERO * max(sizes.values())
     ]
     ax = _marked(curves(ax, lines, "", axis_label(always, result.units)), over, result)
     for name in (name for name in texts if name in sd):
@@ -167,10 +168,7 @@ def checked_over(over: str | None, result: Result) -> str:
     """The name of the abscissa."""
     if over is None:
         return abscissa(result)
-    allowed = [name for name in OVER if name in result.columns]
-    if over not in allowed:
-        raise InputError("over", quoted(over), " | ".join(allowed))
-    return over
+    return choice("over", over, [name for name in OVER if name in result.columns])
 
 
 def along(result: Result, name: str, over: str) -> Any:
@@ -232,10 +230,8 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
 def probes(
     result: Result, quantity: str = "von_mises", over: str | None = None, ax: Axes | None = None
 ) -> Axes:
-    """What was found at the points of all probes, a line for each, over `over` (see `forces`).
-
-    `quantity` is one of a `ProbeHistory`, of a vector or tensor with its component: `cauchy_stress_yy`,
-    `displacement_x`, `principal_stretches_1`. Points are told by their place in the undeformed tissue.
+    """A `quantity` of a `ProbeHistory`, or a component (`cauchy_stress_yy`, `principal_stretches_1`), a line
+    for each point of all probes, over `over` (see `forces`).
     """
     if not result.probes:
         raise InputError("result", "a run without probes", "a run of a scene with Output(probes=...)")
@@ -246,7 +242,7 @@ def probes(
         for place, y, style in zip(probe.position, values.T, cycle(STYLES)):
             label = f"{look['label']} ({', '.join(f'{at + 0.0:.3g}' for at in place)})"
             lines.append((x, y, look | {"label": label, "linestyle": style}))
-    ax = _marked(curves(ax, lines, "", quantity_label(quantity)), over, result)
+    ax = _marked(curves(ax, lines, "", field_label(quantity)), over, result)
     ax.legend(fontsize="small")
     return ax
 
@@ -263,11 +259,8 @@ def compare(
 
 def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
     """Applied force over indentation, of the presses of one result or of several by their names."""
-    found = named(results)
-    lines = [
-        (*_of_presses(result, "indentation", "applied_force"), look | {"marker": "."})
-        for result, look in styled(found)
-    ]
+    found, columns = named(results), ("indentation", "applied_force")
+    lines = [(*_of_presses(one, *columns), look | {"marker": "."}) for one, look in styled(found)]
     units = units_of(found)
     return curves(ax, lines, column_label("indentation", units), axis_label("applied_force", units))
 
@@ -278,7 +271,7 @@ def contact_area(results: Results, ax: Axes | None = None) -> Axes:
     for result, look in styled(found):
         width = "contact_area" if result.mesh.dim == 3 else "contact_width"
         for column, text, style in ((width, "edge to edge", "-"), (f"real_{width}", "touching", "--")):
-            label = ", ".join(filter(None, (look["label"], text)))
+            label = f"{look['label']}, {text}".removeprefix(", ")
             own = look | {"label": label, "linestyle": style, "marker": "."}
             lines.append((*_of_presses(result, "applied_force", column), own))
     units = units_of(found)
@@ -317,19 +310,13 @@ def spectrum(
     stop: float | None = None,
     window: str = "none",
 ) -> Axes:
-    """Amplitudes of a column over the frequency (Hz), of one result or of several by their names.
-
-    They are those of `ev.spectrum`, which says what `start`, `stop` and `window` are; the mean, at
-    0 Hz, is left out.
+    """Amplitudes of a column over the frequency (Hz) without the mean, of one result or of several by their
+    names, as `ev.spectrum` finds them.
     """
-    found = named(results)
-    drawn = {
-        name: spectra.spectrum(result, column, start=start, stop=stop, window=window)
-        for name, result in found.items()
-    }
-    ax, lines = axes_or_new(ax), []
-    for number, ((frequency, amplitude), look) in enumerate(styled(drawn)):
-        f, a, look = frequency[1:], amplitude[1:], look | {"linewidth": 1.0}
+    found, ax, lines = named(results), axes_or_new(ax), []
+    for number, (result, look) in enumerate(styled(found)):
+        f, a = (x[1:] for x in spectra.spectrum(result, column, start=start, stop=stop, window=window))
+        look |= {"linewidth": 1.0}
         if len(f) <= FEW:
             ax.vlines(f, 0.0, a, colors=look["color"], linewidth=THICK / (1.0 + number))
             look |= {"linestyle": "none", "marker": "oxs^v"[number % 5], "markersize": 4}
@@ -338,10 +325,7 @@ def spectrum(
 
 
 def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) -> Axes:
-    """Contact pressure, shear and electrostatic traction (MPa) of the pad over its current x (mm).
-
-    Shear and attraction are left out where they are 0 throughout.
-    """
+    """Contact pressure, and shear and attraction if there is any (MPa), of the pad over its x (mm)."""
     check_plane(result.mesh)
     shown = frame_of(result, frame)
     pad = np.flatnonzero(np.isfinite(shown.gap))

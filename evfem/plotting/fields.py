@@ -74,18 +74,11 @@ def values_of(frame: Frame, field: str) -> Floats:
     return getattr(frame, field)
 
 
-def check_field(field: str) -> None:
-    """Raises InputError unless the field is one of `FIELDS`."""
-    if field not in FIELDS:
-        raise InputError("field", quoted(field), " | ".join(FIELDS))
-
-
 def frame_of(result: Result, number: int) -> Frame:
     """A frame by its number among those kept, from the end if negative; InputError for another."""
     if not -len(result.frames) <= number < len(result.frames):
-        raise InputError(
-            "frame", quoted(number), f"the number of one of the {len(result.frames)} frames kept"
-        )
+        allowed = f"the number of one of the {len(result.frames)} frames kept"
+        raise InputError("frame", quoted(number), allowed)
     return result.frames[number]
 
 

@@ -37,6 +37,8 @@ TISSUE, GROUND, EDGE = "#EFEBE7", "#D0D0D0", "0.25"
 FILES_ONLY = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
 WIDTH, HEIGHT = 7.0, 4.5  # of a figure, in inches
 SLENDER = 25.0  # height of a colour bar over its width
+#: x, y and look of a curve
+Line = tuple[Any, Any, Mapping[str, Any]]
 
 
 class Panels(tuple["Axes", ...]):
@@ -90,9 +92,7 @@ def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:
         yield what, {"label": name, "color": colour, "linestyle": style}
 
 
-def curves(
-    ax: Axes | None, lines: Sequence[tuple[Any, Any, Mapping[str, Any]]], xlabel: str, ylabel: str
-) -> Axes:
+def curves(ax: Axes | None, lines: Sequence[Line], xlabel: str, ylabel: str) -> Axes:
     """Lines of x, y and look on a grid, with a legend where there are several; few points are marked."""
     ax = axes_or_new(ax)
     for x, y, look in lines:

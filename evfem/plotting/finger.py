@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.fields import (
+    FIELDS,
     TRACTIONS,
     Height,
     Scale,
     Window,
     areas,
-    check_field,
     draw_arrows,
     draw_outline,
     frame_of,
@@ -100,7 +101,7 @@ def deformed(
     InputError
         Another field or frame, or a finger in three dimensions.
     """
-    check_field(field)
+    choice("field", field, FIELDS)
     check_plane(result.mesh)
     return picture(View(result, frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)
 
@@ -130,7 +131,7 @@ def side_by_side(
     All are coloured by one field on one scale, as `deformed` does it; `near=None` leaves out the
     close-ups. The panels come row by row.
     """
-    check_field(field)
+    choice("field", field, FIELDS)
     views = {name: View(one, frame_of(one, frame), field) for name, one in named(results).items()}
     levels = [None] if near is None else [None, near]
     rows = [[view.window(level) for view in views.values()] for level in levels]

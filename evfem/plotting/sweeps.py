@@ -51,7 +51,7 @@ def sweep(
     """
     rows = _done(table, x, y, *([by] if by else []))
     names = _names(rows, x)
-    _check_log(log, rows, {"x": None if names else x, "y": y})
+    _check_log(log, rows, {"x": x, "y": y})
     groups, lines = ({row[by]: row[by] for row in rows} if by else {None: None}), []
     for (value, look), marker in zip(styled(groups), cycle(MARKERS), strict=False):
         chosen = [row for row in rows if by is None or row[by] == value]
@@ -133,12 +133,11 @@ def _ranked(x: Any, y: Any) -> float:
     return float(np.corrcoef(rankdata(x), rankdata(y))[0, 1])
 
 
-def _check_log(log: str, rows: Sequence[dict[str, Any]], keys: dict[str, str | None]) -> None:
+def _check_log(log: str, rows: Sequence[dict[str, Any]], keys: dict[str, str]) -> None:
     if log not in ("", "x", "y", "xy"):
         raise InputError("log", quoted(log), '"", "x", "y" or "xy"')
     for axis in log:
-        key = keys[axis]
-        if key is None or not all(type(row[key]) in (int, float) and row[key] > 0.0 for row in rows):
+        if not all(type(row[keys[axis]]) in (int, float) and row[keys[axis]] > 0.0 for row in rows):
             raise InputError("log", quoted(log), f"numbers above 0 along {axis}")
 
 

@@ -138,8 +138,9 @@ class Handler(BaseHTTPRequestHandler):
         elif path == "/upload":
             self._say(page.uploaded(body, query.pop("name", ""), query))
         elif path == "/file":
-            data = page.file(parse(body), kind := query.get("kind", ""))
-            self._send(data, *reversed(page.FILES[kind]))
+            kind = query.get("kind", "")
+            data, (name, media) = page.file(parse(body), kind), page.FILES[kind]
+            self._send(data, media, name)
         elif path == "/run":
             self._stream(body.decode("utf-8", "replace"), query.get("encoding") == "exact")
         else:
@@ -181,9 +182,7 @@ class Handler(BaseHTTPRequestHandler):
         if length is not None:
             self.send_header("Content-Length", str(length))
 
-    def _send(
-        self, data: bytes, kind: str, name: str | None = None, status: HTTPStatus = HTTPStatus.OK
-    ) -> None:
+    def _send(self, data: bytes, kind: str, name: str | None = None, status: int = HTTPStatus.OK) -> None:
         self._head(status, kind, len(data))
         if name is not None:
             self.send_header("Content-Disposition", f'attachment; filename="{name}"')

@@ -164,9 +164,8 @@ class Sweep:
         tables, axes, points = self.tables, self._axes, []
         if self.samples is not None:
             drawn = {key: values.tolist() for key, values in self.samples.draw().items()}
-            axes.append(
-                [({}, dict(zip(drawn, row, strict=True))) for row in zip(*drawn.values(), strict=True)]
-            )
+            rows = zip(*drawn.values(), strict=True)
+            axes.append([({}, dict(zip(drawn, row, strict=True))) for row in rows])
         for index, chosen in enumerate(product(*axes)):
             labels: dict[str, str] = {}
             parameters: dict[str, Any] = {}
@@ -341,9 +340,8 @@ def _grid(table: Mapping[str, Any]) -> dict[str, Any]:
     grid: dict[str, Any] = {}
     for name, entry in table.items():
         if name not in TABLES and isinstance(entry, dict):
-            grid[name] = {
-                key: dict(_flat(row)) if isinstance(row, dict) else row for key, row in entry.items()
-            }
+            rows = entry.items()
+            grid[name] = {key: dict(_flat(row)) if isinstance(row, dict) else row for key, row in rows}
         else:
             grid |= _flat({name: entry})
     return grid

@@ -102,9 +102,8 @@ class SweepFolder:
             if version not in (None, evfem.__version__):
                 other = f"evfem {version!r}, not of {evfem.__version__!r}"
             given = f"{self.path}, with {others} points of {other}"
-            raise InputError(
-                "--out", given, "another folder, --resume to keep them, --overwrite to remove them"
-            )
+            allowed = "another folder, --resume to keep them, --overwrite to remove them"
+            raise InputError("--out", given, allowed)
 
     def _last(self) -> tuple[str | None, str | None]:
         """Fingerprint of the sweep that was started last in the folder, and the version that did."""

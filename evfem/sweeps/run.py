@@ -244,7 +244,7 @@ def evaluate(job: Job) -> Answer:
         result = result if result.depth is None else result.total
         return {name: output(result, name) for name in names}
 
-    return answered(text, folder, ask)
+    return answered(text, folder, ask, simulate)
 
 
 def answered(

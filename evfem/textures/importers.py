@@ -42,9 +42,8 @@ IMAGES = ("PNG", "JPEG", "TIFF", "BMP")
 MOST_PIXELS, MOST_BYTES, MOST_POINTS = 40_000_000, 512_000_000, 50_000_000
 
 Unit = Annotated[str | None, one_of(*LENGTHS), "of lengths for which the file names none; default: mm"]
-Row = Annotated[
-    float, number("a place from 0 to 1", Within(0.0, 1.0)), "which line, from the first to the last"
-]
+_ROW = number("a place from 0 to 1", Within(0.0, 1.0))
+Row = Annotated[float, _ROW, "which line, from the first to the last"]
 
 
 def importer_of(path: Path) -> tuple[str, type[Importer]]:

@@ -103,9 +103,8 @@ class Heights(Importer):
         known = np.isfinite(height)
         if missing := int((~known).sum()):
             if missing > MOST_GAPS * x.size:
-                raise InputError(
-                    "heights", f"{missing} of {x.size} missing", f"at most {MOST_GAPS:.0%} of them"
-                )
+                given = f"{missing} of {x.size} missing"
+                raise InputError("heights", given, f"at most {MOST_GAPS:.0%} of them")
             notes.append(f"{missing} of {x.size} values missing, filled by straight lines.")
             height = np.interp(x, x[known], height[known])
         if self.level != "none":
