@@ -313,8 +313,7 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
     residuals, parameters = _Residuals(problem, runs, progress), problem.parameters
     start, bounds = np.zeros(len(parameters.free)), parameters.bounds
     if not np.isfinite(residuals(start)).all():
-        given = f"one that cannot be run at the start: {residuals.failed}"
-        raise InputError("scene", given, "one that can be")
+        raise InputError("scene", f"one that cannot be run at the start: {residuals.failed}", "one that can")
     ends = {"xtol": UNKNOWNS, "ftol": SQUARES, "gtol": 1e-12, "max_nfev": MOST_STEPS}
     found = least_squares(residuals, start, residuals.jacobian, bounds, **ends)
     known = confidence(found.jac, found.fun, parameters.names)

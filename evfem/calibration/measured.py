@@ -235,10 +235,8 @@ class MeasuredValues:
     @property
     def names(self) -> tuple[str, ...]:
         """A name for each value."""
-        return tuple(
-            ", ".join([self.output, *(f"{key} {shown(value)}" for key, value in keys.items())])
-            for keys, _ in self.runs()
-        )
+        runs = [[f"{key} {shown(value)}" for key, value in keys.items()] for keys, _ in self.runs()]
+        return tuple(", ".join([self.output, *keys]) for keys in runs)
 
     def runs(self) -> list[Run]:
         """A run for each value."""

@@ -128,7 +128,10 @@ class FitResult:
         check_ending(path, ".json")
         content: dict[str, Any] = {"format": FORMAT}
         content |= {name: getattr(self, name) for name in PLAIN}
-        content |= {name: _listed(getattr(self, name)) for name in ARRAYS}
+        for name in ARRAYS:  # None where a number is not finite
+            array: Any = np.array(getattr(self, name), dtype=object)
+            array[~np.isfinite(getattr(self, name))] = None
+            content[name] = array.tolist()
         content["parameters"] = {key: vars(one) for key, one in self.parameters.items()}
         content["paths"] = str(self.paths)
         write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -150,10 +153,3 @@ def load(path: str | Path) -> FitResult:
         raise InputError("fit", f"{path} ({error.strerror})", allowed) from error
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise InputError("fit", f"{path}, damaged or of another kind: {error}", allowed) from error
-
-
-def _listed(values: Floats) -> Any:
-    """Numbers as lists, None where they are not finite."""
-    if np.ndim(values):
-        return [_listed(value) for value in values]
-    return float(values) if math.isfinite(values) else None

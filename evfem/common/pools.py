@@ -100,17 +100,16 @@ def blas_limits(threads: int | None = 1) -> threadpool_limits:
 
 
 def _begin(function: Callable[..., None], line: Connection, *arguments: Any) -> None:
+    def end_with_parent() -> None:
+        parent = parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     blas_limits()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     function(line, *arguments)
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def _serve(line: Connection) -> None:

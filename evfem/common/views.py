@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from inspect import cleandoc
 from textwrap import fill
 from typing import Any
@@ -33,13 +33,13 @@ def changed(value: Any) -> dict[str, Any]:
     >>> changed(Slide(distance=5.0, steps=10))
     {'distance': 5.0, 'steps': 10}
     """
-    shown = [spec for spec in fields(value) if spec.init and spec.repr]
-    return {spec.name: v for spec in shown if _differs(v := getattr(value, spec.name), spec)}
-
-
-def _differs(value: Any, spec: Field[Any]) -> bool:
-    default = spec.default if spec.default_factory is MISSING else spec.default_factory()
-    return default is MISSING or bool(value != default)
+    shown = {}
+    for spec in fields(value):
+        default = spec.default if spec.default_factory is MISSING else spec.default_factory()
+        found = getattr(value, spec.name)
+        if spec.init and spec.repr and (default is MISSING or bool(found != default)):
+            shown[spec.name] = found
+    return shown
 
 
 def called(name: str, arguments: Mapping[str, Any]) -> str:

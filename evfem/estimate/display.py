@@ -120,6 +120,11 @@ def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) 
     frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
     _, given = spectrum_of(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
+    bands = []
+    for low, high in pairwise(BANDS):
+        inside = (frequency > low) & (frequency <= high)
+        share = float(np.sum(wanted[inside] ** 2) / max(np.sum(wanted**2), 1e-300))
+        bands.append((low, high, _relative(given[inside], wanted[inside]), share))
     return Rendering(
         curve=curve,
         signal=signal,
@@ -128,7 +133,7 @@ def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) 
         force_error=_relative(felt, curve.friction),
         change_error=_relative(felt - felt.mean(), change),
         spectrum_error=_relative(given, wanted),
-        bands=tuple(_band(low, high, frequency, wanted, given) for low, high in pairwise(BANDS)),
+        bands=tuple(bands),
     )
 
 
@@ -142,14 +147,6 @@ def spectrum_of(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floa
     even = np.interp(np.linspace(x[0], x[-1], x.size), x, friction)
     amplitude = amplitudes(even, "hann")[1:]
     return np.arange(1.0, amplitude.size + 1.0) * speed / float(x[-1] - x[0]), amplitude
-
-
-def _band(
-    low: float, high: float, frequency: Floats, wanted: Floats, given: Floats
-) -> tuple[float, float, float, float]:
-    inside = (frequency > low) & (frequency <= high)
-    share = float(np.sum(wanted[inside] ** 2) / max(np.sum(wanted**2), 1e-300))
-    return low, high, _relative(given[inside], wanted[inside]), share
 
 
 def playback(profile: VoltageProfile, touch: Touch, device: Device) -> Playback:

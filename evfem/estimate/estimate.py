@@ -126,11 +126,6 @@ class Estimate:
     notes: tuple[str, ...]
     reduced: Reduced | None = None
 
-    @property
-    def trusted(self) -> bool:
-        """Whether nothing speaks against it."""
-        return not self.notes
-
 
 def estimate(texture: Texture, touch: Touch) -> Estimate:
     """The apparent friction over `touch.length`."""

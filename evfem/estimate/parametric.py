@@ -82,13 +82,10 @@ class Parametric(Checked):
 
     def point(self) -> Floats:
         """Its place (6,) in the database, 0 to 1 along each axis where it is inside."""
-        return np.array([_share(getattr(self, name), *RANGES[name]) for name in RANGES])
-
-
-def _share(value: float, low: float, high: float, logarithmic: bool) -> float:
-    if logarithmic:
-        value, low, high = np.log(value), np.log(low), np.log(high)
-    return (value - low) / (high - low)
+        ends = np.array([(getattr(self, name), low, high) for name, (low, high, _) in RANGES.items()]).T
+        logarithmic = [logarithmic for _, _, logarithmic in RANGES.values()]
+        ends[:, logarithmic] = np.log(ends[:, logarithmic])
+        return (ends[0] - ends[1]) / (ends[2] - ends[1])
 
 
 def at(point: Floats, ridged: bool) -> Parametric:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.calibration.result import FitResult
-from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
 from evfem.plotting.fields import frame_of
@@ -88,15 +87,10 @@ def abscissa(result: Result) -> str:
     name = changed.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"
     if name == "position" and result.in_space and not np.ptp(result.position):
         name = "position_z"
-    if _changes(result[name]):
+    steps, least = np.diff(result[name]), ZERO * float(np.abs(result[name]).max(initial=0.0))
+    if steps.size and (np.all(steps > least) or np.all(steps < -least)):
         return name
     return "time" if "wait" in kinds else "step"
-
-
-def _changes(values: Floats) -> bool:
-    """Whether every step goes on in the same direction."""
-    steps, least = np.diff(values), ZERO * float(np.abs(values).max(initial=0.0))
-    return steps.size > 0 and bool(np.all(steps > least) or np.all(steps < -least))
 
 
 def forces(

@@ -182,13 +182,12 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
     least, most = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     least = min(least, 0.0) if field in FROM_ZERO else least
     middle = MIDDLES.get(field)
-    if middle is None:
-        low, high = (least if vmin is None else vmin), (most if vmax is None else vmax)
-    else:
-        reach = max(most - middle, middle - least) or 1.0
+    low, high = least, most
+    if middle is not None:
         given = vmin if vmax is None else vmax
-        reach = reach if given is None else abs(given - middle)
-        low, high = (middle - reach if vmin is None else vmin), (middle + reach if vmax is None else vmax)
+        reach = max(most - middle, middle - least) or 1.0 if given is None else abs(given - middle)
+        low, high = middle - reach, middle + reach
+    low, high = (low if vmin is None else vmin), (high if vmax is None else vmax)
     if not low < high:  # one value throughout, or all beyond a given end
         low, high = (high - 1.0, high) if vmin is None and vmax is not None else (low, low + 1.0)
     slack = 1e-9 * (high - low)

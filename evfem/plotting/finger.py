@@ -137,7 +137,8 @@ def side_by_side(
     rows = [[view.window(level) for view in views.values()] for level in levels]
     pairs = (pair for row in rows for pair in zip(views.values(), row, strict=True))
     scale = scale_of(field, np.concatenate([view.shown(window) for view, window in pairs]), vmin, vmax)
-    tall = [max(_height(window) for window in row) for row in rows]
+    shapes = [[(top - bottom) / (right - left) for left, right, bottom, top in row] for row in rows]
+    tall = [(ACROSS - 0.7) * max(row) for row in shapes]
     figure = new_figure(sum(tall) + 0.75 * len(rows), ACROSS * len(views) + 1.0)
     axes = figure.subplots(len(rows), len(views), squeeze=False, height_ratios=tall)
     for panels, row in zip(axes, rows, strict=True):
@@ -151,12 +152,6 @@ def side_by_side(
     bar = figure.colorbar(mapped, ax=axes, label=field_label(field), shrink=0.8, extend=scale.extend)
     label_bar(bar, field)
     return Panels(axes.ravel())
-
-
-def _height(window: Window) -> float:
-    """Inches of a window that is as wide as its finger's place."""
-    left, right, bottom, top = window
-    return (ACROSS - 0.7) * (top - bottom) / (right - left)
 
 
 @dataclass(frozen=True, eq=False)

@@ -123,7 +123,9 @@ class _Run:
             self.keys = [self._key(point.text) for point in self.points]
         refused = dict(self.answers)
         if len(refused) == len(set(self.keys)):
-            raise self._no_scene()
+            if len({str(error) for error in self.refusals}) == 1:
+                raise self.refusals[0]
+            raise InputError("sweep", f"no valid point: {self.refusals[0]}", "at least one valid scene")
         self.units = table_units(plan.outputs, plan.parameters, self.found)
         self.digest = digest(sorted(set(self.keys)))
         if folder is not None:
@@ -142,12 +144,6 @@ class _Run:
         bar = progress and notices.drawable()
         self.total, self.lines = len(set(self.keys)), progress and not bar
         self.bar = notices.bar(self.total, "point", len(self.answers), bar)
-
-    def _no_scene(self) -> InputError:
-        """The error of all points where they have the same one; else one that tells the first."""
-        if len({str(error) for error in self.refusals}) == 1:
-            return self.refusals[0]
-        return InputError("sweep", f"no valid point: {self.refusals[0]}", "at least one valid scene")
 
     def _key(self, text: str) -> str:
         """Fingerprint of a point's scene and outputs, or of its text when it is no scene."""

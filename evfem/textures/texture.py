@@ -78,8 +78,7 @@ class Texture:
             raise InputError("provenance", f"{len(self.provenance)} sentences", f"at most {MOST_NOTES}")
         for note in self.provenance:
             _text("provenance", note)
-        _check_rows(x, values)
-        _check_range(self)
+        _check(self)
         if self.period is not None:
             period = float(above("period", self.period, 0.0, "a length in mm above zero"))
             if self.quantity == "friction_spectrum" or not x[-1] - x[0] < period <= LONGEST:
@@ -224,7 +223,9 @@ def _text(key: str, value: object) -> None:
         raise InputError(key, quoted(value), f"a line of 1 to {MOST_LETTERS} letters")
 
 
-def _check_rows(x: Floats, values: Floats) -> None:
+def _check(texture: Texture) -> None:
+    """InputError for rows that do not fit, or beyond what a texture may have."""
+    x, values, quantity = texture.x, texture.values, texture.quantity
     if x.size != values.size or not 2 <= x.size <= MOST_ROWS:
         given = f"{x.size} and {values.size} numbers"
         raise InputError("x", given, f"2 to {MOST_ROWS} rows of two numbers")
@@ -234,13 +235,9 @@ def _check_rows(x: Floats, values: Floats) -> None:
         raise InputError("x", f"{x[n]:g}, then {x[n + 1]:g} (rows {n + 1}, {n + 2})", "rising numbers")
     if np.abs(x).max() > LONGEST:
         raise InputError("x", f"{x[np.argmax(np.abs(x))]:g}", f"numbers within {LONGEST:g}")
-
-
-def _check_range(texture: Texture) -> None:
-    values, quantity = texture.values, texture.quantity
     low, high = ENDS[quantity]
     if values.min() < low or values.max() > high:
         wrong = values[int(np.argmax(np.maximum(low - values, values - high)))]
         raise InputError(quantity, f"{wrong:g}", f"values from {low:g} to {high:g}, lengths in mm")
-    if quantity == "friction_spectrum" and texture.x[0] <= 0.0:
-        raise InputError("frequency", f"{texture.x[0]:g}", "spatial frequencies in 1/mm above zero")
+    if quantity == "friction_spectrum" and x[0] <= 0.0:
+        raise InputError("frequency", f"{x[0]:g}", "spatial frequencies in 1/mm above zero")
