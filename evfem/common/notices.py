@@ -11,8 +11,8 @@ import shutil
 import sys
 import textwrap
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any, TextIO
 
 from evfem.errors import InputError, StopRun, quoted
@@ -49,11 +49,15 @@ def tell(text: str) -> None:
     tqdm.write(wrapped(f"evfem: {text}", sys.stderr), file=sys.stderr)
 
 
-class _Lines(logging.Handler):
-    """Notices as lines."""
+class _Told(logging.Handler):
+    """Notices by a function."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        super().__init__()
+        self.tell = tell
 
     def emit(self, record: logging.LogRecord) -> None:
-        tell(record.getMessage())
+        self.tell(record.getMessage())
 
 
 @contextmanager
@@ -73,10 +77,8 @@ def listening(handler: logging.Handler, level: int) -> Iterator[None]:
 @contextmanager
 def shown(wanted: bool = True) -> Iterator[None]:
     """Inside, notices are lines on standard error; once, however often this is nested."""
-    if not wanted or any(isinstance(handler, _Lines) for handler in LOG.handlers):
-        yield
-        return
-    with listening(_Lines(), logging.INFO):
+    again = any(getattr(handler, "tell", None) is tell for handler in LOG.handlers)
+    with listening(_Told(tell), logging.INFO) if wanted and not again else nullcontext():
         yield
 
 
@@ -110,18 +112,6 @@ def drawable() -> bool:
     return sys.stderr.isatty() or "ipykernel" in sys.modules
 
 
-class _Newest(logging.Handler):
-    """Shows the newest notice behind a status."""
-
-    def __init__(self, line: Any) -> None:
-        super().__init__()
-        self.line = line
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.line.set_postfix_str(record.getMessage(), refresh=False)
-        self.line.update()
-
-
 @contextmanager
 def status(label: str) -> Iterator[None]:
     """Inside, a terminal shows `label` and the newest detail. Elsewhere nothing is shown."""
@@ -132,7 +122,12 @@ def status(label: str) -> Iterator[None]:
 
     columns = shutil.get_terminal_size().columns
     line = tqdm(desc=label, bar_format="{desc}{postfix}", leave=False, ncols=columns)
-    with line, listening(_Newest(line), logging.DEBUG):
+
+    def newest(text: str) -> None:
+        line.set_postfix_str(text, refresh=False)
+        line.update()
+
+    with line, listening(_Told(newest), logging.DEBUG):
         yield
 
 

@@ -102,12 +102,8 @@ def frame(columns: Mapping[str, Any]) -> Any:
         from pandas import DataFrame
 
         return DataFrame(columns)
-    arrays = {name: np.asarray(values) for name, values in columns.items()}
-    length = len(next(iter(arrays.values())))
-    records = np.recarray(length, [(name, values.dtype) for name, values in arrays.items()])
-    for name, values in arrays.items():
-        records[name] = values
-    return records
+    names: Any = list(columns)
+    return np.rec.fromarrays([np.asarray(values) for values in columns.values()], names=names)
 
 
 def dataset(variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Any) -> Any:

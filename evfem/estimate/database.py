@@ -53,11 +53,9 @@ ERROR = "error"
 
 @dataclass(frozen=True, eq=False)
 class Database:
-    """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and,
-    as `linear`, that of a pad that yields linearly.
-
-    Sample i is F_t / F_n at x = (i + 1) / SAMPLES wavelengths behind a place where the first sine
-    rises through zero. `errors` (N,) are those of the estimator that does not know the point.
+    """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and, as
+    `linear`, that of a pad that yields linearly, at x = (i + 1) / SAMPLES wavelengths behind a place where
+    the first sine rises through zero; `errors` (N,) of the estimator that does not know the point.
     """
 
     textures: tuple[Parametric, ...]
@@ -176,11 +174,8 @@ def _evaluate(text: str) -> Answer:
 def compute_database(
     folder: str | Path, *, workers: int | None = None, scheduler: str | None = None
 ) -> tuple[Path, dict[str, int]]:
-    """Run the model at every point and over every reference texture that is not finished in `folder`,
-    and write `FILE`, `KERNELS`, `CURVES` and `PADS` there.
-
-    `workers` and `scheduler` as in `evfem.sweep`. Returns the file, and how many points are done and
-    how many are not converged.
+    """Run the model at every point and over every reference texture that is not finished in `folder`, and
+    write `FILE`, `KERNELS`, `CURVES` and `PADS` there; the file, and how many points are done and are not.
     """
     folder = Path(folder)
     scenes: list[tuple[Parametric | tuple[str, bool], Scene]] = [(one, scene(one)) for one in textures()]

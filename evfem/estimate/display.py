@@ -28,16 +28,7 @@ from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
 from evfem.electrostatics.signalfile import Playback
 from evfem.electrostatics.signals import Amplifier, VoltageProfile
-from evfem.estimate.rendering import (
-    NOISE,
-    ApparentFriction,
-    Comparison,
-    Recording,
-    Signal,
-    compare,
-    exact,
-    voltage_for,
-)
+from evfem.estimate import rendering
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of
 from evfem.simulation.spectrum import amplitudes
 from evfem.surface.surfaces import Display
@@ -79,15 +70,13 @@ class Device(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Rendering:
-    """The voltage for a friction curve, what the display makes of it, and how good that is.
-
-    `felt` (n,) is the friction on the display at the curve's positions, `lost` (n,) where it is not
-    the wish; errors are shares as at the head of this file, `bands` rows (low Hz, high Hz, error,
-    share of the wish's power). An error is NaN where there is nothing to be compared with.
+    """The voltage for a friction curve, the friction `felt` (n,) on the display, `lost` (n,) where that is
+    not the wish, errors as at the head of this file (NaN if there is nothing to be compared with), and
+    `bands`: rows (low Hz, high Hz, error, share of the wish's power).
     """
 
     curve: FrictionCurve
-    signal: Signal
+    signal: rendering.Signal
     felt: Floats
     lost: Floats
     force_error: float
@@ -109,13 +98,13 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
     (0.33, 0.25)
     """
     load = np.full(curve.x.shape, touch.load)
-    wish = ApparentFriction(curve.x, load, np.maximum(curve.friction, 0.0) * load)
-    signal = voltage_for(wish, device.encoding, amplifier=device.amplifier, speed=touch.speed)
+    wish = rendering.ApparentFriction(curve.x, load, np.maximum(curve.friction, 0.0) * load)
+    signal = rendering.voltage_for(wish, device.encoding, amplifier=device.amplifier, speed=touch.speed)
     felt = np.asarray(device.encoding.tangential_force(load, signal.profile(curve.x))) / load
     return _compared(curve, signal, felt, touch.speed)
 
 
-def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) -> Rendering:
+def _compared(curve: FrictionCurve, signal: rendering.Signal, felt: Floats, speed: float) -> Rendering:
     """Comparison of the `felt` friction (n,) with the target."""
     frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
     _, given = spectrum_of(curve.x, felt, speed)
@@ -129,7 +118,7 @@ def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) 
         curve=curve,
         signal=signal,
         felt=felt,
-        lost=np.abs(felt - curve.friction) > 10.0 * NOISE * np.abs(curve.friction).max(),
+        lost=np.abs(felt - curve.friction) > 10.0 * rendering.NOISE * np.abs(curve.friction).max(),
         force_error=_relative(felt, curve.friction),
         change_error=_relative(felt - felt.mean(), change),
         spectrum_error=_relative(given, wanted),
@@ -171,7 +160,7 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
     """Friction of the coupled model under its own voltage, compared as by `render`."""
     felt = np.interp(curve.x, found.x, found.friction)
     voltage = np.interp(curve.x, found.x, found.voltage)
-    signal = Signal(
+    signal = rendering.Signal(
         profile=VoltageProfile(found.x, found.voltage),
         share_not_renderable=float(np.mean(curve.friction < device.friction)),
         largest=float(found.voltage.max()),
@@ -182,10 +171,10 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
     return _compared(curve, signal, felt, touch.speed)
 
 
-def exact_voltage(reference: Recording, device: Device) -> tuple[ExactCurve, Comparison]:
+def exact_voltage(reference: rendering.Recording, device: Device) -> tuple[ExactCurve, rendering.Comparison]:
     """The voltage that gives a recorded slide's force in each step (`rendering.exact`), and how well."""
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
-    result = exact(reference, display, FORCE_LAWS[device.law](), largest).result
+    result = rendering.exact(reference, display, FORCE_LAWS[device.law](), largest).result
     felt, voltage = friction_of(result), result.voltage[result.motion_index == 2]
-    return ExactCurve(felt.x, voltage, felt.friction), compare(reference.result, result)
+    return ExactCurve(felt.x, voltage, felt.friction), rendering.compare(reference.result, result)

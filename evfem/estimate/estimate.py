@@ -116,10 +116,8 @@ def _harmonics(x: Floats, height: Floats, wavelength: float) -> Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """An estimated friction curve, and what is to be said of it (`notes`, none where all is well).
-
-    `curve.error` is the root mean square error of the points of the database nearby, left out in
-    turn; it knows nothing of what the notes say.
+    """An estimated friction curve, and what is to be said of it (`notes`, none where all is well), of which
+    `curve.error` knows nothing: the rms error of the points of the database nearby, left out in turn.
     """
 
     curve: FrictionCurve

@@ -43,9 +43,8 @@ MARGIN = 14
 
 @dataclass(frozen=True, eq=False)
 class PressedPad:
-    """n nodes of a pad under a `load` (N/mm): their `x` and `y` (n,) where nothing has moved,
-    relative to the bone (mm). Forces F (2 n,), y components first, move them by `base` (2 n,)
-    + `compliance` (2 n, 2 n) F; `force` (2 n,) are those on a flat surface.
+    """n nodes of a pad under a `load` (N/mm), at `x`, `y` (n,) relative to the bone (mm) if unmoved. Forces F
+    (2 n,), y first, move them by `base` + `compliance` F; `force` are those on a flat surface.
     """
 
     x: Floats

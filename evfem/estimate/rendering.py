@@ -201,10 +201,8 @@ def replay(
     voltage: VoltageProfile | FollowForce,
     drive: Drive | None = None,
 ) -> Recording:
-    """The reference's finger, motion and solver on a display under a voltage.
-
-    As in the paper the finger is pressed to the load that the reference had at the end of its
-    press, and slid in the same steps. A `drive` makes the effective voltage alternate.
+    """The reference's finger, motion and solver on a display under a voltage, alternating by a `drive`: as in
+    the paper, pressed to the load that the reference had after its press, and slid in the same steps.
     """
     motion = list(reference.scene.motion)
     first = next((i for i, part in enumerate(motion) if part.course.distance), 0)
@@ -293,6 +291,5 @@ def pearson(one: Array, other: Array) -> float:
     >>> round(pearson(np.array([1.0, 2.0, 3.0]), np.array([2.0, 5.0, 6.0])), 4)
     0.9608
     """
-    a, b = one - np.mean(one), other - np.mean(other)
-    size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return float(np.clip(a @ b / size, -1.0, 1.0)) if size > 0.0 else float("nan")
+    both_change = np.ptp(one) > 0.0 and np.ptp(other) > 0.0
+    return float(np.corrcoef(one, other)[0, 1]) if both_change else float("nan")

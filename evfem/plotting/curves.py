@@ -16,35 +16,9 @@ import numpy as np
 from evfem.calibration.result import FitResult
 from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
+from evfem.plotting import figures, labels
 from evfem.plotting.fields import frame_of
-from evfem.plotting.figures import (
-    BLACK,
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY,
-    STYLES,
-    VERMILION,
-    Panels,
-    axes_or_new,
-    curves,
-    new_panels,
-    styled,
-)
 from evfem.plotting.finger import check_plane, told
-from evfem.plotting.labels import (
-    Results,
-    axis_label,
-    column_label,
-    column_text,
-    field_label,
-    kind_of,
-    named,
-    on_lines,
-    units_of,
-    values_of,
-)
 from evfem.simulation import spectrum as spectra
 from evfem.simulation.result import Result
 
@@ -52,24 +26,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORCES = {
-    "normal_force": ("normal (contact)", BLUE, "-"),
-    "tangential_force": ("tangential (contact)", VERMILION, "-"),
-    "applied_force": ("applied on the bone", BLACK, ":"),
-    "electrostatic_force": ("electrostatic", GREEN, "--"),
+    "normal_force": ("normal (contact)", figures.BLUE, "-"),
+    "tangential_force": ("tangential (contact)", figures.VERMILION, "-"),
+    "applied_force": ("applied on the bone", figures.BLACK, ":"),
+    "electrostatic_force": ("electrostatic", figures.GREEN, "--"),
 }
 ENERGIES = {
-    "external_work": ("work of the bone", BLACK, ":"),
-    "electrostatic_work": ("work of the attraction", GREEN, "--"),
-    "stored_energy": ("stored in the tissue", BLUE, "-"),
-    "friction_dissipation": ("lost to friction", VERMILION, "-"),
-    "viscous_dissipation": ("lost to viscosity", ORANGE, "-."),
-    "kinetic_energy": ("kinetic", SKY, "-."),
-    "snap_dissipation": ("lost in snaps", PURPLE, "-."),
+    "external_work": ("work of the bone", figures.BLACK, ":"),
+    "electrostatic_work": ("work of the attraction", figures.GREEN, "--"),
+    "stored_energy": ("stored in the tissue", figures.BLUE, "-"),
+    "friction_dissipation": ("lost to friction", figures.VERMILION, "-"),
+    "viscous_dissipation": ("lost to viscosity", figures.ORANGE, "-."),
+    "kinetic_energy": ("kinetic", figures.SKY, "-."),
+    "snap_dissipation": ("lost in snaps", figures.PURPLE, "-."),
 }
 TRACTIONS = {
-    "contact_pressure": (BLUE, "-"),
-    "shear_traction": (VERMILION, "-"),
-    "electrostatic_traction": (GREEN, "--"),
+    "contact_pressure": (figures.BLUE, "-"),
+    "shear_traction": (figures.VERMILION, "-"),
+    "electrostatic_traction": (figures.GREEN, "--"),
 }
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
 #: width of a letter of a motion's name in inches, and height of its line in points
@@ -149,7 +123,7 @@ def _of_one_kind(
         for name, (label, colour, style) in texts.items()
         if name == always or sizes[name] > ZERO * max(sizes.values())
     ]
-    ax = _marked(curves(ax, lines, "", axis_label(always, result.units)), over, result)
+    ax = _marked(figures.curves(ax, lines, "", labels.axis_label(always, result.units)), over, result)
     for name in (name for name in texts if name in sd):
         wide = np.asarray(sd[name])[_drawn(result, over)]
         ends = drawn[name] - wide, drawn[name] + wide
@@ -167,7 +141,7 @@ def checked_over(over: str | None, result: Result) -> str:
 
 def along(result: Result, name: str, over: str) -> Any:
     """A column as it is drawn over another one; over the time, of steps that take none only the last."""
-    return values_of(result, name)[_drawn(result, over)]
+    return labels.values_of(result, name)[_drawn(result, over)]
 
 
 def _drawn(result: Result, over: str) -> Any:
@@ -179,7 +153,7 @@ def _drawn(result: Result, over: str) -> Any:
 
 def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
     """The axes with their abscissa, and over the steps with the motions, if all have the same."""
-    ax.set_xlabel(column_label(over, first.units))
+    ax.set_xlabel(labels.column_label(over, first.units))
     if over == "step" and all(np.array_equal(first.motion, other.motion) for other in others):
         _mark_motions(ax, first)
     return ax
@@ -201,7 +175,7 @@ def _mark_motions(ax: Axes, result: Result) -> None:
         text.set(ha="center", va="bottom")
 
 
-def history(result: Result, columns: Sequence[str], over: str | None = None) -> Panels:
+def history(result: Result, columns: Sequence[str], over: str | None = None) -> figures.Panels:
     """Columns of the history over `over` (see `forces`), a panel for each kind of quantity."""
     if isinstance(columns, str) or not columns:
         raise InputError("columns", quoted(columns), "a list of at least one column of the history")
@@ -209,15 +183,15 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
     kinds: dict[tuple[str, str], dict[str, Any]] = {}
     for name in columns:
         y = along(result, name, over)
-        kinds.setdefault(kind_of(name, result.units), {})[name] = y
-    panels, x = new_panels(len(kinds), 1.0 + 1.9 * len(kinds)), along(result, over, over)
+        kinds.setdefault(labels.kind_of(name, result.units), {})[name] = y
+    panels, x = figures.new_panels(len(kinds), 1.0 + 1.9 * len(kinds)), along(result, over, over)
     for ax, drawn in zip(panels, kinds.values(), strict=True):
-        texts = {column_text(name, result.units[name]): y for name, y in drawn.items()}
-        label = column_label if len(drawn) == 1 else axis_label
-        lines = [(x, y, look) for y, look in styled(texts)]
-        curves(ax, lines, "", on_lines(label(next(iter(drawn)), result.units)))
+        texts = {labels.column_text(name, result.units[name]): y for name, y in drawn.items()}
+        label = labels.column_label if len(drawn) == 1 else labels.axis_label
+        lines = [(x, y, look) for y, look in figures.styled(texts)]
+        figures.curves(ax, lines, "", labels.on_lines(label(next(iter(drawn)), result.units)))
     _marked(panels[0], over, result).set_xlabel("")
-    panels[-1].set_xlabel(column_label(over, result.units))
+    panels[-1].set_xlabel(labels.column_label(over, result.units))
     return panels
 
 
@@ -231,12 +205,12 @@ def probes(
         raise InputError("result", "a run without probes", "a run of a scene with Output(probes=...)")
     over = checked_over(over, result)
     rows, x, lines = _drawn(result, over), along(result, over, over), []
-    for probe, look in styled(result.probes):
+    for probe, look in figures.styled(result.probes):
         values = probe.component(quantity)[rows]
-        for place, y, style in zip(probe.position, values.T, cycle(STYLES)):
+        for place, y, style in zip(probe.position, values.T, cycle(figures.STYLES)):
             label = f"{look['label']} ({', '.join(f'{at + 0.0:.3g}' for at in place)})"
             lines.append((x, y, look | {"label": label, "linestyle": style}))
-    ax = _marked(curves(ax, lines, "", field_label(quantity)), over, result)
+    ax = _marked(figures.curves(ax, lines, "", labels.field_label(quantity)), over, result)
     ax.legend(fontsize="small")
     return ax
 
@@ -246,57 +220,61 @@ def compare(
 ) -> Axes:
     """The same column of several results, each by its name, over `over` (see `forces`)."""
     found, over = _over(results, over)
-    ax = _column(ax, found, column, over, column_label(column, units_of(found)))
+    ax = _column(ax, found, column, over, labels.column_label(column, labels.units_of(found)))
     ax.legend()
     return ax
 
 
-def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
+def force_indentation(results: labels.Results, ax: Axes | None = None) -> Axes:
     """Applied force over indentation, of the presses of one result or of several by their names."""
-    found, columns = named(results), ("indentation", "applied_force")
-    lines = [(*_of_presses(one, *columns), look | {"marker": "."}) for one, look in styled(found)]
-    units = units_of(found)
-    return curves(ax, lines, column_label("indentation", units), axis_label("applied_force", units))
+    found, columns = labels.named(results), ("indentation", "applied_force")
+    lines = [(*_of_presses(one, *columns), look | {"marker": "."}) for one, look in figures.styled(found)]
+    units = labels.units_of(found)
+    return figures.curves(
+        ax, lines, labels.column_label("indentation", units), labels.axis_label("applied_force", units)
+    )
 
 
-def contact_area(results: Results, ax: Axes | None = None) -> Axes:
+def contact_area(results: labels.Results, ax: Axes | None = None) -> Axes:
     """Contact width (in total: area) over the applied force of the presses: outer and real."""
-    found, lines = named(results), []
-    for result, look in styled(found):
+    found, lines = labels.named(results), []
+    for result, look in figures.styled(found):
         width = "contact_area" if result.mesh.dim == 3 else "contact_width"
         for column, text, style in ((width, "edge to edge", "-"), (f"real_{width}", "touching", "--")):
             label = f"{look['label']}, {text}".removeprefix(", ")
             own = look | {"label": label, "linestyle": style, "marker": "."}
             lines.append((*_of_presses(result, "applied_force", column), own))
-    units = units_of(found)
-    return curves(ax, lines, column_label("applied_force", units), axis_label(width, units))
+    units = labels.units_of(found)
+    return figures.curves(
+        ax, lines, labels.column_label("applied_force", units), labels.axis_label(width, units)
+    )
 
 
-def friction(results: Results, over: str | None = None, ax: Axes | None = None) -> Axes:
+def friction(results: labels.Results, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Tangential over normal force on the bone, of steps with a load, over `over` (see `forces`)."""
     found, over = _over(results, over)
     lines = []
-    for result, look in styled(found):
+    for result, look in figures.styled(found):
         load = along(result, "applied_force", over)
         rows = load > ZERO * float(np.abs(load).max(initial=0.0))
         ratio = along(result, "applied_tangential_force", over)[rows] / load[rows]
         lines.append((along(result, over, over)[rows], ratio, look))
-    ax = curves(ax, lines, "", "apparent friction coefficient")
+    ax = figures.curves(ax, lines, "", "apparent friction coefficient")
     return _marked(ax, over, *found.values())
 
 
-def signal(results: Results, over: str | None = None) -> Panels:
+def signal(results: labels.Results, over: str | None = None) -> figures.Panels:
     """Voltage above, friction force on the bone below, over `over` (see `forces`)."""
     found, over = _over(results, over)
-    panels = new_panels(2, 4.8)
+    panels = figures.new_panels(2, 4.8)
     _column(panels[0], found, "voltage", over, "voltage (V)").set_xlabel("")
-    label = f"friction force ({units_of(found)['tangential_force']})"
+    label = f"friction force ({labels.units_of(found)['tangential_force']})"
     _column(panels[1], found, "applied_tangential_force", over, label)
     return panels
 
 
 def spectrum(
-    results: Results,
+    results: labels.Results,
     column: str = "tangential_force",
     ax: Axes | None = None,
     *,
@@ -307,15 +285,17 @@ def spectrum(
     """Amplitudes of a column over the frequency (Hz) without the mean, of one result or of several by their
     names, as `ev.spectrum` finds them.
     """
-    found, ax, lines = named(results), axes_or_new(ax), []
-    for number, (result, look) in enumerate(styled(found)):
+    found, ax, lines = labels.named(results), figures.axes_or_new(ax), []
+    for number, (result, look) in enumerate(figures.styled(found)):
         f, a = (x[1:] for x in spectra.spectrum(result, column, start=start, stop=stop, window=window))
         look |= {"linewidth": 1.0}
         if len(f) <= FEW:
             ax.vlines(f, 0.0, a, colors=look["color"], linewidth=THICK / (1.0 + number))
             look |= {"linestyle": "none", "marker": "oxs^v"[number % 5], "markersize": 4}
         lines.append((f, a, look))
-    return curves(ax, lines, "frequency (Hz)", f"amplitude of {column_label(column, units_of(found))}")
+    return figures.curves(
+        ax, lines, "frequency (Hz)", f"amplitude of {labels.column_label(column, labels.units_of(found))}"
+    )
 
 
 def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) -> Axes:
@@ -330,7 +310,7 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
         for name, (colour, style) in TRACTIONS.items()
         if np.any((y := getattr(shown, name)[pad]) != 0.0) or name == "contact_pressure"
     ]
-    ax = curves(ax, lines, "x (mm)", "traction (MPa)")
+    ax = figures.curves(ax, lines, "x (mm)", "traction (MPa)")
     touching = x[shown.contact_status[pad] > 0]
     if len(touching):
         margin = 0.25 * (touching[-1] - touching[0]) + 0.2
@@ -350,7 +330,7 @@ def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.ticker import MaxNLocator
 
-    ax = axes_or_new(ax)
+    ax = figures.axes_or_new(ax)
     in_sd = bool(fit.provenance.get("sd"))
     values = fit.residuals * (1.0 if in_sd else 100.0)
     number = np.arange(1, len(values) + 1)
@@ -359,26 +339,28 @@ def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
         ax.axhspan(-TWO, TWO, color="0.92", label="two standard deviations")
     ax.axhline(0.0, color="0.4", linewidth=0.8)
     lines = []
-    for own, look in styled({column_text(kind): kinds == kind for kind in dict.fromkeys(kinds.tolist())}):
+    for own, look in figures.styled(
+        {labels.column_text(kind): kinds == kind for kind in dict.fromkeys(kinds.tolist())}
+    ):
         ax.vlines(number[own], 0.0, values[own], color=look["color"], linewidth=1.2)
         lines.append((number[own], values[own], look | {"linestyle": "none", "marker": "o"}))
     unit = "sd" if in_sd else "% of root mean square"
-    curves(ax, lines, "measured value", f"computed - measured ({unit})").legend()
+    figures.curves(ax, lines, "measured value", f"computed - measured ({unit})").legend()
     ax.set_xlim(0.4, len(values) + 0.6)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     return ax
 
 
-def _over(results: Results, over: str | None) -> tuple[dict[str, Result], str]:
+def _over(results: labels.Results, over: str | None) -> tuple[dict[str, Result], str]:
     """Results by their names, and the abscissa of the first."""
-    found = named(results)
+    found = labels.named(results)
     return found, checked_over(over, next(iter(found.values())))
 
 
 def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, label: str) -> Axes:
     """A column of several results."""
-    lines = [(along(one, over, over), along(one, column, over), look) for one, look in styled(found)]
-    return _marked(curves(ax, lines, "", label), over, *found.values())
+    lines = [(along(one, over, over), along(one, column, over), look) for one, look in figures.styled(found)]
+    return _marked(figures.curves(ax, lines, "", label), over, *found.values())
 
 
 def _of_presses(result: Result, *columns: str) -> list[Any]:
@@ -386,4 +368,4 @@ def _of_presses(result: Result, *columns: str) -> list[Any]:
     rows = np.flatnonzero(result.motion == "press")
     if not rows.size:
         raise InputError("results", f"a run of {', '.join(sorted(set(result.motion)))}", "a run with a press")
-    return [values_of(result, column)[rows] for column in columns]
+    return [labels.values_of(result, column)[rows] for column in columns]

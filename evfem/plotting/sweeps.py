@@ -10,18 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.errors import InputError, quoted
-from evfem.plotting.figures import (
-    BLUE,
-    ONE_SIGN,
-    ORANGE,
-    SKY,
-    Panels,
-    add_colorbar,
-    axes_or_new,
-    curves,
-    new_columns,
-    styled,
-)
+from evfem.plotting import figures
 from evfem.plotting.labels import key_label, key_unit
 from evfem.sweeps.file import FIRST, LAST
 
@@ -53,14 +42,14 @@ def sweep(
     names = _names(rows, x)
     _check_log(log, rows, {"x": x, "y": y})
     groups, lines = ({row[by]: row[by] for row in rows} if by else {None: None}), []
-    for (value, look), marker in zip(styled(groups), cycle(MARKERS), strict=False):
+    for (value, look), marker in zip(figures.styled(groups), cycle(MARKERS), strict=False):
         chosen = [row for row in rows if by is None or row[by] == value]
         across = np.array([names.index(row[x]) if names else row[x] for row in chosen])
         up, order = np.array([row[y] for row in chosen]), np.argsort(across, kind="stable")
         if names or table.provenance.get("samples") is not None or np.unique(across).size < across.size:
             look["linestyle"] = "none"
         lines.append((across[order], up[order], look | {"label": _value(table, by, value), "marker": marker}))
-    ax = curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
+    ax = figures.curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
     ax.set(**{f"{axis}scale": "log" for axis in log})
     if "x" in log and (places := np.unique(np.concatenate([line[0] for line in lines]))).size <= FEW:
         ax.set_xticks(places, [f"{place:g}" for place in places])
@@ -82,22 +71,22 @@ def sweep_histogram(table: SweepResult, column: str, ax: Axes | None = None) -> 
     found = [row[column] for row in _done(table, column)]
     if not all(type(value) in (int, float) for value in found):
         raise InputError("column", quoted(column), "a column of numbers")
-    values, ax = np.array(found, dtype=float), axes_or_new(ax)
-    ax.hist(values, bins="auto", color=SKY, edgecolor="white")
+    values, ax = np.array(found, dtype=float), figures.axes_or_new(ax)
+    ax.hist(values, bins="auto", color=figures.SKY, edgecolor="white")
     low, high = np.quantile(values, [0.05, 0.95])
     unit = key_unit(column, table.units).replace("mm2", "mm²")
     deviation = np.std(values, ddof=1) if values.size > 1 else 0.0
     mean = f"mean {values.mean():.4g} {unit}".rstrip() + f", deviation {deviation:.4g} {unit}".rstrip()
     ends = f"90 % of the points: {low:.4g} to {high:.4g} {unit}".rstrip()
-    ax.axvline(values.mean(), color=BLUE, label=mean)
-    ax.axvspan(low, high, color=ORANGE, alpha=0.25, zorder=0, label=ends)
+    ax.axvline(values.mean(), color=figures.BLUE, label=mean)
+    ax.axvspan(low, high, color=figures.ORANGE, alpha=0.25, zorder=0, label=ends)
     ax.set(xlabel=key_label(column, table.units), ylabel=f"points of {values.size}")
     ax.set_ylim(0.0, 1.35 * ax.get_ylim()[1])  # room for the legend
     ax.legend(loc="upper right")
     return ax
 
 
-def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = None) -> Panels:
+def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = None) -> figures.Panels:
     """Column of a sweep over each of the columns of numbers that are varied, in panels side by side, with the
     rank correlation (Spearman 1904): of 1 or -1 where one always rises or falls with the other.
 
@@ -106,11 +95,11 @@ def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = 
     names = list(_varied(table) if over is None else over)
     if not names:
         raise InputError("table", "no column of numbers that is varied", "a sweep of numbers")
-    panels = new_columns(len(names))
+    panels = figures.new_columns(len(names))
     for ax, name in zip(panels, names, strict=True):
         rows = _done(table, name, column)
         x, y = (np.array([row[key] for row in rows]) for key in (name, column))
-        ax.plot(x, y, "o", color=BLUE, markersize=4, alpha=0.7)
+        ax.plot(x, y, "o", color=figures.BLUE, markersize=4, alpha=0.7)
         ax.set(xlabel=key_label(name, table.units), title=f"rank correlation {_ranked(x, y):.2f}")
         ax.grid(alpha=0.3)
     panels[0].set_ylabel(key_label(column, table.units))
@@ -158,10 +147,10 @@ def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = 
     cells = np.full((up.size, across.size), np.nan)
     for row in rows:
         cells[np.searchsorted(up, row[y]), np.searchsorted(across, row[x])] = row[value]
-    ax = axes_or_new(ax)
-    mapped = ax.pcolormesh(_sides(across, ax.xaxis), _sides(up, ax.yaxis), cells, cmap=ONE_SIGN)
+    ax = figures.axes_or_new(ax)
+    mapped = ax.pcolormesh(_sides(across, ax.xaxis), _sides(up, ax.yaxis), cells, cmap=figures.ONE_SIGN)
     ax.set(xlabel=key_label(x, table.units), ylabel=key_label(y, table.units))
-    add_colorbar(mapped, ax, key_label(value, table.units))
+    figures.add_colorbar(mapped, ax, key_label(value, table.units))
     return ax
 
 

@@ -37,9 +37,8 @@ SMALL = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """What came out. Each of the `rows` has a `way`, the forces (N/mm) and the indentation (mm) at its end,
-    and its `difference` from the scene's own end; where it did not get there `why` says it, and the
-    difference is inf.
+    """A row per `way`: the forces (N/mm) and the indentation (mm) at its end, and its `difference` from the
+    scene's own end; inf where it did not get there, and `why`.
     """
 
     rows: list[dict[str, Any]]

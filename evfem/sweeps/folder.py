@@ -153,19 +153,12 @@ def _refuse_no_points(files: Sequence[Path]) -> None:
 
 def _sound(answer: Answer) -> bool:
     numbers = [answer.seconds, *(value for value in answer.outputs.values() if value is not None)]
-    return (
-        answer.status in STATUS
-        and isinstance(answer.message, str)
-        and all(type(number) in (int, float) for number in numbers)
-    )
+    words = answer.status in STATUS and isinstance(answer.message, str)
+    return words and all(type(number) in (int, float) for number in numbers)
 
 
 def sweep_csv(columns: Sequence[str], rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> str:
-    """The table of a sweep as csv, with units behind the names: lists and truth values as in JSON.
-
-    >>> sweep_csv(["point", "motion.0.gap"], [{"point": 0, "motion.0.gap": 0.5}], {"motion.0.gap": "mm"})
-    'point,motion.0.gap (mm)\\n0,0.5\\n'
-    """
+    """The table of a sweep as csv, with units behind the names: lists and truth values as in JSON."""
     heads = [f"{name} ({units[name]})" if units.get(name) else name for name in columns]
     return csv_text([heads, *([cell_of(row.get(name)) for name in columns] for row in rows)])
 

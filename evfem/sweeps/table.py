@@ -35,21 +35,12 @@ KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "
 
 
 def unit_of(key: str, force: str = "N/mm") -> str:
-    """Unit of a dotted key of a scene file, "" for a number; `force` is that of forces.
-
-    >>> unit_of("electrostatics.insulator_thickness"), unit_of("motion.0.force"), unit_of("surface.friction")
-    ('mm', 'N/mm', '')
-    """
+    """Unit of a dotted key of a scene file, "" for a number; `force` is that of forces."""
     return (KEY_UNITS | {"force": force}).get(key.split(".")[-1].rsplit("_", 1)[-1], "")
 
 
 def units_of(scene: Scene) -> Units:
-    """Unit of each column of which a sweep of such scenes can have outputs.
-
-    >>> from evfem.scene.scene import default_scene
-    >>> units_of(default_scene())["normal_force"]
-    'N/mm'
-    """
+    """Unit of each column of which a sweep of such scenes can have outputs."""
     finger = scene.finger
     if isinstance(finger, Fingertip) or (isinstance(finger, MeshedFinger) and finger.mesh().dim == 3):
         return SPATIAL_UNITS
@@ -59,11 +50,8 @@ def units_of(scene: Scene) -> Units:
 def table_units(
     outputs: Sequence[str], parameters: Sequence[str], found: Collection[Units]
 ) -> dict[str, str]:
-    """Unit of each output, and of the parameters that have one, where `found` are the units of the
-    scenes, each kind once.
-
-    Raises InputError for an output that not every scene has, or whose unit is not that of all.
-
+    """Unit of each output, and of the parameters that have one, where `found` are the units of the scenes;
+    InputError for an output that not every scene has in one unit.
     >>> table_units(["normal_force.last"], ["motion.0.force"], [OVER_DEPTH])
     {'motion.0.force': 'N/mm', 'normal_force.last': 'N'}
     >>> table_units(["contact_area.last"], [], [UNITS])
@@ -209,11 +197,8 @@ def _provenance(path: Path) -> dict[str, Any]:
 
 
 def _kept(provenance: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The values of a column that the sweep was given, by their text in the table."""
-    given = (provenance.get("grid") or {}).get(name, ())
-    if isinstance(given, dict):
-        return {str(label): str(label) for label in given}
-    return {str(cell_of(value)): value for value in given}
+    """The values of a column that the sweep was given, or names of its rows, by their text in the table."""
+    return {str(cell_of(value)): value for value in (provenance.get("grid") or {}).get(name, ())}
 
 
 def _value(name: str, cell: str, known: Mapping[str, Any]) -> Any:
@@ -227,11 +212,7 @@ def _value(name: str, cell: str, known: Mapping[str, Any]) -> Any:
 
 
 def told(points: Mapping[str, int]) -> str:
-    """What became of the points, in words.
-
-    >>> told({"requested": 3, "done": 2, "refused": 0, "not_converged": 1, "failed": 0})
-    '2 done, 1 not converged'
-    """
+    """What became of the points, in words."""
     words = [f"{points[name]} {name.replace('_', ' ')}" for name in STATUS if points[name]]
     missing = points["requested"] - sum(points[name] for name in STATUS)
     return ", ".join([*words, *([f"{missing} not computed"] if missing else [])])
