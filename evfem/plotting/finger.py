@@ -119,8 +119,10 @@ def side_by_side(
             ax.set_title(told(view.result, view.frame), fontsize="x-small")
     for ax, name in zip(axes[0], views, strict=True):
         ax.set_title(name, fontsize="medium")
-    for ax in axes.ravel():
-        ax.label_outer(remove_inner_ticks=False)
+    for ax in axes[:, 1:].ravel():
+        ax.set_ylabel("")
+    for ax in axes[:-1].ravel():
+        ax.set_xlabel("")
     bar = figure.colorbar(mapped, ax=axes, label=field_label(field), shrink=0.8, extend=scale.extend)
     label_bar(bar, field)
     return figures.Panels(axes.ravel())

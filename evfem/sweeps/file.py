@@ -116,16 +116,21 @@ class Sweep:
     outputs: Sequence[str] = OUTPUTS
     name: str = "sweep"
     folder: Path = Path()
+    axes: list[list[tuple[dict[str, str], Row]]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        grid = {name: _entry(name, entry) for name, entry in self.grid.items()}
+        axes, grid = {name: _axis(name, entry) for name, entry in self.grid.items()}, {}
+        for name, rows in axes.items():  # in Python's own types
+            named = {label[name]: row for label, row in rows if label}
+            grid[name] = named or [row[name] for _, row in rows]
         set_frozen(self, grid=grid, outputs=tuple(self.outputs), folder=Path(self.folder).resolve())
+        set_frozen(self, axes=list(axes.values()))
         motions = len(self.tables.get("motion", ()))
         for output in self.outputs:
             check_output(output, motions)
         for key in self.samples.parameters if self.samples else ():
             check_key(f"samples.parameters.{key}", key)
-        count = prod(len(axis) for axis in self._axes) * (self.samples.count if self.samples else 1)
+        count = prod(map(len, axes.values())) * (self.samples.count if self.samples else 1)
         if not self.grid and self.samples is None:
             raise InputError("sweep", "nothing that varies", "a grid or samples")
         if count > MOST_POINTS:
@@ -153,15 +158,11 @@ class Sweep:
     def parameters(self) -> list[str]:
         """All keys that vary, those of the grid first."""
         sampled = [] if self.samples is None else list(self.samples.parameters)
-        return [*(key for axis in self._axes for key in axis[0][1]), *sampled]
-
-    @property
-    def _axes(self) -> list[list[tuple[dict[str, str], Row]]]:
-        return [_axis(name, entry) for name, entry in self.grid.items()]
+        return [*(key for axis in self.axes for key in axis[0][1]), *sampled]
 
     def points(self) -> list[Point]:
         """All points, the samples varying fastest and then the grid's last entry."""
-        tables, axes, points = self.tables, self._axes, []
+        tables, axes, points = self.tables, list(self.axes), []
         if self.samples is not None:
             drawn = {key: values.tolist() for key, values in self.samples.draw().items()}
             rows = zip(*drawn.values(), strict=True)
@@ -184,15 +185,9 @@ def scene_tables(scene: Scene | Mapping[str, Any]) -> dict[str, Any]:
     return tomllib.loads(dump(scene)) if isinstance(scene, Scene) else deepcopy(dict(scene))
 
 
-def _entry(name: str, entry: Any) -> list[Any] | dict[str, Row]:
-    """An entry of the grid, checked and in Python's own types."""
-    entry = entry.tolist() if hasattr(entry, "tolist") else entry  # numpy
-    rows = _axis(name, entry)
-    return {label[name]: row for label, row in rows} if rows[0][0] else [row[name] for _, row in rows]
-
-
 def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
     """One entry of the grid: (label, keys and values) of each of its rows."""
+    entry = entry.tolist() if hasattr(entry, "tolist") else entry  # numpy
     if not isinstance(entry, (Mapping, Sequence)) or isinstance(entry, str) or not entry:
         given = "no values" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
         raise InputError(f"grid.{name}", given, "a list of values, or a table of named rows {key = value}")
