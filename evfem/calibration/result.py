@@ -98,9 +98,9 @@ class FitResult:
 
     def __repr__(self) -> str:
         """Values with intervals, how well they explain the data, and what is doubtful."""
-        lines = [f"FitResult of {self._title}"]
-        lines += [f"  {key} = {text}" for key, text in self._rows]
-        return "\n".join([*lines, *(f"  Warning: {warning}" for warning in self.warnings)])
+        rows = [f"  {key} = {text}" for key, text in self._rows]
+        rows += [f"  Warning: {warning}" for warning in self.warnings]
+        return "\n".join([f"FitResult of {self._title}", *rows])
 
     def _repr_html_(self) -> str:
         """For notebooks: the same as a small table."""

@@ -54,12 +54,6 @@ class Reduced:
     x0: float
     explain: float
 
-    def height(self, x: Floats) -> Floats:
-        """The two harmonics (mm) at x (mm), without the mean of the texture."""
-        turn = 2.0 * np.pi / self.wavelength * (x - self.x0)
-        second = self.in_phase * np.sin(2.0 * turn) + self.in_quadrature * np.cos(2.0 * turn)
-        return np.asarray(self.amplitude * (np.sin(turn) + second))
-
 
 def reduced(texture: Texture) -> Reduced:
     """The two harmonics that explain most of a texture's heights.

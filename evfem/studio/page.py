@@ -15,8 +15,8 @@ from evfem.common.checks import Key, choice, keys_of
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.electrostatics.signalfile import write_signal
 from evfem.estimate.display import Device, Rendering, playback, render, render_exact, spectrum_of
-from evfem.estimate.estimate import estimate
-from evfem.estimate.touch import FrictionCurve, touch_scene
+from evfem.estimate.estimate import Estimate, estimate
+from evfem.estimate.touch import touch_scene
 from evfem.scene.file import dump
 from evfem.scene.keys import read
 from evfem.studio.state import State, rows
@@ -69,8 +69,8 @@ def _control(key: Key) -> str:
 
 def answer(state: State) -> dict[str, Any]:
     """Profile, friction with its band, voltage, spectrum, numbers and warnings of a state."""
-    curve, notes = _curve(state)
-    found = _rendering(state, curve)
+    found, notes = _rendered(state)
+    curve = found.curve
     x = np.linspace(0.0, min(state.touch.length, float(curve.x[-1])), POINTS)
     voltage = np.asarray(found.signal.profile(x))
     heights = np.interp(x, *state.texture.over(0.0, float(x[-1])))
@@ -78,6 +78,10 @@ def answer(state: State) -> dict[str, Any]:
     frequency, wished = spectrum_of(x, wish, state.touch.speed)
     given = spectrum_of(x, felt, state.touch.speed)[1]
     layers = state.device.encoding.layers
+    lost = {
+        "is slipperier than the display: it cannot be rendered": found.signal.share_not_renderable,
+        "is too fast for the amplifier": found.signal.share_limited,
+    }
     return {
         "quantity": state.texture.quantity,
         "x": _short(x),
@@ -94,24 +98,22 @@ def answer(state: State) -> dict[str, Any]:
         "given": _short(given),
         "numbers": _numbers(found) | {"laws": float(layers.thickness / layers.reduced)},
         "bands": [[None if value != value else round(value, 6) for value in band] for band in found.bands],
-        "notes": [*notes, *_warnings(found)],
+        "notes": [
+            *notes,
+            *(f"{share:.0%} of the slide {text}" for text, share in lost.items() if share > LOST),
+        ],
         "texture": repr(state.texture),
         "licence": state.texture.licence,
         "provenance": list(state.texture.provenance),
     }
 
 
-def _curve(state: State) -> tuple[FrictionCurve, tuple[str, ...]]:
-    if state.model is not None:
-        return state.model, ()
-    found = estimate(state.texture, state.touch)
-    return found.curve, found.notes
-
-
-def _rendering(state: State, curve: FrictionCurve) -> Rendering:
+def _rendered(state: State) -> tuple[Rendering, tuple[str, ...]]:
+    """The rendering of the model's friction curve, or else of the estimated one, and notes on that."""
+    found = estimate(state.texture, state.touch) if state.model is None else Estimate(state.model, ())
     if state.exact is not None:
-        return render_exact(curve, state.exact, state.touch, state.device)
-    return render(curve, state.touch, state.device)
+        return render_exact(found.curve, state.exact, state.touch, state.device), found.notes
+    return render(found.curve, state.touch, state.device), found.notes
 
 
 def _numbers(found: Rendering) -> dict[str, float | None]:
@@ -129,13 +131,6 @@ def _numbers(found: Rendering) -> dict[str, float | None]:
     return {name: None if value != value else value for name, value in told.items()}
 
 
-def _warnings(found: Rendering) -> list[str]:
-    below, limited = found.signal.share_not_renderable, found.signal.share_limited
-    told = f"{below:.0%} of the slide is slipperier than the display: it cannot be rendered"
-    slow = f"the amplifier cannot follow on {limited:.0%} of the slide"
-    return [*([told] if below > LOST else []), *([slow] if limited > LOST else [])]
-
-
 def _short(values: Floats) -> list[float]:
     return [float(f"{value:.5g}") for value in values]
 
@@ -145,10 +140,10 @@ def file(state: State, kind: str) -> bytes:
     choice("file", kind, FILES)
     if kind == "toml":
         return dump(touch_scene(state.texture, state.touch)).encode()
-    curve, _ = _curve(state)
+    found, _ = _rendered(state)
     if kind == "friction":
-        return curve.rows().encode()
-    profile = _rendering(state, curve).signal.profile
+        return found.curve.rows().encode()
+    profile = found.signal.profile
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"file.{kind}"
         write_signal(path, profile, playback(profile, state.touch, state.device))

@@ -46,11 +46,6 @@ class Answer:
     message: str
     outputs: dict[str, float | None]
 
-    @property
-    def final(self) -> bool:
-        """Whether computing it again would give the same: not so where a process died or the memory ended."""
-        return self.status != "failed"
-
 
 @dataclass(frozen=True)
 class SweepFolder:
@@ -118,11 +113,11 @@ class SweepFolder:
         write_text(self.path / POINTS / f"{key}.json", text + "\n")
 
     def read(self, key: str) -> Answer | None:
-        """A point that is finished; None for one that is not, and for one whose file is damaged."""
+        """A point that is finished; None for one that is not, that failed (of memory, say) or is damaged."""
         with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
             values = json.loads((self.path / POINTS / f"{key}.json").read_text(encoding="utf-8"))
-            if values.pop("format") == FORMAT and _sound(answer := Answer(**values)) and answer.final:
-                return answer
+            if values.pop("format") == FORMAT and _sound(answer := Answer(**values)):
+                return answer if answer.status != "failed" else None
         return None
 
     def write_table(

@@ -130,17 +130,6 @@ class Texture:
         x, values = np.concatenate([self.x, back]), np.concatenate([self.values, self.values[-2:0:-1]])
         return x, values, 2.0 * float(self.x[-1] - self.x[0])
 
-    def document(self, data: str) -> dict[str, Any]:
-        """Content of its `.json`, whose rows are in the file `data`."""
-        units = dict(zip(*QUANTITIES[self.quantity], strict=True))
-        given = {"format": FORMAT, "units": units, "provenance": list(self.provenance), "data": data}
-        return {key: given[key] if key in given else getattr(self, key) for key in KEYS}
-
-    def rows(self) -> str:
-        """Content of its `.csv`."""
-        header = QUANTITIES[self.quantity][0]
-        return csv_text([header, *zip(self.x.tolist(), self.values.tolist(), strict=True)])
-
 
 def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
     """Write a `.json` and its `.csv`, or both into a folder (a path without ending).
@@ -163,8 +152,13 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
     if data.exists() and not is_data(data):
         given = f"{path}, and {data} is there and no texture's"
         raise InputError("path", given, "a name whose .csv is free, or a texture to replace")
-    write_text(data, texture.rows())
-    write_text(path, json.dumps(texture.document(data.name), indent=1) + "\n")
+    header, units = QUANTITIES[texture.quantity]
+    rows = zip(texture.x.tolist(), texture.values.tolist(), strict=True)
+    write_text(data, csv_text([header, *rows]))
+    document: dict[str, Any] = {"format": FORMAT, "data": data.name}
+    document["units"] = dict(zip(header, units, strict=True))
+    document = {key: document[key] if key in document else getattr(texture, key) for key in KEYS}
+    write_text(path, json.dumps(document, indent=1) + "\n")
     return path, data
 
 
