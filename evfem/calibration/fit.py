@@ -186,7 +186,6 @@ class _Problem:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the fit, in plain values ready for JSON."""
         return {
             "fit": self.name,
             **origin(),
@@ -197,7 +196,6 @@ class _Problem:
 
 
 def _scale(one: Measured) -> Floats:
-    """Scale of the residuals of a measurement."""
     if one.sd is not None:
         return np.asarray(one.sd)
     size = float(np.sqrt(np.mean(np.square(one.values))))
@@ -303,7 +301,6 @@ class _Residuals:
 
 
 def _numbers(values: Iterable[float | None]) -> Floats:
-    """Numbers as an array, NaN for None."""
     return np.array(list(values), dtype=float)
 
 

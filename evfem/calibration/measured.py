@@ -141,28 +141,23 @@ class MeasuredCurve:
         zero: float = 0.0,
         branch: str | None = None,
     ) -> MeasuredCurve:
-        """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of
-        the history: `indentation,normal_force`; or with others, of which `columns` names those that are
-        meant, OVER first, by names or numbers from 1: {"indentation": "Travel", "normal_force": 3}.
+        """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of the history:
+        `indentation,normal_force`; or with others, of which `columns` names those that are meant, OVER first,
+        by names or numbers from 1: {"indentation": "Travel", "normal_force": 3}.
 
-        Units of the header are converted to mm, N, s, V and MPa. `zero` is the OVER (in these) at which
-        OVER shall be 0, as the travel at first touch. `branch` is "loading", up to the largest OVER, or
-        "unloading", from there on. Rows with gaps are left out, and rows at one place, as rounding makes
-        them, count by their mean.
-
-        With a `depth` (mm) the file is in N, mm2 and mJ over this depth, as an experiment is and
-        `Result.total`, and what depends on it is divided by it, `sd` too.
+        Units of the header are converted to mm, N, s, V and MPa. `zero` is the OVER (in these) at which OVER
+        shall be 0. `branch` is "loading", up to the largest OVER, or "unloading", from there on. Rows with
+        gaps are left out, rows at one place count by their mean. With a `depth` (mm) the file is in N, mm2
+        and mJ over it, as `Result.total` is, and what depends on it is divided by it, `sd` too.
         """
         table = read_headed(Path(path), "data")
         wanted = dict(zip(table.names, table.names, strict=True)) if columns is None else dict(columns)
         over, *others = (name for name in wanted if name != "sd")
+        given = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
         if len(others) != 1 or (columns is None and len(set(table.names)) < len(table.names)):
-            given = f"{Path(path).name} with the header {','.join(table.names)}"
             allowed = "two columns of the history, as indentation,normal_force; and sd; or `columns`"
             raise InputError("data", given, allowed)
-        foreign = [name for name in (over, *others) if name not in NUMBERS]
-        if foreign and columns is None:
-            given = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
+        if columns is None and not {over, *others} <= {*NUMBERS}:
             allowed = 'columns of the history, or columns={"indentation": %s, "normal_force": %s}'
             raise InputError("data", given, allowed % tuple(map(readable, (over, *others))))
         found = []
@@ -279,7 +274,6 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
 
 
 def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Floats | None]:
-    """Values and their standard deviations, checked."""
     found = numbers("data.values", values, allowed)
     if len(found) != count or not 0 < count <= MOST:
         raise InputError("data.values", f"{len(found)} values", f"{allowed}, from 1 to {MOST}")

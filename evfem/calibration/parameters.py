@@ -101,7 +101,6 @@ class Parameters:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The keys."""
         return tuple(self.free)
 
     @property

@@ -50,8 +50,6 @@ def tell(text: str) -> None:
 
 
 class _Told(logging.Handler):
-    """Notices by a function."""
-
     def __init__(self, tell: Callable[[str], None]) -> None:
         super().__init__()
         self.tell = tell

@@ -77,7 +77,6 @@ def _written(texture: Texture, out: Path) -> None:
 
 
 def _felt(given: argparse.Namespace) -> tuple[Touch, Device]:
-    """The finger and the display."""
     return Touch(**_given(given, Touch)), Device(**_given(given, Device, friction="display"))
 
 
@@ -111,7 +110,6 @@ def _estimate(given: argparse.Namespace) -> None:
 
 
 def _check_outputs(given: argparse.Namespace) -> None:
-    """Before anything is computed."""
     endings = {"out": (".csv",), "signal": (".csv", ".wav", ".png", ".hjif")}
     for key, path in ((key, getattr(given, key)) for key in endings):
         if path is not None and path.suffix.lower() not in endings[key]:

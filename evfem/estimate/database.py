@@ -72,7 +72,6 @@ class Database:
 
     @cached_property
     def estimator(self) -> Estimator:
-        """The estimator of corrections at places in the box."""
         points, responses, _ = self.responses
         return Estimator(points, responses, self.scale, self.smoothing)
 

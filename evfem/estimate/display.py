@@ -105,7 +105,6 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
 
 
 def _compared(curve: FrictionCurve, signal: rendering.Signal, felt: Floats, speed: float) -> Rendering:
-    """Comparison of the `felt` friction (n,) with the target."""
     frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
     _, given = spectrum_of(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()

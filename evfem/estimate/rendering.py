@@ -81,7 +81,6 @@ class ApparentFriction:
             raise InputError("normal_force", lowest, "an applied force above zero all along the slide")
 
     def __repr__(self) -> str:
-        """Its size and range."""
         x, mu = self.position, self.friction
         span = f"{len(x)} positions, {plus(x[0]):.4g} to {plus(x[-1]):.4g} mm"
         return f"ApparentFriction({span}, friction {plus(mu.min()):.4g} to {plus(mu.max()):.4g})"
@@ -253,7 +252,6 @@ class Comparison:
     voltage_difference: float
 
     def __repr__(self) -> str:
-        """Quality of the rendering."""
         good = f"pearson {self.pearson:.4g}, relative L2 error {self.relative_l2:.4g}"
         most = f"at most {self.largest_error:.4g} N/mm and {self.voltage_difference:.4g} V apart"
         return f"Comparison({len(self.position)} positions: {good}, {most})"

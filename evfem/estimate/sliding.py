@@ -22,7 +22,7 @@ deforms far from what it does on a flat surface, stands in the database (`correc
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -40,16 +40,10 @@ LAG = 1.0 - NU * (1.0 - 2.0 * NU) / (1.0 - NU)
 RUN_IN = 12
 
 
-class Ground(Protocol):
-    """A rigid profile: its height (mm) and slope at x (mm)."""
-
-    def height(self, x: Floats) -> Floats: ...
-
-    def slope(self, x: Floats) -> Floats: ...
-
-
-def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, speed: float) -> Floats:
-    """The friction (n,) at even positions (n,) of the bone (mm) and a speed (mm/s), NaN where not found."""
+def slid(pad: PressedPad, ground: Any, friction: float, positions: Floats, speed: float) -> Floats:
+    """The friction (n,) at even positions (n,) of the bone (mm) and a speed (mm/s), NaN where not found;
+    `ground` has `height` (mm) and `slope` at x (mm).
+    """
     step = float(positions[1] - positions[0])
     lag = LAG * VISCOSITY * speed / step
     positions = np.concatenate([positions[0] - step * np.arange(RUN_IN, 0, -1), positions])

@@ -145,7 +145,6 @@ def along(result: Result, name: str, over: str) -> Any:
 
 
 def _drawn(result: Result, over: str) -> Any:
-    """The steps that are drawn over a column."""
     if over != "time" or not len(result.time):
         return slice(None)
     return np.append(np.diff(result.time) > 0.0, True)
@@ -358,13 +357,11 @@ def _over(results: labels.Results, over: str | None) -> tuple[dict[str, Result],
 
 
 def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, label: str) -> Axes:
-    """A column of several results."""
     lines = [(along(one, over, over), along(one, column, over), look) for one, look in figures.styled(found)]
     return _marked(figures.curves(ax, lines, "", label), over, *found.values())
 
 
 def _of_presses(result: Result, *columns: str) -> list[Any]:
-    """Columns of the steps that press."""
     rows = np.flatnonzero(result.motion == "press")
     if not rows.size:
         raise InputError("results", f"a run of {', '.join(sorted(set(result.motion)))}", "a run with a press")

@@ -74,16 +74,11 @@ def axes_or_new(ax: Axes | None, height: float = HEIGHT) -> Axes:
     return ax
 
 
-def new_panels(rows: int, height: float) -> Panels:
-    """Panels below each other that share their abscissa, `height` inches in all."""
-    axes = new_figure(height).subplots(rows, 1, sharex=True, squeeze=False)
-    return Panels(axes[:, 0])
-
-
-def new_columns(columns: int, height: float = 3.2) -> Panels:
-    """Panels side by side that share their ordinate."""
-    axes = new_figure(height, max(WIDTH, 2.6 * columns)).subplots(1, columns, sharey=True, squeeze=False)
-    return Panels(axes[0])
+def new_panels(rows: int, height: float, columns: int = 1) -> Panels:
+    """Panels, `height` inches in all: rows share their abscissa, columns their ordinate."""
+    figure = new_figure(height, max(WIDTH, 2.6 * columns))
+    axes = figure.subplots(rows, columns, sharex=rows > 1, sharey=columns > 1, squeeze=False)
+    return Panels(axes.ravel())
 
 
 def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:

@@ -153,7 +153,6 @@ class View:
 
     @property
     def scaled_as(self) -> str:
-        """The field whose scale it has."""
         return self.field
 
     def shown(self, window: fields.Window) -> Floats:
@@ -197,7 +196,6 @@ def checked_window(window: Any) -> fields.Window:
 
 
 def _whole(points: Floats, height: fields.Height) -> fields.Window:
-    """The whole finger and the surface below it."""
     (left, lowest), (right, top) = points.min(axis=0), points.max(axis=0)
     x = np.linspace(left, right, 500)
     aside, tall = MARGIN * (right - left), top - lowest
@@ -227,10 +225,8 @@ def figure_height(window: fields.Window) -> float:
 
 def told(result: Result, frame: Frame) -> str:
     """Where the finger of a frame is, in a line."""
-    rows = np.flatnonzero(result.step == frame.step)
     text = f"step {frame.step}: position {frame.position + 0.0:.4g} mm"
-    if rows.size:
-        row = rows[0]
+    for row in np.flatnonzero(result.step == frame.step)[:1]:
         text += f", load {result.applied_force[row] + 0.0:.3g} {result.units['applied_force']}"
         text += f", {result.voltage[row]:.4g} V" if np.any(result.voltage != 0.0) else ""
     return text
@@ -268,7 +264,6 @@ def _draw_tissue(
 
 
 def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
-    """The outer outline and the lines between regions."""
     from matplotlib.collections import LineCollection
 
     edges = mesh.cell_edges.reshape(-1, mesh.cell_edges.shape[-1])
@@ -308,7 +303,6 @@ def _mark_probes(ax: Axes, result: Result, frame: Frame, window: fields.Window) 
 
 
 def _draw_surface(ax: Axes, height: fields.Height, window: fields.Window) -> None:
-    """The surface, filled down to the lower end of the window."""
     x = np.linspace(window[0], window[1], 2001)
     y = height(x)
     ax.fill_between(x, y, min(window[2], y.min()), color=figures.GROUND, linewidth=0.0, zorder=0.5)

@@ -93,7 +93,6 @@ class SkinView:
 
     @cached_property
     def skin(self) -> Skin:
-        """The skin of the mesh."""
         return make_skin(self.result.mesh)
 
     @cached_property
@@ -147,7 +146,6 @@ class SkinView:
         return ax.tripcolor(Triangulation(x, z, triangles), values, shading="gouraud")
 
     def _draw_shares(self, ax: Axes, faces: Ints) -> Any:
-        """One colour for each node's share of a face."""
         from matplotlib.collections import PolyCollection
 
         m, shares, values = faces.shape[1], [], []

@@ -79,7 +79,6 @@ class MoviePath(type(Path())):  # type: ignore[misc]
 
 
 def _writer(path: Path) -> Callable[[Path, Reel, int, Any], None]:
-    """What writes files with this ending."""
     if path.suffix not in ENDINGS:
         raise InputError("path", str(path), "a file name that ends in .gif or .mp4")
     if not path.absolute().parent.is_dir():
@@ -129,7 +128,6 @@ def _palette(scale: Scale, pixels: Any) -> Floats:
 
 
 def _write_mp4(path: Path, reel: Reel, fps: int, update: Any) -> None:
-    """All frames through ffmpeg."""
     from matplotlib.animation import FFMpegWriter
 
     writer = FFMpegWriter(fps=fps, extra_args=["-f", "mp4"])

@@ -95,7 +95,7 @@ def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = 
     names = list(_varied(table) if over is None else over)
     if not names:
         raise InputError("table", "no column of numbers that is varied", "a sweep of numbers")
-    panels = figures.new_columns(len(names))
+    panels = figures.new_panels(1, 3.2, len(names))
     for ax, name in zip(panels, names, strict=True):
         rows = _done(table, name, column)
         x, y = (np.array([row[key] for row in rows]) for key in (name, column))
@@ -181,7 +181,6 @@ def _value(table: SweepResult, by: str | None, value: Any) -> str:
 
 
 def _sides(places: Any, axis: Any) -> Any:
-    """Borders of the cells along an axis."""
     steps = np.diff(places)
     if steps.size == 0 or steps.max() <= UNEVEN * steps.min():
         return _edges(places)

@@ -67,7 +67,6 @@ class _Steps:
 
 
 def _work(line: Connection, text: str, exact: bool) -> None:
-    """In the process: run, and send what is found."""
     os.environ["MPLBACKEND"] = "agg"
     try:
         for found in _found(parse(text), exact, _Steps(line.send)):
@@ -77,7 +76,6 @@ def _work(line: Connection, text: str, exact: bool) -> None:
 
 
 def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, Any]]:
-    """The friction curve, then the exact voltage or the pictures."""
     from evfem.estimate.display import exact_voltage
     from evfem.estimate.rendering import record
     from evfem.estimate.touch import friction_of, from_texture, touch_scene
@@ -99,12 +97,11 @@ def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, 
 
 def _picture(result: Any) -> str:
     """The deformed pad near its contact as a PNG in base 64."""
-    from evfem.plotting.figures import whole_figure
     from evfem.plotting.finger import deformed
 
-    axes = deformed(result, near="contact")
+    figure: Any = deformed(result, near="contact").figure
     buffer = io.BytesIO()
-    whole_figure(axes).savefig(buffer, format="png", dpi=110)
+    figure.savefig(buffer, format="png", dpi=110)
     return base64.b64encode(buffer.getvalue()).decode()
 
 

@@ -19,7 +19,8 @@ from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 from evfem.common.checks import real
-from evfem.errors import EvfemError, InputError, StorageError
+from evfem.common.storage import disk
+from evfem.errors import EvfemError, InputError
 from evfem.studio import page, runs
 from evfem.studio.state import parse
 from evfem.textures.library import about, names
@@ -61,10 +62,8 @@ class Studio(ThreadingHTTPServer):
     def __init__(self, port: int = 0) -> None:
         allowed = "a port from 0 (any that is free) to 65535"
         number = int(real("port", port, allowed, lambda p: 0 <= p <= 65535 and p == int(p)))
-        try:
+        with disk(f"use port {number}"):
             super().__init__((ADDRESS, number), Handler)
-        except OSError as error:
-            raise StorageError(f"cannot use port {number}: {error.strerror or error}") from error
 
     @property
     def url(self) -> str:
@@ -89,11 +88,9 @@ class Handler(BaseHTTPRequestHandler):
         """Nothing is logged."""
 
     def do_GET(self) -> None:
-        """The page and its parts."""
         self._answered(self._get)
 
     def do_POST(self) -> None:
-        """Requests of the page."""
         self._answered(self._post)
 
     def _answered(self, what: Callable[[], None]) -> None:
@@ -190,7 +187,6 @@ class Handler(BaseHTTPRequestHandler):
         self.wfile.write(data)
 
     def _say(self, told: Any, status: int = HTTPStatus.OK) -> None:
-        """An answer in JSON."""
         self._send(page.text(told), "application/json", status=status)
 
 

@@ -146,7 +146,6 @@ class Sweep:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the table's columns."""
         return (*FIRST, *self.labels, *self.parameters, *self.outputs, *LAST)
 
     @property

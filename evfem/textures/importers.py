@@ -296,7 +296,6 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
 
 
 def _channel(given: int | str | None, names: list[str], count: int) -> int:
-    """Which of the channels, from 0."""
     called = [*names, *map(str, range(1, count + 1))]
     if given is None and count == 1:
         return 0

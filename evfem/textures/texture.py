@@ -88,7 +88,6 @@ class Texture:
             set_frozen(self, period=period)
 
     def __repr__(self) -> str:
-        """Its size."""
         if self.quantity == "friction_spectrum":
             what = f"{self.x.size} frequencies, {self.x[0]:.4g} to {self.x[-1]:.4g} per mm"
             return f"Texture({self.name!r}, {self.kind}, {what})"
