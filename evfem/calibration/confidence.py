@@ -40,11 +40,8 @@ class Confidence:
 
 
 def confidence(jacobian: Floats, residuals: Floats, names: Sequence[str]) -> Confidence:
-    """Standard errors (P,), correlation (P, P), singular values (P,) of the scaled Jacobian, and a
-    sentence for each unknown or combination that the data do not determine.
-
-    An unknown that is not determined has an infinite standard error.
-
+    """Standard errors (P,), inf of what is not determined, correlation (P, P), singular values (P,) of the
+    scaled Jacobian, and a sentence for each unknown or combination that the data do not determine.
     >>> J = np.array([[1.0, 2.0], [2.0, 4.0], [0.5, 1.0]])
     >>> confidence(J, np.ones(3), ["a", "b"]).warnings
     ('the data do not tell a and b apart: only a combination of them is determined',)

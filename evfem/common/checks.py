@@ -62,11 +62,7 @@ def choice(key: str, value: object, names: Collection[str]) -> str:
 
 
 def plain(value: Values) -> Values:
-    """A Python number for a single value, the array itself otherwise.
-
-    >>> plain(np.array(2.5))
-    2.5
-    """
+    """A Python number for a single value, the array itself otherwise."""
     return value.item() if isinstance(value, (np.ndarray, np.generic)) and value.ndim == 0 else value
 
 

@@ -21,12 +21,7 @@ LOG = logging.getLogger("evfem")
 
 
 def wrapped(text: str, stream: TextIO) -> str:
-    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep their lines.
-
-    >>> import io
-    >>> wrapped("one sentence " * 20, io.StringIO()).count(chr(10))
-    0
-    """
+    """`text` broken between words where `stream` is a terminal; files keep their lines."""
     if not stream.isatty():
         return text
     columns = max(shutil.get_terminal_size().columns, 40)

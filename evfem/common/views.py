@@ -43,20 +43,12 @@ def changed(value: Any) -> dict[str, Any]:
 
 
 def called(name: str, arguments: Mapping[str, Any]) -> str:
-    """The call that makes an object.
-
-    >>> called("Slide", {"distance": 5.0, "hold": "force"})
-    "Slide(distance=5.0, hold='force')"
-    """
+    """The call that makes an object."""
     return f"{name}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
 
 
 def plus(value: float) -> float:
-    """The number itself, with 0 for -0 and for what rounds to it in a table.
-
-    >>> plus(-0.0), plus(-1e-13), plus(-0.5)
-    (0.0, 0.0, -0.5)
-    """
+    """The number itself, with 0 for -0 and for what rounds to it in a table."""
     return 0.0 if abs(value) < TINY else float(value)
 
 

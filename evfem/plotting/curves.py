@@ -322,10 +322,8 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
 
 
 def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
-    """Computed minus measured for each measured value of a fit, in the order of the data.
-
-    In standard deviations where the data have them, with a band of two on either side; else in percent of the
-    root mean square of the measurement. A good fit scatters about zero without a pattern.
+    """Computed minus measured for each measured value of a fit: in standard deviations where the data have
+    them, with a band of two, else in percent of their root mean square. Good ones have no pattern.
     """
     from matplotlib.ticker import MaxNLocator
 

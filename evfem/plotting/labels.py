@@ -72,11 +72,7 @@ def kind_of(name: str, units: Units = UNITS) -> tuple[str, str]:
 
 
 def column_label(name: str, units: Units = UNITS) -> str:
-    """A column with its unit, for an axis of its own.
-
-    >>> column_label("min_gap"), column_label("step"), column_label("contact_width", {"contact_width": "mm2"})
-    ('smallest gap (mm)', 'step', 'contact area (mm²)')
-    """
+    """A column with its unit, for an axis of its own."""
     return with_unit(column_text(name, units[name]), units[name])
 
 
@@ -86,11 +82,7 @@ def axis_label(name: str, units: Units = UNITS) -> str:
 
 
 def on_lines(label: str) -> str:
-    """A label beside a low panel, on lines that are no longer than the panel is high.
-
-    >>> on_lines("electrostatic force (N/mm)").split(chr(10)), on_lines("voltage (V)")
-    (['electrostatic force', '(N/mm)'], 'voltage (V)')
-    """
+    """A label beside a low panel, on lines that are no longer than the panel is high."""
     return textwrap.fill(label, LINE, break_long_words=False, break_on_hyphens=False)
 
 

@@ -6,7 +6,7 @@ colours are the same in every frame; a close-up goes along with the finger.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import CalledProcessError
@@ -30,7 +30,6 @@ from evfem.simulation.result import POINT_FIELDS, Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ENDINGS = (".gif", ".mp4")
 DPI, CURVES_HEIGHT = 100, 2.0  # pixels per inch; height of the forces in inches
 OF_SCALE, SHADES = 160, 12  # of the 256 colours of a .gif: those of the scale, and of each curve
 
@@ -54,11 +53,19 @@ def animate(
     a second; keep more of them with `Output(every=...)`. Raises InputError for another ending, for .mp4
     without ffmpeg, and for a result without frames; StorageError when the disk refuses.
     """
+    from matplotlib.animation import FFMpegWriter
+
     path, fps = Path(path), count("fps", fps, 60)
     choice("field", field, POINT_FIELDS if result.mesh.dim == 3 else FIELDS)
     if not result.frames:
         raise InputError("result", "a result without frames", "a result with frames (Output(every=...))")
-    write = _writer(path)
+    if path.suffix not in (".gif", ".mp4"):
+        raise InputError("path", str(path), "a file name that ends in .gif or .mp4")
+    if not path.absolute().parent.is_dir():
+        raise StorageError(f"cannot write {path}: there is no folder {path.parent}")
+    if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError("path", f"{path}, and no ffmpeg", "a .gif, or an .mp4 where ffmpeg is installed")
+    write = _write_gif if path.suffix == ".gif" else _write_mp4
     reel = make_reel(result, field, near, (vmin, vmax))
     wanted = progress and notices.drawable()
     with replacing(path) as temporary, notices.bar(len(result.frames), "frame", wanted=wanted) as bar:
@@ -76,20 +83,6 @@ class MoviePath(type(Path())):  # type: ignore[misc]
         if self.suffix == ".gif":
             return f'<img src="data:image/gif;base64,{data}">'
         return f'<video controls loop src="data:video/mp4;base64,{data}"></video>'
-
-
-def _writer(path: Path) -> Callable[[Path, Reel, int, Any], None]:
-    if path.suffix not in ENDINGS:
-        raise InputError("path", str(path), "a file name that ends in .gif or .mp4")
-    if not path.absolute().parent.is_dir():
-        raise StorageError(f"cannot write {path}: there is no folder {path.parent}")
-    if path.suffix == ".gif":
-        return _write_gif
-    from matplotlib.animation import FFMpegWriter
-
-    if not FFMpegWriter.isAvailable():
-        raise InputError("path", f"{path}, and no ffmpeg", "a .gif, or an .mp4 where ffmpeg is installed")
-    return _write_mp4
 
 
 def _write_gif(path: Path, reel: Reel, fps: int, update: Any) -> None:

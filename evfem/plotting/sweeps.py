@@ -30,13 +30,11 @@ MARKERS = "os^Dv<>P"
 def sweep(
     table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | None = None, log: str = ""
 ) -> Axes:
-    """Column `y` of a sweep over its column `x`, a line with markers of its own for each value of the column
-    `by`.
+    """Column `y` of a sweep over its column `x`, a line with its own markers for each value of column `by`.
 
-    `log` is "x", "y" or "xy": axes with logarithmic scales, on which all numbers must be above 0. Points
-    without a number are left out. Samples, which have no value of `x` twice but also no order, and everything
-    that is varied beside `x` and `by` are points without lines. Names on the abscissa stand in the order of
-    the table.
+    `log` is "x", "y" or "xy": axes with logarithmic scales, on which all numbers must be above 0. Samples,
+    and what is varied beside `x` and `by`, are points without lines; points without a number are left out.
+    Names on the abscissa stand in the order of the table.
     """
     rows = _done(table, x, y, *([by] if by else []))
     names = _names(rows, x)

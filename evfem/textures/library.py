@@ -45,11 +45,7 @@ FRICTIONS: dict[str, tuple[str, tuple[float, ...], tuple[float, ...], float]] = 
 
 
 def names() -> list[str]:
-    """The names of the twenty reference textures.
-
-    >>> len(names())
-    20
-    """
+    """The names of the twenty reference textures."""
     return [*REFERENCES, *FRICTIONS]
 
 

@@ -104,10 +104,7 @@ class Texture:
         return float(self.x[-1] - self.x[0]) if self.period is None else self.period
 
     def over(self, start: float, stop: float) -> tuple[Floats, Floats]:
-        """Rows from `start` or before it to `stop` or behind it (mm), periods repeated.
-
-        A texture that ends is continued by its mirror image, so that it neither jumps nor stops.
-        """
+        """Rows from `start` to `stop` (mm) or beyond them, periods repeated, without one mirrored."""
         if self.quantity == "friction_spectrum":
             raise InputError("texture", f"{self.name}, a spectrum", "heights or friction over x")
         x, values, period = self._repeated()
