@@ -40,6 +40,11 @@ class Recording:
     result: Result
     full_slip: float | None
 
+    @property
+    def peak_voltage(self) -> Array:
+        """Peak (V) of the waveform in every step, whose effective value is `result.voltage`."""
+        return np.asarray((self.scene.drive or Drive()).peak(self.result.voltage))
+
 
 def record(scene: Scene, observers: Sequence[Observer] = ()) -> Recording:
     """Simulate `scene` and watch for full slip; `observers` as in `simulate`."""
@@ -225,8 +230,8 @@ def exact(
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as its
     equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
     attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
-    was. The voltage found, an effective one, is in `result.voltage`; `Comparison.unmet` says where the wish
-    was out of reach.
+    was. The voltage found, an effective one, is in `result.voltage`, the `drive`'s peak in `peak_voltage`;
+    `Comparison.unmet` says where the wish was out of reach.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
