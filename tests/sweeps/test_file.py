@@ -152,7 +152,7 @@ MISTAKES = [
     (f"{SAMPLED}surface.y = {{ normal = [2.0] }}", "samples.parameters.surface.y.normal: given [2.0]"),
     (
         f"{SAMPLED}surface.y = {{ between = [0.0, 1.0] }}",
-        "samples.parameters.surface.y: given neither uniform nor normal",
+        "samples.parameters.surface.y.uniform: given neither uniform nor normal",
     ),
     (
         SAMPLED.replace("seed = 1\n", "") + "surface.y = { normal = [0.0, 1.0] }",
