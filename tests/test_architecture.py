@@ -21,7 +21,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray"},
-        "arrays quadrature constants notices checks views pools digest storage manifest tables pictures",
+        "constants arrays quadrature notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},

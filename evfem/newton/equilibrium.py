@@ -110,9 +110,8 @@ class Equilibrium:
         return self._given_way(old, held, frozen, found) if found.touching.any() else found
 
     def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
-        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`.
-
-        Without mass every height above is an equilibrium too: its lowest node then just does not touch.
+        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`: of all
+        heights above, which are equilibria too, the one where its lowest node just does not touch.
         """
         lifted = self._followed(old, replace(target, height=Force(0.0)), frozen, touched)
         gap = float(self.interface.surface_at(lifted).gap.min())

@@ -350,7 +350,7 @@ class Run:
             if isinstance(end.voltage, KeptCharge):
                 return self._kept(begin + fraction * seconds, begin) or end.voltage
             if isinstance(wanted, FollowForce) and isinstance(end.voltage, FollowFriction):
-                return self._following(wanted, end.voltage.way, (x, z))
+                return self._following(wanted, end.voltage.direction, (x, z))
             if isinstance(end.voltage, GivenGap):
                 gap = start.voltage.gap if isinstance(start.voltage, GivenGap) else end.voltage.gap
                 return GivenGap(gap + fraction * (end.voltage.gap - gap))

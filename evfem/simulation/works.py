@@ -308,7 +308,7 @@ class SubstepWork:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
         places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
         pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
-        forces = attraction.way_forces(places, volts, old.touching, pressing)
+        forces = attraction.column_law.forces_along(places, volts, old.touching, pressing)
         return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:

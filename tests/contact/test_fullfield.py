@@ -401,7 +401,7 @@ def test_harmonics_of_a_square_wave_add_up():
     square = replace(DRY, waveform="square")  # a skin whose permittivity falls with the frequency
     hover = [ev.Hover(gap=0.02)]
     attraction = make_model(driven("full", square, hover)).attraction
-    assert sum(one.share for one in attraction.harmonics) == pytest.approx(1.0)
+    assert sum(one.weight for one in attraction.harmonics) == pytest.approx(1.0)
     local = make_model(driven("local", square, hover)).attraction
     pad, points = arc(12, 3.0, 2.0)
     points[:, 1] = 0.0003
@@ -411,7 +411,7 @@ def test_harmonics_of_a_square_wave_add_up():
     given = {"edges": facing(pad, points), "skin": skin, "harmonics": attraction.harmonics}
     flat = type(attraction)(*of, pad, surface, "normal", **given)
     pulls = [forces[:, 1].sum() for forces in (flat.forces(points, 50.0, None),
-                                               flat.column_forces(points, 50.0, None))]  # fmt: skip
+                                               flat.column_law.forces(points, 50.0, None))]  # fmt: skip
     assert pulls[0] == pytest.approx(pulls[1], rel=1e-3)
 
 

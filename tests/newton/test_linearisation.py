@@ -151,7 +151,7 @@ def test_a_factorisation_is_kept_while_few_iterations_are_left(history, anew):
     assert linear.refactorise_if_needed(state, history)  # there is none
     assert linear.refactorise_if_needed(state, history) == anew
     assert linear.record.factorisations == 1 + anew
-    linear.discard()
+    linear.factor = None
     assert linear.reusable is None
     assert linear.refactorise_if_needed(state, history)
 
