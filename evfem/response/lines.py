@@ -21,6 +21,7 @@ from evfem.response.parts import Equations
 from evfem.scene.scene import Scene
 from evfem.simulation.history import UNITS
 from evfem.simulation.ledger import Ledger
+from evfem.simulation.model import Model
 from evfem.simulation.run import Request, Run
 from evfem.simulation.works import Books
 from evfem.surface.ways import Steps
@@ -31,8 +32,9 @@ PLACES, WEIGHTS = (-2, -1, 1, 2), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 #: the farthest place goes no further than this share of the way to a kink of the attraction or to another
 #: status, than this share of the length over which the attraction changes, and at least so far
 NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
-#: how far (mm) nodes of the undeformed finger move between places, and nodes along a profile
-SHIFT, ALONG = 5e-6, 1e-5
+#: how far nodes of the undeformed finger move between places, as a share of the distance of pad nodes; in mm
+#: pad nodes below which there is an attraction or a profile, and nodes along a profile
+INSIDE, SHIFT, ALONG = 2e-3, 5e-6, 1e-5
 #: how many times as far apart places are for what is smooth
 FAR = 4.0
 #: refinements at most; the relative change that is still to come when they are done, that from which on it is
@@ -191,9 +193,9 @@ class Line:
         """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
         step = longest = STEP * parameter.size
         last = Beside.of(scene, parameter, PLACES[-1] * step)
-        shift = _shift(last, centre.run.model.mesh.points) / PLACES[-1]
-        if shift > SHIFT:
-            step *= SHIFT / shift
+        share = _shift(last, centre.run.model) / PLACES[-1]
+        if share > 1.0:
+            step /= share
             last = Beside.of(scene, parameter, PLACES[-1] * step)
         beside = [*(Beside.of(scene, parameter, place * step) for place in PLACES[:-1]), last]
         state = changes([one.run.state for one in beside], step)
@@ -363,7 +365,12 @@ class Line:
             one.run.rows.append({**row, **{n: row[n] + one.way * value for n, value in found.items()}})
 
 
-def _shift(one: Beside, points: Floats) -> float:
-    """How far (mm) the nodes of a finger are from `points` (N, dim) at most; 0 for other meshes."""
-    own = one.run.model.mesh.points
-    return float(np.abs(own - points).max()) if own.shape == points.shape else 0.0
+def _shift(one: Beside, model: Model) -> float:
+    """How far nodes of a finger are from those of `model`, over how far they may; 0 for other meshes."""
+    own, points = one.run.model.mesh.points, model.mesh.points
+    if own.shape != points.shape:
+        return 0.0
+    most = np.full(len(points), INSIDE * model.equilibrium.interface.length)
+    if model.attraction is not None or not model.surface.is_flat:
+        most[model.pad.nodes] = SHIFT
+    return float((np.abs(own - points).max(axis=1) / most).max())
