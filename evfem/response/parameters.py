@@ -252,10 +252,10 @@ def _with(owner: Any, path: tuple[str, ...], value: float, key: str) -> Any:
         return type(owner)(part if i == int(step) else one for i, one in enumerate(owner))
     attribute = _field(owner, step)
     assert attribute is not None
-    if is_dataclass(owner) and owner.__dataclass_params__.init:  # type: ignore[attr-defined]
+    if is_dataclass(owner) and vars(type(owner))["__dataclass_params__"].init:
         return replace(owner, **{attribute: part})  # type: ignore[type-var]
     changed = copy(owner)
-    if is_dataclass(owner):  # made from other names than its fields' own; without what is cached
+    if is_dataclass(owner):  # made from other names than its fields' own; what is cached is not kept
         for name in vars(owner).keys() - {spec.name for spec in fields(owner)}:
             del vars(changed)[name]
     object.__setattr__(changed, attribute, part)

@@ -13,7 +13,7 @@ of w, z, p. With :math:`' = d/dp`
 what a part leaves behind, of works and rows, by the run's own code, with no equilibrium solved
 (`evfem.response.lines`). By the parameter, states fixed, over models of changed scenes
 :math:`\epsilon = 10^{-3}` of the parameter apart (of Poisson's ratio of its distance to 1/2; of shapes so
-that no node moves by more than 1/500 of the distance of pad nodes, and these, where there is an attraction or
+that no node moves by more than 1/250 of the distance of pad nodes, and these, where there is an attraction or
 a profile, by 5e-6 mm). Along the derivative of the states: of tissue, bone and gaps 4e-3
 apart; of attraction and friction so far that no gap changes by more than 1/1000 of the length over which the
 attraction does, or passes a kink of it, and that no node goes on by more than 1e-5 mm along a profile. For a
