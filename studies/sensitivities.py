@@ -45,7 +45,7 @@ KEYS = {
     **{f"finger.materials.{layer}.nu": f"ν, {layer.replace('_', ' ')}" for layer in LAYERS},
     **{f"finger.{layer}_thickness": f"thickness, {layer.replace('_', ' ')}" for layer in LAYERS[:3]},
     "surface.friction": "friction",
-    "finger.stratum_corneum_eps_r": "permittivity, stratum corneum",
+    "finger.electrical.stratum_corneum_eps_r": "permittivity, stratum corneum",
     "electrostatics.insulator_thickness": "thickness, insulator",
     "electrostatics.insulator_eps_r": "permittivity, insulator",
     "electrostatics.voltage": "voltage",
@@ -207,7 +207,7 @@ def _draw_shares(ax: Any, found: dict[str, Floats]) -> None:
     shares = np.array([values.ravel() for values in found.values()])
     ax.imshow(shares, cmap="RdBu_r", vmin=-2.0, vmax=2.0, aspect="auto")
     for (row, column), value in np.ndenumerate(shares):
-        if np.isfinite(value) and 0.005 <= abs(value):
+        if abs(value) >= 0.005:
             colour = "white" if abs(value) > 1.3 else "black"
             ax.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=6, color=colour)
     ax.set_yticks(range(len(found)), [KEYS[key] for key in found], fontsize="small")

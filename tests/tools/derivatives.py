@@ -35,7 +35,7 @@ from evfem.simulation.run import simulate
 FORCES = ("normal_force", "tangential_force", "electrostatic_force")
 TABLES = ("finger", "surface", "electrostatics", "adhesion", "hand", "motion")
 #: shares of a parameter between the runs, agreement asked for, and CPU seconds of a scene
-SHARES, AGREE, LIMIT = (2e-4, 1e-4), 1e-5, 120.0
+SHARES, AGREE, LIMIT = (2e-4, 1e-4), 1e-5, 40.0
 STEPS, PARAMETERS = 2, 3
 COLUMNS = ("seed", "scene", "key", "found", "steps", "of", "difference", "known_to")
 
