@@ -79,7 +79,7 @@ ROOMS = {
     ),
     "response": (
         {"numpy", "scipy"},
-        "parameters parts tangent lines sensitivities uncertainty design impedance",
+        "parameters parts tangent lines sensitivities file uncertainty design impedance",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
