@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from os import PathLike
@@ -19,13 +19,12 @@ from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
-from evfem.planning.adhesion import told
+from evfem.newton.hand import Hand
 from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
-from evfem.planning.pathdependence import steps_line
 from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
-from evfem.planning.resolution import oscillating, too_fast, unresolved
+from evfem.planning.resolution import oscillating, steps_line, too_fast, unresolved
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import MOTIONS
@@ -176,18 +175,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         *drifting(scene, mesh, moduli),
     )
     locked = locking(element, scene.finger.materials, mesh.dim)
-    terms = (
-        _tissue(scene, mesh, moduli),
-        _contact(scene),
-        _friction(scene),
-        _electricity(closing),
-        *_adhesion(closing),
-        *_field(scene, mesh),
-        *_drive(scene),
-        _time(scene, mesh, element),
-        *_hand(scene),
-        _forms(scene, mesh),
-    )
+    terms = tuple(_terms(closing, moduli, element))
     return Plan(
         name=scene.name,
         element=element,
@@ -201,6 +189,27 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         warnings=(*implausible(scene, mesh, moduli), *locked, *filter(None, others)),
         closing=closing,
     )
+
+
+def _terms(closing: Closing, moduli: Mapping[str, float], element: str) -> Iterator[Term]:
+    scene, mesh = closing.scene, closing.mesh
+    yield _tissue(scene, mesh, moduli)
+    yield _contact(scene)
+    yield _friction(scene)
+    yield _electricity(closing)
+    if scene.adhesion is not None:
+        yield Term("adhesion", True, closing.adhesion_in_words)
+    if scene.field != "local" and scene.electrics.acts:
+        from evfem.planning.fieldchoice import chosen_field
+
+        choice = chosen_field(scene, mesh)
+        yield Term("full field", choice.full, choice.reason)
+    if scene.drive is not None:
+        yield Term("drive", True, time_scales(scene))
+    yield _time(scene, mesh, element)
+    if scene.hand is not None:
+        yield Term("hand", True, _hand(scene.hand))
+    yield _forms(scene, mesh)
 
 
 def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
@@ -261,27 +270,12 @@ def _electricity(closing: Closing) -> Term:
     return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")
 
 
-def _adhesion(closing: Closing) -> tuple[Term, ...]:
-    """The adhesion of a scene that has any."""
-    return () if closing.scene.adhesion is None else (Term("adhesion", True, told(closing)),)
-
-
 def _other_law(scene: Scene) -> str:
     """What the other one of the two laws of the literature says, and where to read which to take."""
     if (other := OTHER_LAW.get(type(scene.law))) is None:
         return ""
     traction = touching_traction(scene, other(gap_eps_r=scene.electrics.gap_eps_r))
     return f" ({other.__name__} {traction:.2g} MPa: see docs/howto/which-law.md)"
-
-
-def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
-    """Bounds of the full field, if a scene requests it or leaves the choice."""
-    if scene.field == "local" or not scene.electrics.acts:
-        return ()
-    from evfem.planning.fieldchoice import chosen_field
-
-    choice = chosen_field(scene, mesh)
-    return (Term("full field", choice.full, choice.reason),)
 
 
 def _roughness(scene: Scene) -> str:
@@ -293,13 +287,6 @@ def _roughness(scene: Scene) -> str:
         return f", rough faces {rough.gap:g} mm apart in contact"
     apart = float(rough.separation(0.0))
     return f", rough faces up to {apart:g} mm apart, less with a node's contact pressure"
-
-
-def _drive(scene: Scene) -> tuple[Term, ...]:
-    """The time scales of a scene with a drive."""
-    if scene.drive is None:
-        return ()
-    return (Term("drive", True, time_scales(scene)),)
 
 
 def _time(scene: Scene, mesh: Mesh, element: str) -> Term:
@@ -329,18 +316,15 @@ def _relaxing(scene: Scene, mesh: Mesh, element: str) -> str:
     )
 
 
-def _hand(scene: Scene) -> tuple[Term, ...]:
-    """The hand between drive and bone, if there is one: its own frequency is to be resolved."""
-    hand = scene.hand
-    if hand is None:
-        return ()
+def _hand(hand: Hand) -> str:
+    """The hand between drive and bone, in words: its own frequency is to be resolved."""
     reason = f"x of the bone an unknown, behind a spring of {hand.stiffness:g} N/mm"
     if hand.damping > 0.0:
         reason += f", a damper of {hand.damping:g} N s/mm"
     if hand.mass > 0.0:
         own = np.sqrt(hand.stiffness / hand.mass) / (2.0 * np.pi)
         reason += f", a mass of {hand.mass:g} t: {own:.3g} Hz by themselves"
-    return (Term("hand", True, f"{reason} (per mm of depth)"),)
+    return f"{reason} (per mm of depth)"
 
 
 def _forms(scene: Scene, mesh: Mesh) -> Term:

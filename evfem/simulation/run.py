@@ -35,7 +35,7 @@ from evfem.newton.control import (
 )
 from evfem.newton.hand import HandControl, at_rest
 from evfem.newton.state import State, StepFailed
-from evfem.planning.pathdependence import allowed_error
+from evfem.planning.resolution import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
 from evfem.scene.scene import Scene
