@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _status(given: argparse.Namespace) -> int:
     """Run the command; its exit status, with the message of what went wrong."""
     try:
-        return _command(given.command)(given)
+        return _command(given.command)(given) or DONE
     except InputError as error:
         return _refuse(error, _file(given))
     except NotConverged as error:
@@ -146,10 +146,10 @@ def _kind(path: Path) -> str:
     return ""
 
 
-def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
-    """Runs a command of `evfem.arguments.parser`."""
+def _command(name: str | None) -> Callable[[argparse.Namespace], int | None]:
+    """Runs a command of `evfem.arguments.parser`; None is done."""
     return {
-        None: _help,
+        None: lambda given: parser().print_help(),
         "run": _run,
         "init": _init,
         "plan": _plan,
@@ -165,21 +165,15 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
     }[name]
 
 
-def _help(given: argparse.Namespace) -> int:
-    parser().print_help()
-    return DONE
-
-
-def _init(given: argparse.Namespace) -> int:
+def _init(given: argparse.Namespace) -> None:
     from evfem.templates import write
 
     path = given.file or Path(f"{given.template}.toml")
     written = write(given.template, path)
     print(f"{', '.join(map(str, written))} written; evfem run {path} runs it", flush=True)
-    return DONE
 
 
-def _schema(given: argparse.Namespace) -> int:
+def _schema(given: argparse.Namespace) -> None:
     from evfem.scene import schema as scenes
     from evfem.sweeps import file as sweeps
 
@@ -187,12 +181,11 @@ def _schema(given: argparse.Namespace) -> int:
     text = json.dumps(found, indent=2)
     if given.out is None:
         print(text, flush=True)
-        return DONE
+        return
     from evfem.common.storage import write_text
 
     write_text(given.out, text + "\n")
     print(given.out, flush=True)
-    return DONE
 
 
 def _run(given: argparse.Namespace) -> int:
@@ -286,7 +279,7 @@ class _Milestones:
         notices.milestone("step", int(str(row["step"])), self.total)
 
 
-def _plan(given: argparse.Namespace) -> int:
+def _plan(given: argparse.Namespace) -> None:
     from evfem.export import FieldFiles
     from evfem.planning.plan import plan_on, scene_mesh
 
@@ -296,7 +289,6 @@ def _plan(given: argparse.Namespace) -> int:
         needed = plan_on(scene, mesh, element)
     files = FieldFiles.of(scene, mesh)
     print(f"{needed}\n\nFiles of a run\n  {files}", flush=True)
-    return DONE
 
 
 def _check(given: argparse.Namespace) -> int:
@@ -307,7 +299,7 @@ def _check(given: argparse.Namespace) -> int:
     return DONE if found.agrees else DIFFERENT
 
 
-def _sensitivities(given: argparse.Namespace) -> int:
+def _sensitivities(given: argparse.Namespace) -> None:
     from evfem.response.sensitivities import sensitivities
     from evfem.runfolder import write_sensitivities
 
@@ -317,10 +309,9 @@ def _sensitivities(given: argparse.Namespace) -> int:
     for key in (key for key in found.parameters if key in found.reasons):
         notices.tell(f"{key}: {found.reasons[key]}")
     print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
-    return DONE
 
 
-def _study(given: argparse.Namespace) -> int:
+def _study(given: argparse.Namespace) -> None:
     known = studies()
     names: list[str] = []
     for name in given.names:
@@ -337,7 +328,6 @@ def _study(given: argparse.Namespace) -> int:
         print(given.out / f"{name}.json", flush=True)
     if "all" in given.names:
         print(*known.report(given.out), sep="\n")
-    return DONE
 
 
 def _sample(given: argparse.Namespace) -> Any:
@@ -383,7 +373,7 @@ def _sweep(given: argparse.Namespace) -> int:
     return NOT_CONVERGED if wrong else DONE
 
 
-def _mesh(given: argparse.Namespace) -> int:
+def _mesh(given: argparse.Namespace) -> None:
     scene = _scene(given.scene)
     from evfem.mesh.file import write
     from evfem.planning.plan import scene_mesh
@@ -396,10 +386,9 @@ def _mesh(given: argparse.Namespace) -> int:
         f"{len(mesh.points)} nodes, {len(mesh.cells)} cells ({mesh.kind}); {regions}; in {given.out}",
         flush=True,
     )
-    return DONE
 
 
-def _signal(given: argparse.Namespace) -> int:
+def _signal(given: argparse.Namespace) -> None:
     from evfem.common.views import plus
     from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
 
@@ -413,21 +402,18 @@ def _signal(given: argparse.Namespace) -> int:
     start, stop = profile.position[0], profile.position[-1]
     largest = max(abs(profile.voltage))
     print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {given.out}", flush=True)
-    return DONE
 
 
-def _texture(given: argparse.Namespace) -> int:
+def _texture(given: argparse.Namespace) -> None:
     from evfem.estimate.commands import run
 
     run(given)
-    return DONE
 
 
-def _studio(given: argparse.Namespace) -> int:
+def _studio(given: argparse.Namespace) -> None:
     from evfem.studio.server import serve
 
     serve(given.port, not given.no_browser)
-    return DONE
 
 
 if __name__ == "__main__":

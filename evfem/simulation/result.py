@@ -27,7 +27,7 @@ from evfem.simulation.history import (
     ABOUT,
     COLUMNS,
     DRIFT,
-    INTEGERS,
+    KINDS,
     NEEDED,
     SHOWN,
     SPATIAL,
@@ -41,6 +41,9 @@ from evfem.simulation.history import (
     columns_of,
     load_drift,
     over_depth,
+)
+from evfem.simulation.history import (
+    INTEGERS as INTEGERS,
 )
 from evfem.simulation.provenance import provenance as provenance
 
@@ -309,9 +312,8 @@ class Result(History):
 
         Raises InputError where xarray is not installed (the extra `xarray`).
         """
-        about = dict(ABOUT)
         variables: dict[str, Any] = {
-            name: ("step", self[name], {"units": self.units[name], "long_name": about[name]["meaning"]})
+            name: ("step", self[name], {"units": self.units[name], "long_name": ABOUT[name]["meaning"]})
             for name in self.columns[1:]
         }
         for name, shape in _SHAPES.items() if self.frames else ():
@@ -391,18 +393,12 @@ def _probes_from(arrays: Mapping[str, np.ndarray], steps: int) -> dict[str, Any]
 
 
 def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:
-    column = arrays.get(f"history/{name}")
-    if column is not None:
-        return _checked_column(name, column)
-    steps = len(arrays["history/step"])
-    return np.zeros(steps, dtype=np.int64) if name in INTEGERS else np.full(steps, np.nan)
-
-
-def _checked_column(name: str, column: np.ndarray) -> Any:
-    kinds = "U" if name == "motion" else "iu" if name in INTEGERS else "f"
-    if column.ndim != 1 or (column.size and column.dtype.kind not in kinds):
+    kind, column = KINDS.get(name, float), arrays.get(f"history/{name}")
+    if column is None:
+        return np.full(len(arrays["history/step"]), 0 if kind is int else np.nan, dtype=kind)
+    if column.ndim != 1 or (column.size and column.dtype.kind not in {str: "U", int: "iu", float: "f"}[kind]):
         raise ValueError(f"column {name}")
-    return column.astype(str) if name == "motion" else column
+    return column.astype(str) if kind is str else column
 
 
 def _json(value: Any) -> Any:

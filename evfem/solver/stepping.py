@@ -1,24 +1,13 @@
-"""Adaptive steps: a requested step is reached exactly, in as many substeps as its equilibria need.
-
-Algorithm (`Stepper.follow`)::
-
-    substep <- the one that worked last
-    repeat until the end of the path
-        solve one equilibrium at `done + substep`
-        if it failed: halve the substep; from `RELEASED` of a step on, release the body, which comes to
-            rest at another equilibrium (`evfem.solver.relaxation`); if it does not, halve on, and fail
-            at the strategy's smallest
-        else: accept; if it took few iterations, the next substep is longer
+"""Adaptive steps: a requested step is reached exactly, in as many parts as its equilibria need (1. of
+`evfem.solver`).
 
 A body that is released from the begin of a long part lags the loads of its end by all of it, and its edge
-peels on the way: so the part is halved first.
+peels on the way: so the part is halved first. After a release the step goes on with the part that worked
+before; its next release comes at a part `COARSER` times as long, so that a step in which the finger snaps
+again and again comes to its end.
 
 Where the error of the path is limited, a part is solved as two halves and accepted if one whole part
 ends close enough to them; its length follows that error (`evfem.solver.path`).
-
-Nothing that has not converged is kept. After a release the step goes on with the substep that worked
-before; its next release comes at a part `COARSER` times as long, so that a step in which the finger
-snaps again and again comes to its end.
 
 Staggered rounds have the same equilibria as the monolithic coupling, but may not converge to them: the
 attraction of one round, held, can pull a node down the slope of a texture. If they do not settle, the
@@ -65,15 +54,6 @@ class Accounts(Protocol):
 
     def back(self, mark: Any) -> None:
         """Discards the substeps accepted since `mark`."""
-
-
-@dataclass(frozen=True)
-class Substep:
-    """A fraction of a step, from `begin` to `end` (0 to 1), and the target there."""
-
-    begin: float
-    end: float
-    target: Target
 
 
 @dataclass
@@ -131,8 +111,9 @@ class Stepper:
             try:
                 parts, error = self._part(state, path, done, fraction)
             except StepFailed as failed:
-                part = Substep(done, fraction, path(done, fraction))
-                rest = self._shortened(state, part, accounts, failed)
+                left, target = 1.0 - done, path(done, fraction)
+                self.substep = 0.5 * (fraction - done)
+                rest = self._shortened(state, target, left, accounts, failed)
                 if rest is not None:
                     state, done, substeps = rest, fraction, substeps + 1
                 continue
@@ -151,23 +132,24 @@ class Stepper:
             done = fraction
         return state, substeps
 
-    def _shortened(self, state: State, part: Substep, accounts: Accounts, failed: StepFailed) -> State | None:
-        """Halve the part that failed, or release the body at one that is short enough: its rest is
-        returned, and the part that worked before is tried next. Raises `failed` at the smallest part
-        of what was left of the step, or `LiftedOff`.
+    def _shortened(
+        self, state: State, target: Target, left: float, accounts: Accounts, failed: StepFailed
+    ) -> State | None:
+        """Go on with half of the part that failed, or release the body where that is short enough: its rest
+        is returned, and the part that worked before is tried next. Raises `failed` at the smallest part of
+        what was `left` of the step, or `LiftedOff`.
         """
-        release, least = self._release, self._least(part.target)
+        release, half, least = self._release, self.substep, self._least(target) * left
         self.cuts += 1
         release.unstable = failed.unstable = release.unstable or failed.unstable
-        self.substep = half = 0.5 * (part.end - part.begin)
         if half >= release.least:
             return None
-        rest = self._released(state, part.target, accounts, failed)
+        rest = self._released(state, target, accounts, failed)
         if rest is None:
-            if half < least * (1.0 - part.begin):
-                self._refuse_flight(state, part.target, failed)
+            if half < least:
+                self._refuse_flight(state, target, failed)
                 raise failed
-            self.substep, release.least = half, least * (1.0 - part.begin)
+            self.substep, release.least = half, least
             return None
         self.substep, release.unstable = min(1.0, max(release.trusted, release.least)), False
         release.least *= COARSER
@@ -213,7 +195,6 @@ class Stepper:
             self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
 
     def _relaxation(self, body: Body) -> Relaxation:
-        """The release of `body`."""
         attraction = self.equilibrium.attraction
         return Relaxation(body, self.solve, attraction is not None and attraction.charging is not None)
 
