@@ -93,7 +93,6 @@ def _of(file: Path | None, message: object) -> str:
 
 
 def _warner(file: Path | None) -> Callable[..., None]:
-    """Shows a warning in one line, without its place in the code."""
     return lambda message, *place, **more: notices.tell(f"warning: {_of(file, message)}")
 
 
@@ -331,7 +330,6 @@ def _study(given: argparse.Namespace) -> None:
 
 
 def _sample(given: argparse.Namespace) -> Any:
-    """Scenes that are drawn; None if not given."""
     said = {name: getattr(given, name) for name in ("scenes", "seed", "workers", "limit")}
     said = {name: value for name, value in said.items() if value is not None}
     return studies().Sample(**said) if said else None

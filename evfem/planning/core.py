@@ -186,12 +186,10 @@ class Closing:
 
     @property
     def _charged(self) -> bool:
-        """Whether charges flow in time."""
         return self.scene.drive is not None and self.scene.drive.resolved
 
     @property
     def _nodes(self) -> Ints:
-        """Nodes of the pad (P,)."""
         mesh = self.mesh
         return np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
 

@@ -127,7 +127,6 @@ def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
 
 
 def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
-    """Periods (s) of what swings by itself."""
     hand = scene.hand
     if hand is not None and hand.damping < 2.0 * math.sqrt(hand.stiffness * hand.mass):
         yield "the hand", 2.0 * math.pi * math.sqrt(hand.mass / hand.stiffness)

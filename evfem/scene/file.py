@@ -153,7 +153,6 @@ def _motions(tables: list[Any]) -> list[Motion]:
 def _surface(
     table: Mapping[str, Any], folder: Path, insulator: Any = None, electrodes: Any = None
 ) -> dict[str, Any]:
-    """The surface, and what its table says of the scene."""
     mistakes, found = Mistakes(), dict[str, Any]()
     with mistakes.of_a_part():
         kind, kinds, more = kind_of(table, "surface", SURFACES), SURFACES, {"insulator": insulator}
@@ -187,7 +186,6 @@ def _elastic(table: Any) -> Any:
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """The finger, and what its table says of the scene."""
     mistakes, found = Mistakes(), dict[str, Any]()
     with mistakes.of_a_part(), at("finger"):
         if "depth" in table:

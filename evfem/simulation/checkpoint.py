@@ -147,7 +147,6 @@ class Checkpoint:
         save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
 
     def _text_of(self, rows: Sequence[Row]) -> str:
-        """The rows as JSON."""
         pairs = zip(rows, self._texts, strict=False)
         same = next((i for i, (row, known) in enumerate(pairs) if row is not known[0]), len(self._texts))
         new = [(row, json.dumps({name: plain(v) for name, v in row.items()})) for row in rows[same:]]

@@ -213,7 +213,6 @@ class Loop:
             raise InputError("position_z", "a way across x", "0 with a finger in the plane")
 
     def _start(self) -> Start:
-        """Where the step starts."""
         run = self._run
         start = run.start_of(len(run.rows))
         if self.scene.hand is not None:

@@ -332,7 +332,6 @@ class SubstepWork:
 
     @property
     def _seconds(self) -> float:
-        """Of this part."""
         return float(self.model.equilibrium.interface.duration)
 
     @cached_property
@@ -443,5 +442,4 @@ class SubstepWork:
 
 
 def _mean_work(before: Floats, after: Floats, moved: Floats) -> float:
-    """Work of the mean of two forces."""
     return float(0.5 * np.sum((before + after) * moved))
