@@ -106,7 +106,7 @@ class Closing:
         """
         scene, wanted, voltage = self.scene, self.scene.solver.core, self.scene.electrics.largest_voltage
         found = isinstance(scene.voltage, FollowForce) or any(one.gap is not None for one in scene.courses)
-        has_none = self._charged or found or not scene.air_layer
+        has_none = scene.electrics.resolved or found or not scene.air_layer
         if wanted == "off" or not scene.electrics.acts or has_none or self._full:
             return None
         if isinstance(wanted, str) and not self.snaps:
@@ -181,12 +181,8 @@ class Closing:
         only while they touch do not.
         """
         scene = self.scene
-        still = scene.air_layer and not scene.solver.timed and not self._charged
+        still = scene.air_layer and not scene.solver.timed and not scene.electrics.resolved
         return bool(still and scene.electrics.acts and self.core is None and self.snaps)
-
-    @property
-    def _charged(self) -> bool:
-        return self.scene.drive is not None and self.scene.drive.resolved
 
     @property
     def _nodes(self) -> Ints:

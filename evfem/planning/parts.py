@@ -181,7 +181,7 @@ def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:
         given = f"a traction of shape {found.shape} at gaps of shape {GAPS.shape}"
         raise InputError(key, given, "a value for every gap")
     _check_traction(key, np.broadcast_to(found, GAPS.shape), StrongTroxel().traction(GAPS, at, layers))
-    if voltage == 0.0 or (scene.drive is not None and scene.drive.resolved):  # charges give another voltage
+    if voltage == 0.0 or scene.electrics.resolved:  # charges give another voltage
         return
     if (lowest := _lowest(scene)) < 0.0:
         what = f"a traction at {lowest:g} V"

@@ -28,7 +28,7 @@ from evfem.planning.resolution import oscillating, steps_line, too_fast, unresol
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import MOTIONS
-from evfem.scene.scene import Scene
+from evfem.scene.scene import Scene, scene_of
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
@@ -136,10 +136,7 @@ def plan(scene: Scene | str | PathLike[str]) -> Plan:
     >>> [term.name for term in needed.terms if not term.needed]
     ['friction', 'electricity', 'time', 'user forms']
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
+    scene = scene_of(scene)
     mesh, element = scene_mesh(scene)
     return plan_on(scene, mesh, element)
 

@@ -180,11 +180,10 @@ def path_dependence(scene: Scene) -> tuple[str, ...]:
     >>> [path_dependence(ev.Scene(pad, ev.Flat(friction=mu), motion=press)) for mu in (0.0, 0.3)]
     [(), ('friction',)]
     """
-    drive = scene.drive is not None and scene.drive.resolved
     found = {
         "friction": scene.has_friction,
         "time": scene.solver.timed,
-        "charges": drive,
+        "charges": scene.electrics.resolved,
         "the hand": scene.hand is not None and scene.hand.timed,
         "who touches": scene.law is not None and not scene.air_layer,
     }

@@ -147,7 +147,7 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
         _check_quadratic(scene)
     law, layers = electrics.attraction
     rough, charging = roughness_of(scene.roughness_gap), None
-    if scene.drive is not None and scene.drive.resolved:
+    if electrics.resolved:
         charging = Charging(electrics.sandwich, pad.nodes.size)
     if closing.core is not None:
         law = closing.core.law

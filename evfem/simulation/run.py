@@ -38,7 +38,7 @@ from evfem.newton.state import State, StepFailed
 from evfem.planning.resolution import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Course
-from evfem.scene.scene import Scene
+from evfem.scene.scene import Scene, scene_of
 from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
     PROBES,
@@ -117,10 +117,7 @@ def simulate(
     InputError
         The scene cannot be run.
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
+    scene = scene_of(scene)
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
     # scene's threads are those of the factorisation
     with blas_limits(), notices.shown(progress):

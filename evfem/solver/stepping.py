@@ -277,13 +277,9 @@ class Stepper:
         attraction = self.equilibrium.attraction
         if attraction is None or attraction.charging is None:
             return self._coupled(state, target, start)
-        interface = self.equilibrium.interface
-        pressing = state.contact_force[:, 0]
-        old = attraction.charged(interface.resting(state), state.voltage, pressing, state.charges)
-        attraction.charging.begin(old, target.duration)
+        attraction.charging.begin(self.equilibrium.charged(state), target.duration)
         new = self._coupled(state, target, start)
-        end = attraction.charged(interface.resting(new), new.voltage, new.contact_force[:, 0])
-        return replace(new, charges=end.charges)
+        return replace(new, charges=self.equilibrium.charged(new, kept=False).charges)
 
     def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""
