@@ -109,7 +109,9 @@ def too_fast(scene: Scene) -> str | None:
     if 2.0 * f > 0.5 / step:
         alias = f", and shows what the attraction does above {0.5 / step:.4g} Hz at a lower frequency"
     needed = math.ceil(PER_PERIOD * f * scene.courses[longest].seconds() * (1.0 - 1e-9))
-    return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{_instead(signal)}"
+    mean = ", or resolved=False for the mean over the carrier's cycles"
+    instead = mean if isinstance(signal, Carrier) and signal.resolved else ""
+    return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{instead}"
 
 
 def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
@@ -145,12 +147,6 @@ def _longest(scene: Scene) -> tuple[int, float]:
     """The motion with the longest steps, presses being from first touch, and their seconds."""
     steps = [motion.course.seconds() / motion.part(motion.steps)[2] for motion in scene.motion]
     return steps.index(max(steps)), max(steps)
-
-
-def _instead(signal: TimeSignal) -> str:
-    if isinstance(signal, Carrier) and signal.resolved:
-        return ", or resolved=False for the mean over the carrier's cycles"
-    return ""
 
 
 def path_line(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:

@@ -186,7 +186,8 @@ class Result(History):
         """
         if self.in_space or WHOLE in self.provenance:
             return self
-        depth = self._known_depth
+        if (depth := self.depth) is None:
+            raise InputError("depth", ABSENT, "a depth in mm, by Scene(depth=...) or depth in [finger]")
         columns = over_depth({name: self[name] for name in COLUMNS}, depth)
         return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
 
@@ -206,13 +207,6 @@ class Result(History):
         return self.in_space["real_contact_area"] if self.in_space else self.total.real_contact_width
 
     @property
-    def _known_depth(self) -> float:
-        if self.depth is None:
-            allowed = "a depth in mm, by Scene(depth=...) or depth in [finger]"
-            raise InputError("depth", ABSENT, allowed)
-        return self.depth
-
-    @property
     def warnings(self) -> list[str]:
         """Warnings of the run about its numbers, one sentence each."""
         return list(self.provenance.get("warnings", []))
@@ -221,8 +215,10 @@ class Result(History):
         """Sizes, the last row, extremes and costs, in plain numbers ready for JSON."""
         scene = self.provenance.get("scene", {})
         steps = len(self.step)
-        extremes = {}
+        last, extremes = dict[str, Any](), dict[str, float]()
         if steps:
+            last = self.rows[-1]
+            last |= {name: None for name, v in last.items() if isinstance(v, float) and not math.isfinite(v)}
             peaks = (*self._shown[3:], "peak_contact_pressure")
             extremes = {name: float(np.max(np.abs(self[name]))) for name in peaks}
         found = {
@@ -233,7 +229,7 @@ class Result(History):
             "nodes": len(self.mesh.points),
             "cells": len(self.mesh.cells),
             "kind": self.mesh.kind,
-            "last": {name: _json(value) for name, value in self.rows[-1].items()} if steps else {},
+            "last": last,
             "largest": extremes,
             "load_drift": self.load_drift,
             "warnings": self.warnings,
@@ -399,11 +395,6 @@ def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:
     if column.ndim != 1 or (column.size and column.dtype.kind not in {str: "U", int: "iu", float: "f"}[kind]):
         raise ValueError(f"column {name}")
     return column.astype(str) if kind is str else column
-
-
-def _json(value: Any) -> Any:
-    """The value itself, or None for a number that JSON does not know."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @dataclass(frozen=True)
