@@ -27,8 +27,9 @@ from evfem.planning.plausibility import implausible, locking, touching_traction,
 from evfem.planning.resolution import oscillating, steps_line, too_fast, unresolved
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
+from evfem.scene.file import scene_at
 from evfem.scene.motion import MOTIONS
-from evfem.scene.scene import Scene, scene_of
+from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
@@ -136,7 +137,7 @@ def plan(scene: Scene | str | PathLike[str]) -> Plan:
     >>> [term.name for term in needed.terms if not term.needed]
     ['friction', 'electricity', 'time', 'user forms']
     """
-    scene = scene_of(scene)
+    scene = scene_at(scene)
     mesh, element = scene_mesh(scene)
     return plan_on(scene, mesh, element)
 

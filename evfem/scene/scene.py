@@ -353,15 +353,6 @@ def _check_dynamics(scene: Scene) -> None:
         raise InputError("finger.viscosity", 0.0, allowed)
 
 
-def scene_of(given: object) -> Scene:
-    """A scene itself, or the one in the file at a path."""
-    if isinstance(given, Scene):
-        return given
-    from evfem.scene.file import scene_at
-
-    return scene_at(given)
-
-
 def default_scene() -> Scene:
     """Table 2's finger (medium) pressed to 0.05 N/mm and slid 5 mm over a display at 1000 V."""
     from evfem.electrostatics.laws import Kaczmarek, Layer

@@ -21,8 +21,9 @@ from evfem.errors import ABSENT, InputError, StopRun
 from evfem.newton.control import Target
 from evfem.planning.core import Closing
 from evfem.protocols import Observer, TimeSignal
+from evfem.scene.file import scene_at
 from evfem.scene.motion import FORCE, INDENTATION, VOLTAGE, Course, Motion
-from evfem.scene.scene import SIGNALS, Scene, scene_of
+from evfem.scene.scene import SIGNALS, Scene
 from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import Request, Run, Start
 from evfem.solver.stepping import Path
@@ -344,4 +345,4 @@ def loop(
     >>> steps.step(indentation=0.1).motion, len(steps.result().rows)
     ('step', 3)
     """
-    return Loop(scene_of(scene), observers, largest_voltage)
+    return Loop(scene_at(scene), observers, largest_voltage)

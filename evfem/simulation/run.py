@@ -37,8 +37,9 @@ from evfem.newton.hand import HandControl, at_rest
 from evfem.newton.state import State, StepFailed
 from evfem.planning.resolution import allowed_error
 from evfem.protocols import Observer, TimeSignal
+from evfem.scene.file import scene_at
 from evfem.scene.motion import Course
-from evfem.scene.scene import Scene, scene_of
+from evfem.scene.scene import Scene
 from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
     PROBES,
@@ -117,7 +118,7 @@ def simulate(
     InputError
         The scene cannot be run.
     """
-    scene = scene_of(scene)
+    scene = scene_at(scene)
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
     # scene's threads are those of the factorisation
     with blas_limits(), notices.shown(progress):
@@ -392,7 +393,7 @@ class Run:
     def _restore(self, saved: Saved) -> None:
         arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
         self.state = state_of(arrays)
-        self.model.equilibrium.body.resume(self.state, reusable_of(arrays))
+        self.model.equilibrium.body.resume(reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows, self.probed = list(saved.rows), list(arrays.get(PROBES, ()))
