@@ -28,7 +28,7 @@ from evfem.newton.control import ConstrainedVoltage, Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.newton.strategy import stuck
-from evfem.solver.hold import Hold
+from evfem.solver.hold import held
 from evfem.solver.path import length_factor, relative_difference
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.tissue.body import Body
@@ -254,7 +254,7 @@ class Stepper:
             return new
         if self.body is None or timed or self.releasing:
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
-        new = Hold(self.body, self._reached, self.equilibrium.strategy.hold).follow(state, target)
+        new = held(self.body, self._reached, self.equilibrium.strategy.hold, state, target)
         self.held += 1
         return new
 
