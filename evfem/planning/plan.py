@@ -85,19 +85,12 @@ class Plan:
         return next(term.needed for term in self.terms if term.name == name)
 
     def __str__(self) -> str:
-        lines = [
-            f"Scene {self.name}: {self.steps} steps, {self.nodes} nodes, {self.cells} cells ({self.element})",
-            "",
-            "Terms",
-        ]
+        size = f"{self.steps} steps, {self.nodes} nodes, {self.cells} cells ({self.element})"
+        lines = [f"Scene {self.name}: {size}", "", "Terms"]
         for term in self.terms:
             lines += _wrapped(f"  {'+' if term.needed else '-'} {term.name:<13} ", term.reason)
-        lines += [
-            "",
-            "Unknowns",
-            f"  {self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch",
-        ]
-        lines += ["", "Solver"]
+        size = f"{self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch"
+        lines += ["", "Unknowns", f"  {size}", "", "Solver"]
         for line in self.solver:
             lines += _wrapped("  ", line)
         for warning in self.warnings:
@@ -183,7 +176,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         pad_nodes=int(np.setdiff1d(pad, bone).size),
         steps=scene.total_steps,
         terms=terms,
-        solver=_solver(scene, mesh, terms),
+        solver=tuple(_solver(scene, mesh, terms)),
         warnings=(*implausible(scene, mesh, moduli), *locked, *filter(None, others)),
         closing=closing,
     )
@@ -345,34 +338,24 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
     return type(law).__name__
 
 
-def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...]:
-    needed: dict[str, Any] = {term.name: term.needed for term in terms}
-    backend = (
-        "PARDISO (symmetric, Schur complement)"
-        if find_spec("pypardiso")
-        else "SuperLU (install evfem[fast] for PARDISO)"
-    )
+def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
+    backend = "SuperLU (install evfem[fast] for PARDISO)"
+    if find_spec("pypardiso"):
+        backend = "PARDISO (symmetric, Schur complement)"
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
-    lines = [
-        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
-        f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
-    ]
+    yield f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}"
+    yield f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set"
     if mesh.dim == 3:
-        lines.append(f"direct solver: {memory(mesh)}")
+        yield f"direct solver: {memory(mesh)}"
     laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
-    stiff = [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]
-    if stiff:
-        lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")
-    unsymmetric = [name for name in ("friction", "electricity", "adhesion") if needed.get(name)]
-    if unsymmetric:
-        lines.append(
-            f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
+    if stiff := [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]:
+        yield f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume"
+    acting = [t.name for t in terms if t.needed and t.name in ("friction", "electricity", "adhesion")]
+    if acting:
+        yield (
+            f"{' and '.join(acting)} {'act' if acting[1:] else 'acts'} on the candidates only, "
             "so the tissue's matrix stays symmetric"
         )
-    steps = steps_line(scene)
-    if steps:
-        lines.append(steps)
-    return (
-        *lines,
-        f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction",
-    )
+    if steps := steps_line(scene):
+        yield steps
+    yield f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction"

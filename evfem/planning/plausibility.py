@@ -53,10 +53,11 @@ def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[
     """One sentence per valid but implausible input of a scene; `moduli` are the shear moduli (MPa) of
     the materials.
     """
-    lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
     return (
         *_hard(scene, mesh, moduli),
-        *lengths,
+        *_small(scene),
+        *_large(scene, mesh, min(moduli.values())),
+        *_other_units(scene, mesh),
         *_breakdown(scene),
         *_unbearable(scene),
         *_hovering(scene, mesh),
