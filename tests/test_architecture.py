@@ -66,8 +66,7 @@ ROOMS = {
     ),
     "planning": (
         {"numpy"},
-        "resolution loaddrift partchecks parts plausibility fieldchoice core adhesion timescales "
-        "pathdependence plan",
+        "resolution loaddrift parts plausibility fieldchoice core timescales plan",
     ),
     "simulation": (
         {"numpy", "scipy"},

@@ -24,6 +24,7 @@ from evfem.errors import ABSENT, InputError, NotConverged, StopRun
 from evfem.newton.control import Target
 from evfem.planning.core import Closing
 from evfem.protocols import Observer, TimeSignal
+from evfem.scene.file import scene_at
 from evfem.scene.motion import FORCE, INDENTATION, VOLTAGE, Course, Motion
 from evfem.scene.scene import SIGNALS, Scene
 from evfem.simulation.result import Frame, Result, Saved
@@ -227,8 +228,10 @@ class Loop:
     def _check(self, asked: Asked) -> None:
         """Raise InputError for what the scene does not have."""
         scene = self.scene
-        if asked.duration is None and (what := _timed(scene)):
-            raise InputError("duration", ABSENT, f"a time in s, needed with {what}")
+        over_time = isinstance(scene.electrics.voltage, TimeSignal) or scene.electrics.resolved
+        needing = scene.time_needed_by or ("a voltage over time",) * over_time
+        if asked.duration is None and needing:
+            raise InputError("duration", ABSENT, f"a time in s, needed with {' and '.join(needing)}")
         if asked.voltage is None:
             return
         if scene.law is None:
@@ -239,18 +242,17 @@ class Loop:
 
     def _check_course(self, course: Course) -> None:
         """Raise InputError for a step that no motion of the scene could be."""
-        scene, dynamic = self.scene, _dynamic(self.scene)
+        scene, needing = self.scene, " and ".join(self.scene.time_needed_by)
         if course.force == 0.0 and scene.law is None and scene.adhesion is None:
             raise InputError("force", 0.0, "larger than 0 when nothing else pulls the finger down")
-        if course.distance and dynamic and not course.duration:
-            raise InputError("duration", 0.0, f"larger than 0 where the finger moves along, with {dynamic}")
+        if course.distance and needing and not course.duration:
+            raise InputError("duration", 0.0, f"larger than 0 where the finger moves along, with {needing}")
         if not course.angle:
             return
         if self._run.model.mesh.dim == 2:
             raise InputError("position_z", "a way across x", "0 with a finger in the plane")
 
     def _start(self) -> Start:
-        """Where the step starts."""
         run = self._run
         start = run.start_of(len(run.rows))
         if self.scene.hand is not None:
@@ -346,22 +348,6 @@ def _exactly(path: Path, asked: Asked) -> Path:
     return exact
 
 
-def _dynamic(scene: Scene) -> str:
-    """What of a scene resists by the speed, in words; empty if nothing does."""
-    if scene.solver.timed:
-        return f"dynamics = {scene.solver.dynamics}"
-    if scene.hand is not None and scene.hand.timed:
-        return "a hand that has a damping or a mass"
-    return type(scene.friction_law).__name__ if getattr(scene.friction_law, "timed", False) else ""
-
-
-def _timed(scene: Scene) -> str:
-    """What of a scene depends on time, in words; empty if nothing does."""
-    signal = isinstance(scene.electrics.voltage, TimeSignal)
-    over_time = "a voltage over time" if signal or (scene.drive is not None and scene.drive.resolved) else ""
-    return _dynamic(scene) or over_time
-
-
 def loop(
     scene: Scene | str | PathLike[str],
     *,
@@ -403,9 +389,5 @@ def loop(
     >>> steps.step(indentation=0.1).motion, len(steps.result().rows)
     ('step', 3)
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
-    whole = Loop(scene, observers, largest_voltage)
+    whole = Loop(scene_at(scene), observers, largest_voltage)
     return whole.linearised() if linearised else whole

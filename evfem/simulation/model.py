@@ -22,7 +22,6 @@ from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits, State
-from evfem.planning.adhesion import softened
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
@@ -164,7 +163,7 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
         _check_quadratic(scene)
     law, layers = electrics.attraction
     rough, charging = roughness_of(scene.roughness_gap), None
-    if scene.drive is not None and scene.drive.resolved:
+    if electrics.resolved:
         charging = Charging(electrics.sandwich, pad.nodes.size)
     if closing.core is not None:
         law = closing.core.law
@@ -189,7 +188,7 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
 def with_adhesion(closing: Closing, pad: Any, surface: Any, attraction: Attraction | None) -> WithAdhesion:
     """The attraction of the voltage, if there is one, and the scene's adhesion as the mesh resolves it."""
     scene, rough = closing.scene, roughness_of(closing.scene.roughness_gap)
-    law = softened(closing)
+    law = closing.adhesion
     return WithAdhesion.of(attraction, Attraction(law, None, pad, surface, scene.direction, roughness=rough))
 
 

@@ -1,5 +1,7 @@
 """A finger on an elastic surface: two elastic bodies in contact, limits, books, and a run that goes on."""
 
+import re
+
 import numpy as np
 import pytest
 from tools.builders import balance, pad_state
@@ -220,9 +222,8 @@ def test_a_surface_that_is_strained_too_much_is_told():
     scene = ev.Scene(
         PAD, ev.Flat(elastic=ev.ElasticLayer(0.05, 0.48, 5.0)), motion=[ev.Press(force=0.05, steps=2)]
     )
-    with pytest.warns(UserWarning, match=r"strained by about \d+%"):
-        result = ev.simulate(scene)
-    assert any("strained by about" in one for one in result.warnings)
+    (said,) = (one for one in ev.simulate(scene).warnings if "strained" in one)
+    assert re.search(r"strained by about \d+%", said)
 
 
 def test_a_clutch_of_two_strips():
