@@ -310,9 +310,9 @@ def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
     """The outer outline and the lines between regions."""
     from matplotlib.collections import LineCollection
 
-    edges = mesh.cell_edges.reshape(-1, mesh.cell_edges.shape[-1])
+    edges = mesh.cell_sides.reshape(-1, mesh.order + 1)
     owner = np.repeat(mesh.region, mesh.corners)
-    number = mesh.edges[1].ravel()
+    number = mesh.sides[1].ravel()
     low, high = np.full(number.max() + 1, np.inf), np.full(number.max() + 1, -np.inf)
     np.minimum.at(low, number, owner)
     np.maximum.at(high, number, owner)
@@ -324,7 +324,7 @@ def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
 
 def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: Window) -> None:
     """What the hole in the middle is, where the tissue has one around the bone."""
-    edges = mesh.edges_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
+    edges = mesh.sides_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
     around, count = np.unique(edges, return_counts=True)
     if not count.size or np.any(count != 2):
         return

@@ -36,7 +36,7 @@ def outline_nodes(mesh: Mesh) -> Ints:
     """
     if mesh.dim == 3:
         raise InputError("finger.mesh", "a finger in three dimensions", "a plane finger")
-    edges = mesh.edges_of("pad")
+    edges = mesh.sides_of("pad")
     follow = {int(edge[0]): [int(node) for node in (*edge[2:], edge[1])] for edge in edges}
     starts = set(follow) - {nodes[-1] for nodes in follow.values()}
     if len(starts) != 1:
@@ -246,10 +246,9 @@ def make_pad(mesh: Mesh) -> Pad:
 
 def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
     """Pad nodes (P,), edges or faces among them, and who follow no bone (P,); InputError without a pad."""
-    of, side = (mesh.edges_of, "edge") if mesh.dim == 2 else (mesh.faces_of, "face")
-    sides = of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
+    sides = mesh.sides_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
     if not len(sides):
-        given = f"no outer {side} whose nodes are all on `pad`"
+        given = f"no outer {'edge' if mesh.dim == 2 else 'face'} whose nodes are all on `pad`"
         raise InputError("finger.mesh", given, "point data or a physical group `pad`")
     nodes, local = np.unique(sides, return_inverse=True)
     free = ~np.isin(nodes, mesh.node_sets.get("bone", np.zeros(0, dtype=np.int64)))
