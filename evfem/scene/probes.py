@@ -282,8 +282,7 @@ class Probes:
 
     def at(self, u: Floats, inner: Floats | None = None) -> Floats:
         """The numbers (P, K) of `columns` at displacements u (N, d) and the branches' variables `inner`."""
-        from evfem.tissue.forms import Field
-        from evfem.tissue.splitlaw import embed
+        from evfem.tissue.forms import Field, embed
         from evfem.tissue.weakform import cauchy_stress
 
         moved, dim = u[self.nodes], self.space.dim
