@@ -14,8 +14,8 @@ the column law, which they are close to, so contact, friction and controls know 
 field; between rough faces it is scaled by the ratio of the forces (`tangent_factor`).
 Where that tangent leads nowhere, among ridges or steep waves close to a thin insulator, it is
 replaced by the field's own (`fringe_stiffness`), by differences: a node's field decays within a few
-nodes, so every `APART`-th one is moved at once, and the potential follows with the factor of
-where it began (`Columns.nearby`). In every accepted state C lies between its bounds (`certificate`).
+nodes, so every `APART`-th one is moved at once. In every accepted state C lies between its bounds
+(`certificate`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
-from evfem.field.columns import Capacitance, Columns, Nearby
+from evfem.field.columns import Capacitance, Columns
 from evfem.surface.pad import Pad, surface_state
 
 #: gap of touching nodes, as a share of the insulator's reduced thickness
@@ -275,21 +275,19 @@ class FieldAttraction(Attraction):
         return found
 
     def _above(
-        self, position: Floats, lines: Any, pressing: Floats | None, near: Nearby | None = None
+        self, position: Floats, lines: Any, pressing: Floats | None
     ) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
         x, levels = self.outline(position, lines, pressing)
-        field, forces = self._solved(
-            x, levels, surface_state(self.surface, lines @ position).slope[:, 0], near
-        )
+        field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope[:, 0])
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
         """Derivative of `forces` by positions, sparse (2 P, 2 P); touching nodes move along the surface."""
         lines, frame = self.visible(position), surface_state(self.surface, position)
         nodes = in_line(self._plane, self.edges)
-        closed, near = frame.gap <= TOUCHING, self._nearby(*self.outline(position, lines, pressing))
-        start = self._above(position, lines, pressing, near)[1]
+        closed = frame.gap <= TOUCHING
+        start = self._above(position, lines, pressing)[1]
         ways = np.zeros((2, self._size, 2))
         ways[0, :, 0] = 1.0
         ways[0, closed, 1], ways[1, ~closed, 1] = frame.slope[closed, 0], 1.0
@@ -298,7 +296,7 @@ class FieldAttraction(Attraction):
             moved = nodes[first::APART]
             place = position.copy()
             place[moved] += MOVED * ways[axis, moved]
-            rate = voltage**2 / MOVED * (self._above(place, lines, pressing, near)[1] - start)[nodes]
+            rate = voltage**2 / MOVED * (self._above(place, lines, pressing)[1] - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
             triplets += [(rate[:, k], 2 * nodes + k, column) for k in range(2)]
@@ -308,15 +306,9 @@ class FieldAttraction(Attraction):
         share = sparse.diags_array(np.repeat(self.share(position[:, 0]) ** 2, 2))
         return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(share @ outer)
 
-    def _nearby(self, x: Floats, levels: Floats) -> Nearby | None:
-        """Start values of the fields of close outlines; None if each is solved anew."""
-        return None if self.floating or self._electrodes is not None else self._columns.nearby(x, levels)
-
-    def _solved(
-        self, x: Floats, levels: Floats, slope: Floats, near: Nearby | None = None
-    ) -> tuple[Capacitance | None, Floats]:
+    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
         """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""
-        found = self._columns.solve(x, levels, self._electrodes, self.floating, near)
+        found = self._columns.solve(x, levels, self._electrodes, self.floating)
         along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
         return found, 0.5 * np.stack([along, found.by_level[2:].sum(axis=0)], axis=1)
 
