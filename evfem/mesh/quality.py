@@ -21,7 +21,7 @@ from evfem.mesh.solids import Refuse, listed, some, turned
 SMALLEST, LARGEST = 1.0, 200.0
 #: Two nodes closer than this part of the outline's extent are the same place.
 SAME_PLACE = 1e-7
-#: Pairs of edges looked at for crossings: 4,000 edges of the outline, one of them as long as the finger.
+#: Pairs of nodes or edges that are near each other: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
 
 
@@ -79,19 +79,13 @@ def _nodes(mesh: Mesh, refuse: Refuse) -> None:
     if len(unused):
         refuse(f"{len(unused)} nodes that no cell uses (node {some(unused)})", "only nodes of cells")
     radius = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
-    # first by boxes, for of many nodes in one place there would be too many pairs
-    box = np.floor((mesh.points - mesh.points.min(axis=0)) / (0.5 * radius)).astype(np.int64)
-    order = np.lexsort(box.T)
-    same = np.flatnonzero((np.diff(box[order], axis=0) == 0).all(axis=1))
-    pairs: Ints | None = np.stack([order[same], order[same + 1]], axis=1)
-    if not same.size:
-        pairs = _pairs_within(mesh.points, radius)
+    pairs = _pairs_within(mesh.points, radius)
+    apart = "one node per place: merge double nodes, or the parts come loose"
     if pairs is None:
-        refuse("too many nodes in one line", "nodes of cells that fill an area")
+        refuse("too many nodes in the same place", apart)
     elif len(pairs):
         first, second = pairs[0]
-        fault = f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})"
-        refuse(fault, "one node per place: merge double nodes, or the parts come loose")
+        refuse(f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})", apart)
 
 
 def _oriented(mesh: Mesh, refuse: Refuse) -> Mesh:
@@ -193,19 +187,14 @@ def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
 
 
 def _pairs_within(points: Floats, reach: float) -> Ints | None:
-    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None where more than `MOST_PAIRS` would
-    have to be looked at: those that are near along an oblique line, which no row of a mesh follows.
-    """
-    direction = np.sqrt([2.0, 3.0, 5.0])[: points.shape[1]]
-    along = points @ (direction / np.linalg.norm(direction))
-    order = np.argsort(along)
-    following = np.searchsorted(along[order], along[order] + reach, side="right") - np.arange(len(order)) - 1
-    if following.sum() > MOST_PAIRS:
+    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None of more than `MOST_PAIRS`."""
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(points)
+    if tree.count_neighbors(tree, reach) > 2 * MOST_PAIRS:
         return None
-    first = np.repeat(np.arange(len(order)), following)
-    second = np.arange(first.size) - np.repeat(np.cumsum(following) - following, following) + first + 1
-    pairs = np.stack([order[first], order[second]], axis=1)
-    return pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
+    pairs: Ints = tree.query_pairs(reach, output_type="ndarray")
+    return pairs[np.lexsort(pairs.T[::-1])]
 
 
 def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:

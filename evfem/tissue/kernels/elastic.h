@@ -175,37 +175,3 @@ INLINE void smallest_J(request *r, int n) {
     }
     r->found[0] = smallest;
 }
-
-/* Means over the cells of the Cauchy stress xx, yy, zz, xy (yz, xz), and of J, (B, STRESSES + 1): J sigma =
-   mu F F^T + q with the pressure q (B, Q) at the points, in the plane with F_zz = 1. */
-INLINE void stresses(request *r, int n) {
-    const mesh *m = &r->m;
-    const double *u = r->arrays[0];
-    const stored *mu = r->arrays[1], *pressure = r->arrays[2];
-    stored *out = r->arrays[3];
-    for (Py_ssize_t b = 0; b < m->blocks; b++) {
-        lanes ue[DIM * MOST_NODES], total = {0}, means[STRESSES + 1] = {{0}};
-        gather(u, m->nodes + b * n * LANES, n, ue);
-        for (int q = 0; q < m->at.count; q++) {
-            tensor F = displacement_gradient(&m->at, b, q, ue, n);
-            lanes w = m->weight[b * m->at.count + q], J = 1.0 + volume_change(F), share = w / J;
-            lanes p = pressure[b * m->at.count + q];
-            EACH(i) F.a[i][i] += 1.0;
-#if DIM == 2
-            EACH(i) means[i] += share * (mu[b] * DOT(F.a[i], 1, F.a[i], 1) + p);
-            means[2] += share * (mu[b] + p);
-            means[3] += share * mu[b] * DOT(F.a[0], 1, F.a[1], 1);
-#else
-            tensor S;
-            EACH(i) EACH(j) S.a[i][j] = share * mu[b] * DOT(F.a[i], 1, F.a[j], 1);
-            EACH(i) means[i] += S.a[i][i] + share * p;
-            means[3] += S.a[0][1];
-            means[4] += S.a[1][2];
-            means[5] += S.a[0][2];
-#endif
-            means[STRESSES] += w * J;
-            total += w;
-        }
-        for (int i = 0; i <= STRESSES; i++) out[(STRESSES + 1) * b + i] = means[i] / total;
-    }
-}

@@ -5,7 +5,6 @@
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030b0000
 #define STRAINS (DIM * (DIM + 1) / 2)
-#define STRESSES (DIM == 2 ? 4 : 6)
 #include "relaxing.h"
 #include "arrays.h"
 
@@ -20,9 +19,6 @@
     X(log_volumes, "uvS", 0,                                                                             \
       "(cells, u, du, out): ln J, or its change along du if that is not None.", __VA_ARGS__)             \
     X(volume_forces, "usU", 0, "(cells, u, pressure, out): add the nodal forces of a pressure.",         \
-      __VA_ARGS__)                                                                                       \
-    X(stresses, "ucqT", 0,                                                                               \
-      "(cells, u, mu, pressure, out): cell means of the Cauchy stress xx, yy, zz, xy, yz, xz and of J.", \
       __VA_ARGS__)                                                                                       \
     X(smallest_J, "u", 1, "(cells, u): smallest volume ratio of all samples.", __VA_ARGS__)              \
     X(strains, "uE", 0, "(cells, u, out): Green strains.", __VA_ARGS__)                                  \
@@ -105,9 +101,7 @@ static Py_ssize_t count_of(const request *r, Py_ssize_t size, char kind) {
     case 'u': case 'v': case 'U': return DIM * size;                   /* displacements or forces (N, DIM) */
     case 'c': return cells;                                            /* (B, LANES) */
     case 's': case 'o': case 'S': return cells * r->m.sample.count;    /* where ln J is sampled (B, S, LANES) */
-    case 'q': return points;                                           /* (B, Q, LANES) */
     case 'e': case 'E': return points * STRAINS;                       /* (B, Q, STRAINS, LANES) */
-    case 'T': return cells * (STRESSES + 1);                           /* (B, STRESSES + 1, LANES) */
     case 'k': case 'K': return points * r->branches * KEPT;            /* (B, Q, branches, KEPT, LANES) */
     case 'a': case 'A': return points * r->branches * (KEPT + 1);      /* (B, Q, branches, KEPT + 1, LANES) */
     case 'l': return 4 * cells * r->branches;                          /* (B, branches, 4, LANES) */
