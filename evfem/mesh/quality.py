@@ -21,7 +21,7 @@ from evfem.mesh.solids import Refuse, listed, some, turned
 SMALLEST, LARGEST = 1.0, 200.0
 #: Two nodes closer than this part of the outline's extent are the same place.
 SAME_PLACE = 1e-7
-#: Pairs of nodes or edges that are near each other: 4,000 edges of the outline, one of them as long as the finger.
+#: Pairs of nodes or edges near each other: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
 
 
