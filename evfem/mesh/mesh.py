@@ -113,10 +113,18 @@ class Mesh:
         around = self.points[self.cell_sides[..., [0, 2, 1] if self.order == 2 else [0, 1]]]
         low, high = around.min(axis=(1, 2)), around.max(axis=(1, 2))
         edges = np.stack([around[:, :, :-1], around[:, :, 1:]], axis=3).reshape(len(around), -1, 2, 2)
-        return np.array([_cell_around(point, edges, low, high) for point in given], dtype=int)
+        edges = np.take_along_axis(edges, edges[..., 1:].argsort(axis=2), axis=2)  # the lower end first
+        found = np.full(len(given), -1)
+        for i, (x, y) in enumerate(given):
+            near = np.flatnonzero(((low <= given[i]) & (given[i] <= high)).all(axis=1))
+            (x0, y0), (x1, y1) = np.moveaxis(edges[near], (2, 3), (0, 1))
+            passed = (y0 <= y) & (y < y1)
+            share = np.divide(y - y0, y1 - y0, out=np.zeros_like(y0), where=passed)
+            inside = near[(passed & (x < x0 + share * (x1 - x0))).sum(axis=1) % 2 == 1]
+            found[i] = inside[0] if inside.size else -1
+        return found
 
     # -- sides: edges in the plane, faces in space
-    # ----------------------------------------------------------------------------------------------------
 
     @property
     def local_sides(self) -> Ints:
@@ -218,20 +226,3 @@ def interface_of(mesh: Mesh, region: str) -> Ints:
     if not len(interface):
         raise InputError("region", quoted(region), "a region that has another one below it")
     return interface
-
-
-def _cell_around(point: Floats, edges: Floats, low: Floats, high: Floats) -> int:
-    """The cell whose edges (E, n, 2 ends, 2) go round a point, -1 for none; `low` and `high` (E, 2)
-    are the corners of a box around each.
-    """
-    near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
-    ends = edges[near]
-    rising = (ends[:, :, 0, 1] <= ends[:, :, 1, 1])[..., None]
-    (x0, y0), (x1, y1) = (
-        np.moveaxis(np.where(rising, ends[:, :, i], ends[:, :, 1 - i]), -1, 0) for i in (0, 1)
-    )
-    passed = (y0 <= point[1]) & (point[1] < y1)
-    share = np.divide(point[1] - y0, y1 - y0, out=np.zeros_like(y0), where=passed)
-    crossings = np.sum(passed & (point[0] < x0 + share * (x1 - x0)), axis=1)
-    inside = near[crossings % 2 == 1]
-    return int(inside[0]) if inside.size else -1

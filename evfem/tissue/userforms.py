@@ -40,7 +40,6 @@ def make_term(space: Space, form: Integrand, on: str, boundary: bool, law: Any =
 
 
 # -- trial
-# --------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -163,7 +162,6 @@ def _few(rows: Ints) -> Ints:
 
 
 # -- facets
-# --------------------------------------------------------------------------------------------------------
 
 
 def sides_of(mesh: Mesh, name: str) -> tuple[Ints, Ints]:
