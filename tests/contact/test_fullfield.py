@@ -437,8 +437,8 @@ def test_the_exact_encoding_drives_the_full_field():
     assert result.applied_force == pytest.approx(left, rel=1e-6)
 
 
-def test_the_stiffness_under_an_electrode_that_ends_is_solved_anew(monkeypatch):
-    """A field that starts from nearby knows of one electrode without end alone."""
+def test_the_stiffness_under_an_electrode_that_ends(monkeypatch):
+    """One column against differences of forces."""
     pad, points = arc(12, 3.0, 1.0)
     points[:, 1] += 0.01
     _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, 0.13, 1.0]]))

@@ -12,9 +12,9 @@ from tools.laws import LAWS, LMBDA, MU
 
 from evfem.errors import InputError
 from evfem.tensor import det
+from evfem.tissue.forms import embed
 from evfem.tissue.laws import NeoHookean, Yeoh
 from evfem.tissue.space import ELEMENTS, make_space
-from evfem.tissue.splitlaw import embed
 from evfem.tissue.weakform import Tissue, check_laws
 
 every_element = pytest.mark.parametrize("element", list(CELLS))
