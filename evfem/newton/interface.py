@@ -137,10 +137,9 @@ class Interface:
         self.length = pad.spacing(self.points)
         self._down = pad.facing(self.points)
         self.jumps = FrictionJumps(surface.friction_steps(SHORT_RAMP * self.length), self.points[:, ::2])
-        elastic, least = getattr(surface, "elastic", None), SHORTEST_LENGTH * self.length
-        self.bed: Bed | None = None
-        if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
-            self.bed = Bed(elastic, pad, self.length, least)
+        elastic = getattr(surface, "elastic", None)
+        self._least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
+        self.bed = None if elastic is None else Bed(elastic, pad, self.length, self._least)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
         self._oscillating = OscillatingNodes(pad.nodes.size)
@@ -172,8 +171,8 @@ class Interface:
                 return found
         found = surface_state(self.surface, self.places(state))
         if self.bed is not None:
-            shortened, sunk = state.strain.T
-            found = replace(found, slope=(found.slope - sunk[:, None]) / (1.0 - shortened)[:, None])
+            slope = np.linalg.solve(self._kept(state), (found.slope - state.strain[:, :, 1])[:, :, None])
+            found = replace(found, slope=slope[:, :, 0])
         self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
 
@@ -187,19 +186,25 @@ class Interface:
         """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
         if self.bed is None:
             return force
-        (shortened, sunk), (along, up) = state.strain.T, force.T
-        return np.stack([(along + sunk * up) / (1.0 - shortened), up], axis=1)
+        found, pushed = force.copy(), force[:, ::2] + state.strain[:, :, 1] * force[:, 1:2]
+        found[:, ::2] = np.linalg.solve(self._kept(state), pushed[:, :, None])[:, :, 0]
+        return found
 
     def untilted(self, state: State, force: Floats) -> Floats:
         """The same attraction as above a surface that has not sunk, whose work is that of the field."""
         if self.bed is None:
             return force
-        (shortened, sunk), (along, up) = state.strain.T, force.T
-        return np.stack([along * (1.0 - shortened) - sunk * up, up], axis=1)
+        found, along = force.copy(), np.einsum("pkj,pj->pk", self._kept(state), force[:, ::2])
+        found[:, ::2] = along - state.strain[:, :, 1] * force[:, 1:2]
+        return found
+
+    def _kept(self, state: State) -> Floats:
+        """How long lengths on an elastic surface along x[, z] are for what they were, (P, d, d)."""
+        return np.asarray(np.eye(self.dim - 1) - state.strain[:, :, ::2])
 
     def unyielded(self, state: State, force: Floats) -> float:
         """By how much, over the tolerances' lengths, what an elastic surface gives way by misses what the
-        forces on the nodes (P, 2) ask for; 0 of a rigid one.
+        forces on the nodes (P, dim) ask for; 0 of a rigid one.
         """
         if self.bed is None:
             return 0.0
@@ -295,8 +300,7 @@ class Interface:
 
     def tributary_of(self, position: Floats) -> Floats:
         """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
-        least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
-        return np.maximum(self.pad.tributary(position), least)
+        return np.maximum(self.pad.tributary(position), self._least)
 
     def tributary(self, state: State) -> Floats:
         """Tributary lengths or areas (P,) in a state."""

@@ -42,10 +42,6 @@ def _check_plane(scene: Scene) -> list[tuple[str, str, str]]:
 
 def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     found = []
-    if scene.ground.elastic is not None:
-        found.append(
-            ("surface.elastic", f"an elastic surface {SOLID}", "a rigid one, or a finger in the plane")
-        )
     if scene.solver.contact != "exact":
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
     if scene.law is not None and scene.field != "local":

@@ -36,6 +36,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
+from evfem.surface.patches import Patches
 
 #: the table of a kernel: so many distances, up to so many lengths over which it falls off
 TABULATED, FARTHEST = 1500, 36.0
@@ -46,6 +47,8 @@ HIGHEST, RESOLVED = 45.0, 2.0
 #: strips shorter than this share of the top thickness take the kernel's quadratic, and far ones whose
 #: length is this share of their distance
 SHORT, FAR = 0.02, 0.01
+#: the same two limits of kernels in space
+IN_SPACE, SHORTEST = 24.0, 18.0
 #: step (mm) of the slope of a compliance of one's own
 SLOPE_STEP = 1e-4
 #: most layers of a stack
@@ -58,29 +61,35 @@ ELASTIC = "ElasticLayer, ElasticStack, or an object with compliance(x, lengths)"
 
 
 class Layered:
-    """What layers share: their compliance in plane strain."""
+    """What layers share: their compliance in plane strain and in space."""
 
     layers: tuple[ElasticLayer, ...]
 
     def compliance(self, x: Any, lengths: Any) -> Floats:
-        """Mean displacements of n strips by forces on them.
+        """Mean displacements of n strips, in space of n squares, by forces on them.
 
         Parameters
         ----------
         x, lengths
-            Middles and lengths of the strips (n,) in mm.
+            Middles (n,) and lengths (n,) of the strips in mm; in space x and z (n, 2) and areas (n,) in mm2.
 
         Returns
         -------
         array
             (2n, 2n) in mm per N/mm: first the n displacements into the surface, then the n along +x; columns
-            in the same order, forces on the surface into it and along +x.
+            in the same order, forces on the surface into it and along +x. In space (3n, 3n) in mm per N,
+            last along +z.
         """
-        return _kernels(self.layers).compliance(*strips(x, lengths))
+        return self._kernels(x).compliance(*strips(x, lengths))
 
     def compliance_slope(self, x: Any, lengths: Any) -> Floats:
-        """Derivatives of `compliance` (2n, 2n) by the place of the strip that is displaced, in N^-1 mm."""
-        return _kernels(self.layers).slope(*strips(x, lengths))
+        """Derivatives of `compliance` by the place of what is displaced: (1, 2n, 2n) by x, in space (2, 3n,
+        3n) by x and z.
+        """
+        return self._kernels(x).slope(*strips(x, lengths))
+
+    def _kernels(self, x: Any) -> Kernels | Patches:
+        return (_kernels if np.ndim(x) < 2 else _patches)(self.layers)
 
 
 @dataclass(frozen=True)
@@ -132,10 +141,11 @@ def elastic_of(given: Any, key: str = "surface.elastic") -> Any:
 
 
 def strips(x: Any, lengths: Any) -> tuple[Floats, Floats]:
-    """Middles and lengths of strips (n,) as arrays; InputError for what is none."""
+    """Middles (n,) or (n, 2) and lengths or areas (n,) as arrays; InputError for what is none."""
     found = np.atleast_1d(np.asarray(x, dtype=float))
-    long = np.broadcast_to(np.asarray(lengths, dtype=float), found.shape)
-    if found.ndim != 1 or not np.isfinite(found).all() or not (np.isfinite(long) & (long > 0.0)).all():
+    long = np.broadcast_to(np.asarray(lengths, dtype=float), found.shape[:1])
+    flat = found.ndim == 1 or found.shape[1:] == (2,)
+    if not flat or not np.isfinite(found).all() or not (np.isfinite(long) & (long > 0.0)).all():
         raise InputError("lengths", quoted(lengths), "places in mm, and a length in mm above 0 for each")
     return found, long
 
@@ -154,6 +164,15 @@ def transfer(layers: tuple[ElasticLayer, ...], k: Floats) -> tuple[Floats, Float
     for layer in reversed(layers):
         below = _on_top(layer, k, below)
     return -below[:, 1, 1], -below[:, 0, 0], -below[:, 1, 0]
+
+
+def shear_across(layers: tuple[ElasticLayer, ...], k: Floats) -> Floats:
+    """Compliance a_s (K,) of a stack to shear across waves of these numbers k (K,) in 1/mm."""
+    below = np.zeros(k.size)
+    for layer in reversed(layers):
+        stiff, grown = 0.5 * layer.E / (1.0 + layer.nu) * k, np.tanh(k * layer.thickness)
+        below = (below + grown / stiff) / (1.0 + below * stiff * grown)
+    return below
 
 
 def _on_top(layer: ElasticLayer, k: Floats, below: Floats) -> Floats:
@@ -245,7 +264,7 @@ class Kernels:
         found[1, i, 1, j], found[1, j, 1, i] = tangent, -tangent
         found[0, i, 1, j] = found[0, j, 1, i] = cross
         found[1, i, 0, j] = found[1, j, 0, i] = -cross
-        return found.reshape(2 * x.size, 2 * x.size)
+        return found.reshape(1, 2 * x.size, 2 * x.size)
 
     def _means(self, x: Floats, lengths: Floats) -> Floats:
         """Slopes and means of the three kernels over each pair of strips, (3, 2, pairs); the last kept."""
@@ -296,9 +315,7 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     differs from a part of known transform that falls off as fast.
     """
     top, unit = layers[0], layers[0].thickness
-    soft = min(one.E for one in layers)
-    reach = sum(one.thickness * (one.E / soft) ** (1.0 / 3.0) for one in layers) / unit
-    end, mu, free = FARTHEST * reach, 0.5 * top.E / (1.0 + top.nu), 1.0 - 2.0 * top.nu
+    end, mu, free = _end(layers) / unit, 0.5 * top.E / (1.0 + top.nu), 1.0 - 2.0 * top.nu
     step = np.pi / (1.5 * end)
     s = step * (np.arange(int(np.ceil(HIGHEST / step))) + 0.5)
     normal, tangent, cross = (each * mu * s / unit for each in transfer(layers, s / unit))
@@ -316,6 +333,24 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     kernels = (_kernel(x, even[0]), _kernel(x, even[1]), _kernel(x, odd, 0.5 * np.pi * free))
     own = (1.0 - top.nu) / (np.pi * mu)
     return Kernels(unit, kernels, np.array([own, own, 0.5 / (np.pi * mu)]), SPREAD)
+
+
+@lru_cache(maxsize=32)
+def _patches(layers: tuple[ElasticLayer, ...]) -> Patches:
+    """The kernels of a stack in space."""
+    top = layers[0]
+
+    def compliances(k: Floats) -> Floats:
+        return np.stack([*transfer(layers, k), shear_across(layers, k)])
+
+    end = IN_SPACE / FARTHEST * _end(layers)
+    return Patches(0.5 * top.E / (1.0 + top.nu), top.nu, compliances, SHORTEST / top.thickness, end)
+
+
+def _end(layers: tuple[ElasticLayer, ...]) -> float:
+    """Distance (mm) beyond which nothing is left of a stack's kernels."""
+    soft = min(one.E for one in layers)
+    return FARTHEST * sum(one.thickness * (one.E / soft) ** (1.0 / 3.0) for one in layers)
 
 
 def _kernel(x: Floats, rest: Floats, jump: float | None = None) -> Kernel:
