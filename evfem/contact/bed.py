@@ -19,6 +19,7 @@ surface by less than the strain of the finger over the number of its nodes; no f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -92,13 +93,21 @@ class Bed:
         over = np.flatnonzero((length > 0.0) & near)
         flat, length, dim = position[over, ::2], np.maximum(length[over], self.least), position.shape[1]
         x = flat[:, 0] if dim == 2 else flat
-        # forces on the surface are into it and along +x[, +z]: F_y, -F_x[, -F_z] of those on the finger
-        rows = (np.array([1, 0, 2])[:dim] * over.size + np.arange(over.size)[:, None]).ravel()
-        signs = np.repeat([1.0, -1.0], [over.size, (dim - 1) * over.size])
-        both = signs[:, None] * signs
-        found = (both * each for each in (self.elastic.compliance(x, length), *slopes(self.elastic, x, length)))
-        compliance, *slope = (each[np.ix_(rows, rows)] for each in found)
+        given, changed = self.elastic.compliance(x, length), slopes(self.elastic, x, length)
+        compliance, *slope = (_by_nodes(np.asarray(each), dim) for each in (given, *changed))
         return Yielding(over, compliance, np.stack(slope))
+
+
+def _by_nodes(found: Floats, dim: int) -> Floats:
+    """A matrix (dim k, dim k) of a surface, by forces on the finger along x, y[, z] node by node: those on the
+    surface, component by component, are into it and along +x[, +z], F_y, -F_x[, -F_z].
+    """
+    size, order, sign = len(found) // dim, np.array([1, 0, 2])[:dim], np.array([-1.0, 1.0, -1.0])[:dim]
+    blocks = found.reshape(dim, size, dim, size)
+    made = np.empty((size, dim, size, dim))
+    for p, q in product(range(dim), repeat=2):
+        np.multiply(blocks[order[p], :, order[q]], sign[p] * sign[q], out=made[:, p, :, q])
+    return made.reshape(dim * size, dim * size)
 
 
 def slopes(elastic: Any, x: Floats, length: Floats) -> Floats:

@@ -17,8 +17,8 @@ In space that are kernels of the distance x, which fall off exponentially. Their
 :math:`-2\ln|x|/(\pi E^*)` and :math:`\mathrm{sgn}(x)(1-2\nu)/(4\mu)` with those of the top layer, are known;
 what is left is smooth and tabulated once (`Kernels`). Forces act on strips of given lengths, and
 displacements are means over the strips: second differences of the kernel's second integral. That makes
-the compliance symmetric and positive, as Galerkin's method does. A strip shorter than the table resolves
-takes the mean of the kernel's quadratic instead.
+the compliance symmetric and positive, as Galerkin's method does. Strips far apart take
+the mean of the kernel's quadratic instead.
 
 Sources: K. L. Johnson, Contact Mechanics (1985), doi:10.1017/CBO9781139171731, ch. 2 and 5.8 (half-plane and
 layer). Units: mm, N, MPa; compliances are mm per N/mm.
@@ -44,9 +44,9 @@ TABULATED, FARTHEST = 1500, 36.0
 SPREAD = 8.0
 #: largest wavenumber (over the top thickness) and layers of it that one exponential resolves
 HIGHEST, RESOLVED = 45.0, 2.0
-#: strips shorter than this share of the top thickness take the kernel's quadratic, and far ones whose
-#: length is this share of their distance
-SHORT, FAR = 0.02, 0.01
+#: strips take the kernel's quadratic that are shorter than these shares of the top thickness and of their
+#: distance: errors of 1e-5 of a strip's own kernel
+SHORT, FAR = 0.25, 0.1
 #: the same two limits of kernels in space
 IN_SPACE, SHORTEST = 24.0, 18.0
 #: step (mm) of the slope of a compliance of one's own
@@ -209,7 +209,7 @@ class Kernel:
     jump: float | None = None
 
     def odd(self, order: int) -> bool:
-        """Whether the kernel's integral of this order, 0 for itself, -1 for its derivative, is odd."""
+        """Whether the kernel's integral of this order is odd."""
         return (order % 2 == 1) != (self.jump is not None)
 
     def singular(self, x: Floats, log: Floats, order: int) -> Floats:
@@ -218,17 +218,6 @@ class Kernel:
             return np.asarray(self.jump * (x if order == 1 else 0.5 * x**2))
         return np.asarray(x - x * log if order == 1 else 0.75 * x**2 - 0.5 * x**2 * log)
 
-    def quadratic(self, x: Floats, share: Floats, order: int) -> Floats:
-        """Kernel (order 0) or slope (-1) at x, and `share` times its second derivative."""
-        size = np.minimum(np.abs(x), self.rest.x[-1])
-        found = self.rest(size, -order) + share * self.rest(size, 2 - order)
-        if self.jump is None:
-            near = np.maximum(size, 1e-300)
-            found = found - (1.0 / near + 2.0 * share / near**3 if order else np.log(near) - share / near**2)
-        elif order == 0:
-            found = found + self.jump
-        return np.asarray(np.sign(x) * found if self.odd(order) else found)
-
 
 class Kernels:
     """Normal, tangential and coupling kernels of a stack over the distance in thicknesses of its top layer,
@@ -236,8 +225,11 @@ class Kernels:
     """
 
     def __init__(self, unit: float, kernels: tuple[Kernel, ...], sizes: Floats, spread: float) -> None:
+        from scipy.interpolate import PPoly
+
         self.unit, self.kernels, self.sizes, self.spread = unit, kernels, sizes, spread
         self.places = kernels[0].rest.x
+        self.rests = PPoly(np.stack([one.rest.c for one in kernels], axis=2), self.places)
         # polynomials of all first and second integrals, (pieces, 3 kernels x 2 orders) for each power
         integrals = [one.rest.antiderivative(order).c for one in kernels for order in (1, 2)]
         self._powers = [
@@ -278,16 +270,25 @@ class Kernels:
 
     def _over_strips(self, x: Floats, a: Floats, b: Floats) -> Floats:
         """Slopes and means (3, 2, k) of the kernels over strips a and b whose middles are x apart."""
-        middle, half = 0.5 * np.abs(a - b), 0.5 * (a + b)
-        ends = ((x + half, 1.0), (x + middle, -1.0), (x - middle, -1.0), (x - half, 1.0))
-        found = np.asarray(sum(sign * self._integrals(at) for at, sign in ends)) / (a * b)
-        short = half < SHORT
-        for kernel, both in zip(self.kernels, found, strict=True):
-            small = np.flatnonzero(short & ((half < FAR * np.abs(x)) | (kernel.jump is not None)))
-            if small.size:
-                share = (a[small] ** 2 + b[small] ** 2) / 24.0
-                both[:, small] = [kernel.quadratic(x[small], share, order) for order in (-1, 0)]
-        return np.where(np.abs(x) - half > self.places[-1], 0.0, found)
+        half, found = 0.5 * (a + b), np.empty((3, 2, x.size))
+        far = half < np.minimum(SHORT, FAR * np.abs(x))
+        found[:, :, far] = self._quadratic(x[far], (a[far] ** 2 + b[far] ** 2) / 24.0)
+        x, a, b = x[~far], a[~far], b[~far]
+        middle, end = 0.5 * np.abs(a - b), 0.5 * (a + b)
+        ends = ((x + end, 1.0), (x + middle, -1.0), (x - middle, -1.0), (x - end, 1.0))
+        found[:, :, ~far] = sum(sign * self._integrals(at) for at, sign in ends) / (a * b)
+        return found
+
+    def _quadratic(self, x: Floats, share: Floats) -> Floats:
+        """Slopes and kernels (3, 2, k) at x, and `share` times their second derivatives."""
+        size, share = np.minimum(np.abs(x), self.places[-1]), share[:, None]
+        value, slope, *more = (self.rests(size, order) for order in range(4))
+        found = np.stack([slope + share * more[1], value + share * more[0]])
+        log = np.array([-1.0 / size - 2.0 * share[:, 0] / size**3, share[:, 0] / size**2 - np.log(size)])
+        found[:, :, :2] += log[:, :, None]
+        found[1, :, 2] += self.kernels[2].jump
+        found[[0, 0, 1], :, [0, 1, 2]] *= np.sign(x)
+        return np.where(np.abs(x) > self.places[-1], 0.0, found.transpose(2, 0, 1))
 
     def _integrals(self, x: Floats) -> Floats:
         """First and second integrals (3, 2, k) of the kernels from 0 to x of either sign."""
