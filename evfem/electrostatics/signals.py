@@ -22,8 +22,6 @@ from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_colum
 from evfem.common.views import plus
 from evfem.errors import ABSENT, InputError
 
-#: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
-APPLIED_TO_EFFECTIVE = 2.0
 HEADER = ["position", "voltage"]
 #: largest magnitude of a position (mm) and of a voltage (V)
 LARGEST = 1e6
@@ -150,15 +148,6 @@ def carrier_amplitude(effective: Values) -> Values:
     return plain(np.sqrt(2.0) * np.asarray(effective))
 
 
-def applied_voltage(effective: Values) -> Values:
-    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17): about 2 U.
-
-    This is a rule from experience that contains losses outside the finger; `carrier_amplitude` is
-    the mean alone.
-    """
-    return plain(APPLIED_TO_EFFECTIVE * np.asarray(effective))
-
-
 @dataclass(frozen=True)
 class Amplifier:
     """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
@@ -192,20 +181,12 @@ class Amplifier:
         return _no_steeper(cut, self.slew / above("speed", speed, 0.0, "a speed in mm/s above zero"))
 
     def _clipped(self, profile: VoltageProfile) -> VoltageProfile:
-        x, u = profile.position, profile.voltage
-        parts_x, parts_u = [x[:1]], [u[:1]]
-        for i in range(x.size - 1):
-            levels = [
-                level
-                for level in (-self.voltage_max, self.voltage_max)
-                if (u[i] - level) * (u[i + 1] - level) < 0
-            ]
-            crossings = sorted((level - u[i]) / (u[i + 1] - u[i]) for level in levels)
-            share = np.array([*crossings, 1.0])
-            parts_x.append(x[i] + share * (x[i + 1] - x[i]))
-            parts_u.append(u[i] + share * (u[i + 1] - u[i]))
-        voltage = np.clip(np.concatenate(parts_u), -self.voltage_max, self.voltage_max)
-        return VoltageProfile(np.concatenate(parts_x), voltage)
+        x, u, most = profile.position, profile.voltage, self.voltage_max
+        row = np.arange(x.size)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = (np.array([[-most], [most]]) - u[:-1]) / np.diff(u)
+        at = np.sort(np.append(row, (row[:-1] + share)[(share > 0.0) & (share < 1.0)]))
+        return VoltageProfile(np.interp(at, row, x), np.clip(np.interp(at, row, u), -most, most))
 
 
 def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
