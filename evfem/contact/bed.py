@@ -99,8 +99,8 @@ class Bed:
 
 
 def _by_nodes(found: Floats, dim: int) -> Floats:
-    """A matrix (dim k, dim k) of a surface, by forces on the finger along x, y[, z] node by node: those on the
-    surface, component by component, are into it and along +x[, +z], F_y, -F_x[, -F_z].
+    """A matrix (dim k, dim k) of a surface, for forces on the finger along x, y[, z] node by node: those on
+    the surface, component by component, are into it and along +x[, +z], F_y, -F_x[, -F_z].
     """
     size, order, sign = len(found) // dim, np.array([1, 0, 2])[:dim], np.array([-1.0, 1.0, -1.0])[:dim]
     blocks = found.reshape(dim, size, dim, size)

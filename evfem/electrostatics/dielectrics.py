@@ -86,7 +86,9 @@ class _Fitted:
         real("tolerance", tolerance, _TOLERANCE, Within(0.0, 0.5, above=True))
         best, decades = np.inf, float(np.log10(f_high / f_low))
         band = np.geomspace(f_low, f_high, 2 + int(np.ceil(PER_DECADE * decades)))
-        ends = [(2.0 * np.pi * f_high * 10.0**beyond, 2.0 * np.pi * f_low / 10.0**beyond) for beyond in BEYOND]
+        ends = [
+            (2.0 * np.pi * f_high * 10.0**beyond, 2.0 * np.pi * f_low / 10.0**beyond) for beyond in BEYOND
+        ]
         for number in POLES:
             tried = [_fit(self, band, 1.0 / np.geomspace(*end, number)) for end in ends]
             found, error = min(tried, key=lambda one: one[1])
@@ -277,7 +279,8 @@ def debye_layer(layer: Layer, frequency: float | None) -> Layer:
     3
     """
     of: Any = layer.eps_r
-    if not relaxes(layer) or _is_debye(of):
+    own = isinstance(of, Dielectric) and all(not any(pole[2:]) and len(pole) == 3 for pole in of.poles)
+    if not relaxes(layer) or own:
         return layer
     if not callable(getattr(of, "debye", None)):
         allowed = "a Dielectric or a DielectricTable where the voltage is resolved in time"
@@ -286,11 +289,6 @@ def debye_layer(layer: Layer, frequency: float | None) -> Layer:
     if frequency is not None:
         low, high = min(low, frequency / WIDER), max(high, frequency * WIDER)
     return Layer(layer.thickness, _remembered(of, low, high))
-
-
-def _is_debye(of: Any) -> bool:
-    """Whether all poles are Debye's."""
-    return isinstance(of, Dielectric) and all(not any(pole[2:]) and len(pole) == 3 for pole in of.poles)
 
 
 @lru_cache(maxsize=32)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from evfem.common.checks import Values, above, at_least, plain
-from evfem.electrostatics.laws import Layer, Layers, eps_0
+from evfem.electrostatics.laws import Layer, Layers
 from evfem.errors import InputError, quoted
 from evfem.protocols import ForceLaw
 

@@ -13,7 +13,8 @@ polarisation p_k (over eps_0, a field) for each pole:
 For a fixed gap this is linear, with real, negative rates. With given charges every force law stays what it
 is, under the voltage of the same field in the gap.
 
-Laplace's transform makes it algebra: with the admittance :math:`Y_j(s) = \varepsilon_{\infty j} + \kappa_j/s + \sum_k \Delta_k/(1 + s\tau_k)`,
+Laplace's transform makes it algebra: with the admittance
+:math:`Y_j(s) = \varepsilon_{\infty j} + \kappa_j/s + \sum_k \Delta_k/(1 + s\tau_k)`,
 :math:`z_j = d_j/Y_j`, and what the state at the beginning, index 0, leaves behind,
 :math:`h_j = \sum_k p_k^0\tau_k/(1 + s\tau_k)`,
 
@@ -250,6 +251,7 @@ class Sandwich:
         """Conductivity over permittivity at high frequency (1/s) of skin, gap and insulator."""
         skin, film = (one.kappa / one.eps_inf for one in (self.skin, self.insulator))
         return skin, self.leak / self.gap_eps_r, film
+
 
 def _lifted(values: Any, axes: int) -> Any:
     """With so many axes, the further ones in front."""

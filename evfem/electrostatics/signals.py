@@ -93,15 +93,9 @@ class VoltageProfile:
             raise InputError("start, stop", (start, stop), "two positions in mm, the second one larger")
         inside = (self.position > start) & (self.position < stop)
         x = np.concatenate([[start], self.position[inside], [stop]])
-        before = np.concatenate([self.voltage[inside], [self._just_before(stop)]])  # limit from the left
-        after = np.concatenate([[self(start)], self.voltage[inside]])
-        square = (after**2 + after * before + before**2) / 3.0
-        return float(np.sqrt(np.sum(np.diff(x) * square) / (stop - start)))
-
-    def _just_before(self, position: float) -> float:
-        """The limit from the left at `position`: the first of repeated rows counts."""
-        reverse = VoltageProfile(-self.position[::-1], self.voltage[::-1])
-        return float(reverse(-position))
+        middle, half = 0.5 * (x[1:] + x[:-1]), 0.5 * np.diff(x)
+        square = sum(np.asarray(self(middle + side * half)) ** 2 for side in (-(3.0**-0.5), 3.0**-0.5))
+        return float(np.sqrt(np.sum(half * square) / (stop - start)))
 
     def steepest(self) -> float:
         """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in V/s."""

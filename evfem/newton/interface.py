@@ -172,7 +172,7 @@ class Interface:
         found = surface_state(self.surface, self.places(state))
         if self.bed is not None:
             slope = np.linalg.solve(self._kept(state), (found.slope - state.strain[:, :, 1])[:, :, None])
-            found = replace(found, slope=slope[:, :, 0])
+            found = replace(found, slope=np.asarray(slope[:, :, 0]))
         self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
 

@@ -11,6 +11,7 @@ import os
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
+from evfem.surface.skin import make_skin
 
 SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
 #: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, which grow with the
@@ -22,7 +23,7 @@ PACKAGES, BODY, BODY_GROWTH, CONTACT = 0.13e9, 0.0226e9, 1.1, 27.0
 def check_space(scene: Scene, mesh: Mesh) -> None:
     """Raise InputError for what a finger of this mesh cannot do."""
     mistakes = Mistakes()
-    for key, given, allowed in (_check_solid if mesh.dim == 3 else _check_plane)(scene):
+    for key, given, allowed in _check_solid(scene, mesh) if mesh.dim == 3 else _check_plane(scene):
         with mistakes.of_a_part():
             raise InputError(key, given, allowed)
     mistakes.report()
@@ -40,8 +41,13 @@ def _check_plane(scene: Scene) -> list[tuple[str, str, str]]:
     return found
 
 
-def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
+def _check_solid(scene: Scene, mesh: Mesh) -> list[tuple[str, str, str]]:
     found = []
+    skin = make_skin(mesh)
+    apart, layers = skin.spacing(mesh.points[skin.nodes]), getattr(scene.ground.elastic, "layers", ())
+    if layers and layers[0].thickness < apart:
+        allowed = f"an upper layer at least as thick as the pad's nodes are apart, {apart:.2g} mm"
+        found.append(("surface.elastic", f"one {layers[0].thickness:g} mm thick {SOLID}", allowed))
     if scene.solver.contact != "exact":
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
     if scene.law is not None and scene.field != "local":

@@ -318,7 +318,7 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     top, unit = layers[0], layers[0].thickness
     end, mu, free = _end(layers) / unit, 0.5 * top.E / (1.0 + top.nu), 1.0 - 2.0 * top.nu
     step = np.pi / (1.5 * end)
-    s = step * (np.arange(int(np.ceil(HIGHEST / step))) + 0.5)
+    s = np.asarray(step * (np.arange(int(np.ceil(HIGHEST / step))) + 0.5), dtype=np.float64)
     normal, tangent, cross = (each * mu * s / unit for each in transfer(layers, s / unit))
     rests = np.stack([normal / (1.0 - top.nu) - np.tanh(s), tangent / (1.0 - top.nu) - np.tanh(s)])
     turned = 2.0 * cross - free * (1.0 - 1.0 / np.cosh(s))

@@ -31,7 +31,7 @@ POINTS, WIDEST = 16, 20.0
 #: places of a table, end sinh(t) / sinh(SPREAD) with even t
 TABULATED, SPREAD = 600, 6.0
 #: step of a slope (mm) per side of the smallest patch
-STEP = 1e-4
+STEP = 1e-5
 
 
 class Patches:
@@ -57,7 +57,10 @@ class Patches:
         self.places = end * np.sinh(np.linspace(0.0, SPREAD, TABULATED)) / np.sinh(SPREAD)
         found = np.zeros((TABULATED, 2, 4))
         for part in np.array_split(np.arange(k.size), k.size // 2000 + 1):
-            angle, both = np.outer(self.places, k[part]), np.stack([rest[:, part], -rest[:, part] * k[part] ** 2])
+            angle, both = (
+                np.outer(self.places, k[part]),
+                np.stack([rest[:, part], -rest[:, part] * k[part] ** 2]),
+            )
             zeroth, first = j0(angle), j1(angle)
             second = 2.0 * first / np.where(angle > 0.0, angle, 1.0) - zeroth * (angle > 0.0)
             for kernel, bessel in enumerate((zeroth, zeroth, second, first)):
@@ -74,7 +77,7 @@ class Patches:
 
     def slope(self, x: Floats, areas: Floats) -> Floats:
         """Derivatives (2, 3 n, 3 n) of `compliance` by the place of the displaced square along both axes."""
-        i, j = np.triu_indices(len(x), 1)
+        i, j = np.triu_indices(len(x))
         side, step = np.sqrt(areas), STEP * float(np.sqrt(areas.min()))
         found = []
         for way in step * np.eye(2):
@@ -132,7 +135,9 @@ def _integrals(x: Floats, z: Floats) -> Floats:
     """
     u, v, r = np.abs(x), np.abs(z), np.hypot(x, z)
     log, angle = np.log(np.where(r > 0.0, r, 1.0)), np.arctan2(u, v)  # from the axis of z
-    by_x, by_z = (np.arcsinh(np.divide(p, q, out=np.zeros_like(p), where=q > 0.0)) for p, q in ((u, v), (v, u)))
+    by_x, by_z = (
+        np.arcsinh(np.divide(p, q, out=np.zeros_like(p), where=q > 0.0)) for p, q in ((u, v), (v, u))
+    )
     over_x, over_z = r**3 / 6.0 + 0.5 * v**2 * (u * by_x - r), r**3 / 6.0 + 0.5 * u**2 * (v * by_z - r)
     mixed = -np.sign(x * z) * (2.0 * u * v * r + u**3 * by_z + v**3 * by_x) / 3.0
     ahead = (v**2 * u / 2.0 - u**3 / 6.0) * log + v**3 / 6.0 * angle + 0.5 * u**2 * v * (0.5 * np.pi - angle)
