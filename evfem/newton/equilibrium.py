@@ -72,7 +72,7 @@ class Equilibrium:
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
             given=NO_BED if self.interface.bed is None else zero,
-            strain=NO_BED if self.interface.bed is None else zero,
+            strain=NO_BED if self.interface.bed is None else np.zeros((nodes, dim - 1, dim)),
             rates=np.zeros_like(self.body.body.rates(still)),
         )
         attraction = self.attraction_at(state, state, voltage)

@@ -59,8 +59,8 @@ class State:
     resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
     (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
     `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface
-    adds to the places of the pad's nodes relative to it is `given` (P, 2) in mm, its derivative along x
-    `strain` (P, 2).
+    adds to the places of the pad's nodes relative to it is `given` (P, dim) in mm, its derivatives along x[,
+    z] `strain` (P, d, dim).
     """
 
     u: Floats

@@ -319,7 +319,10 @@ class SubstepWork:
         """Ways (P,) along an elastic surface, as long as it is stretched."""
         if not self.new.strain.size:
             return length
-        return np.asarray(length * (1.0 - 0.5 * (self.old.strain + self.new.strain)[:, 0]))
+        way = self.places[1] - self.places[0]
+        along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        stretch = 0.5 * (self.old.strain + self.new.strain)[:, :, ::2]
+        return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
     @property
     def _seconds(self) -> float:
