@@ -1,11 +1,8 @@
 """What a case of the study of stability is, how it is run, and what is recorded of it.
 
-A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and
-balances, and returns whether the physics is as expected and a sentence with the numbers. What it
-raises is recorded.
+A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and balances,
+and returns whether the physics is as expected and a sentence with the numbers. What it raises is recorded.
 """
-
-from __future__ import annotations
 
 import time
 import warnings

@@ -1,7 +1,5 @@
 """Cases of contact and friction: reversals, jumps, texture, deep and light, steps too large."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -118,9 +116,8 @@ def _textured(surface: Any, ridges: bool, dynamics: str, distance: float = 2.0, 
 
 
 def _slides_over(log: Log, asked: Scene, mu: float, finer: Scene | None = None) -> Verdict:
-    """Mean friction at least mu (slopes only dissipate), no node below the surface, energy not
-    gained. With a `finer` scene, of more steps: what is gained is an error of the works, which falls
-    with the step.
+    """Mean friction at least mu (slopes only dissipate), no node below the surface, energy not gained. With a
+    `finer` scene, of more steps: what is gained is an error of the works, which falls with the step.
     """
     result = log.simulate(asked)
     later = result.position > 0.5 * result.position[-1]

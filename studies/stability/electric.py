@@ -1,7 +1,5 @@
 """Cases of the attraction: pull-in and hysteresis, thin insulators, voltages that jump."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -133,9 +131,8 @@ for _law in LAWS:
 class FixedCharge:
     """Strong-Troxel's law with the charge per area given instead of the voltage.
 
-    "voltage" is what this charge makes of the layers and the first gap; it then changes with the
-    gap. Where the gap is uniform, so is the charge of an electrode: the plate is
-    charge-controlled.
+    "voltage" is what this charge makes of the layers and the first gap; it then changes with the gap. Where
+    the gap is uniform, so is the charge of an electrode: the plate is charge-controlled.
     """
 
     def traction(self, gap: Any, voltage: Any, layers: ev.Layers) -> Any:

@@ -1,7 +1,5 @@
 """The picture of the study of stability: a row per case, in two columns of groups."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..plots import COLOURS, Axes, Figure, new_figure

@@ -1,7 +1,5 @@
 """Small bodies and meshes of the study of stability; tests use them too."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -5,12 +5,8 @@ listed with its message. Outcomes: passed; refused or stopped with a sentence, w
 wrong; not converged; error. Beside json, csv and picture the table is written as stability.md.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 from ..common import Series, Study, markdown, side_by_side
 from . import contact, electric, same, tissue
@@ -43,16 +39,15 @@ ASSUMPTIONS = {
 MEASURED = ("steps", "substeps", "cuts", "iterations", "cpu_s", "force_error", "energy_error")
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Judge all cases, or the quick ones, in two processes; numbers, table and figure."""
     chosen = [key for key, case in CASES.items() if case.quick or not quick]
     found = side_by_side(judge_by_key, chosen, 1 if quick else 2)
     said = {one.key: {"expected": one.expected, "outcome": one.outcome, "found": one.said} for one in found}
     rest = ASSUMPTIONS | {"cases": said, "groups": by_group(found)}
-    study = Study(
+    return Study(
         "stability", numbers(found), {}, rest, series(found), lambda: draw(found), tables=tables(found)
     )
-    return study.finish(out, quick)
 
 
 def judge_by_key(key: str) -> Found:

@@ -1,7 +1,5 @@
 """Cases of the tissue: incompressible and unequal layers, meshes good and bad."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from functools import partial
