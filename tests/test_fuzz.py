@@ -95,10 +95,7 @@ def little_memory(megabytes):
         (SCENE + "steps = 1000000000\n", r"motion\[0\].steps"),
         (SCENE + "steps = 0x" + "f" * 100_000 + "\n", r"motion\[0\].steps"),
         (SCENE.replace("0.05", "9" * 4000), r"motion\[0\].force"),
-        (
-            SCENE + "steps = 600000\n" + SCENE[SCENE.index("[[m") :] + "steps = 600000\n",
-            "1200000 steps in all",
-        ),
+        (SCENE + "steps = 600000\n" + SCENE[SCENE.index("[[m") :] + "steps = 600000\n", "1200000 steps in"),
         (SCENE.replace("force", "f" * 10**6), "an unknown key"),
         (SCENE.replace("'press'", "'" + "p" * 10**6 + "'"), r"motion\[0\].kind"),
         (SCENE.replace("'press'", '"two\\nlines"'), r'given "two\\nlines"'),

@@ -153,10 +153,7 @@ DAMAGES = {
         lambda p: save_arrays(p, {"format": np.array("evfem-checkpoint-1"), "version": np.array("0.0.1")}),
         f"another format, {NOT_OURS}",
     ),
-    "another version": (
-        lambda p: replaced(p, version=np.array("0.0.1")),
-        NOT_OURS,
-    ),
+    "another version": (lambda p: replaced(p, version=np.array("0.0.1")), NOT_OURS),
     "another scene": (lambda p: replaced(p, scene=np.array("0" * 64)), "another scene"),
     "no state": (lambda p: replaced(p, state__u=np.zeros(0)), "no usable u"),
     "text": (lambda p: replaced(p, state__time=np.array("now")), "no usable time"),

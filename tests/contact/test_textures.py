@@ -98,19 +98,13 @@ def test_a_wider_band_keeps_the_waves_that_it_had():
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (
-            lambda: Grating(period=0.0, groove_depth=0.1),
-            r"surface\.period: given 0\.0; allowed: a length in mm",
-        ),
+        (lambda: Grating(period=0.0, groove_depth=0.1), r"surface\.period: given 0\.0; allowed: a length"),
         (lambda: Grating(period=1.0, groove_depth=np.nan), r"surface\.groove_depth: given nan"),
         (
             lambda: Grating(1.0, 0.1, groove_width=1.0),
             "groove_width: given 1.0; allowed: .* below the period, 1",
         ),
-        (
-            lambda: Grating(1.0, 0.1, 0.3, wall_width=0.4),
-            "wall_width: given 0.4; allowed: .* up to 0.3, ridge",
-        ),
+        (lambda: Grating(1.0, 0.1, 0.3, wall_width=0.4), "wall_width: given 0.4; allowed: .* up to 0.3"),
         (lambda: Grating(1.0, 0.1, phase=2.0), r"surface\.phase: given 2\.0"),
         (lambda: SelfAffine(hurst=1.1, rms=0.1), "hurst: given 1.1; allowed: a Hurst exponent from 0 to 1"),
         (lambda: SelfAffine(hurst=0.8, rms=-0.1), "rms: given -0.1"),

@@ -174,10 +174,7 @@ LIMITS = {
     ),
     "jump": (ev.Display(FILM, friction=[[-9.0, 0.2], [0.1, 0.2], [0.1, 0.6]]), {}),
     "rate": (ev.Display(FILM), exponential(5.0, exponent=0.5)),
-    "rough": (
-        ev.Display(THIN),
-        {"law": ev.StrongTroxel(), "voltage": 150.0, "roughness_gap": ROUGH},
-    ),
+    "rough": (ev.Display(THIN), {"law": ev.StrongTroxel(), "voltage": 150.0, "roughness_gap": ROUGH}),
 }
 
 
