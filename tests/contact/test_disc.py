@@ -175,15 +175,6 @@ def test_nodes_of_no_compliance_of_their_own_are_closed_to_rounding():
     assert_allclose(found.force, held, atol=1e-12)
 
 
-def test_turned_tangents_turn_the_answer():
-    problem, _ = half_space(8, 0.3, (0.04, 0.03), 0.2)
-    c, s = np.cos(0.7), np.sin(0.7)
-    R = np.kron(np.eye(problem.size), [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-    turned = ContactProblem(R @ problem.start, R @ problem.compliance @ R.T, problem.friction)
-    found, expected = (solved(one, np.zeros(3 * problem.size)) for one in (turned, problem))
-    assert_allclose(found.force, R @ expected.force, atol=1e-10)
-
-
 def test_what_has_no_solution_is_said_not_to_be_solved():
     """A body that gives way the more, the more it is pressed."""
     with pytest.raises(ContactNotSolved, match="1 of 1 nodes keep changing"):

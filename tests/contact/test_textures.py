@@ -8,7 +8,6 @@ from scipy.integrate import trapezoid
 
 from evfem.errors import InputError
 from evfem.surface.textures import Grating, SelfAffine
-from evfem.tensor import complex_step
 
 X = np.linspace(-1.7137, 2.3071, 41)
 TEXTURES = [
@@ -21,15 +20,6 @@ TEXTURES = [
 def sampled(rough, count):
     """Heights at `count` places over one period."""
     return rough.height(np.arange(count) * rough.period / count)
-
-
-@pytest.mark.parametrize("surface", TEXTURES, ids=lambda surface: type(surface).__name__)
-def test_slope_and_curvature_are_derivatives_of_the_height(surface):
-    np.testing.assert_allclose(surface.slope(X), complex_step(surface.height, X), atol=1e-14)
-    np.testing.assert_allclose(surface.curvature(X), complex_step(surface.slope, X), atol=1e-12)
-    for x in (0.3, np.full((2, 3), 0.3)):
-        for method in (surface.height, surface.slope, surface.curvature):
-            assert np.shape(method(x)) == np.shape(x)
 
 
 @pytest.mark.parametrize("surface", TEXTURES, ids=lambda surface: type(surface).__name__)

@@ -1,7 +1,6 @@
 """Mistakes in a user's parts, refused before a run with one sentence each."""
 
 import math
-import time
 from dataclasses import replace
 from types import SimpleNamespace as Part
 
@@ -12,8 +11,7 @@ from tools.meshes import block
 import evfem as ev
 from evfem.errors import InputError
 from evfem.planning.parts import check_parts
-from evfem.planning.plan import plan, scene_mesh
-from evfem.planning.plausibility import implausible
+from evfem.planning.plan import plan
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.38)
 PRESS, SLIDE = ev.Press(indentation=0.2, steps=2), ev.Slide(distance=1.0, steps=5)
@@ -390,10 +388,6 @@ def test_a_surface_is_tried_along_the_way_alone():
 # -- friction and roughness ------------------------------------------------------------------------------
 
 
-def fixed(pressure, mu, speed, age):
-    return 1e-3
-
-
 def test_a_law_of_friction_behind_a_decorator_is_taken():
     check_parts(
         scene(None, *FAST, friction_law=friction(lambda pressure, *args, **kwargs: 0.001 + 0.0 * pressure)), 2
@@ -408,18 +402,3 @@ def test_a_roughness_without_mistakes_is_taken():
         scene(law=CHARGED, voltage=300.0, roughness_gap=4.0)
     with pytest.raises(InputError, match="given the class Apart; allowed: an object of it"):
         scene(law=CHARGED, voltage=300.0, roughness_gap=type("Apart", (), {"separation": apart}))
-
-
-def test_looking_takes_next_to_no_time():
-    parts = {"law": own(), "friction_law": friction(fixed), "roughness_gap": rough(apart)}
-    asked = replace(
-        scene(Mine(), PRESS, SLIDE, voltage=300.0, **parts), surface=surface(waves, insulator=FILM)
-    )
-    mesh, _ = scene_mesh(asked)
-    best = math.inf
-    for _ in range(5):
-        begin = time.perf_counter()
-        check_parts(asked, 2)
-        implausible(asked, mesh, {"tissue": 0.04})
-        best = min(best, time.perf_counter() - begin)
-    assert best < 5e-3
