@@ -444,9 +444,7 @@ def test_a_folder_that_cannot_be_made_is_exit_status_4(place):
 
 
 def interrupted(place, number):
-    """Start the long scene, send a signal after some steps; returns exit status and standard
-    error.
-    """
+    """Start the long scene, send a signal after some steps; returns exit status and standard error."""
     (place / "square.toml").write_text(MANY_STEPS)
     words, environment = process_of("run", "square.toml")
     with subprocess.Popen(words, cwd=place, env=environment, stderr=subprocess.PIPE, text=True) as process:

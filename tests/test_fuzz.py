@@ -1,6 +1,4 @@
-"""Hostile input: damaged files of every format, and files made to take all memory or time, get a
-sentence.
-"""
+"""Hostile input: damaged files of every format, and files made to take all memory or time, get a sentence."""
 
 import io
 import tracemalloc

@@ -1,6 +1,4 @@
-"""Nothing is lost: runs that are killed, disks that are full, checkpoints damaged or of other
-scenes.
-"""
+"""Nothing is lost: runs that are killed, disks that are full, checkpoints damaged or of other scenes."""
 
 import errno
 import json
@@ -228,9 +226,7 @@ def test_what_a_killed_run_was_writing_is_removed_by_the_next_and_nothing_else(p
 
 
 class Full:
-    """Lets `room` writes of files pass, then the disk is full: half of what was to be written is
-    on it.
-    """
+    """Lets `room` writes of files pass, then the disk is full: half of what was to be written is on it."""
 
     def __init__(self, room, monkeypatch):
         self.room = room

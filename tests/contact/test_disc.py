@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from evfem.contact.signorini import (
-    OPEN,
-    SLIP,
-    STICK,
-    ContactNotSolved,
-    ContactProblem,
-)
+from evfem.contact.signorini import OPEN, SLIP, STICK, ContactNotSolved, ContactProblem
 from evfem.contact.solve import solve_contact
 
 
@@ -93,9 +87,7 @@ def test_one_node_sticks_below_the_cone_and_slips_against_its_motion_beyond():
 
 
 def test_cohesion_widens_the_disc_of_what_touches():
-    """Unit compliance: pressed with 1, mu = 0.3 and c = 0.2 hold slips up to 0.5; an open node has
-    neither.
-    """
+    """Unit compliance: pressed with 1, mu = 0.3 and c = 0.2 hold slips up to 0.5; open nodes have neither."""
     cohesion, start = np.full(3, 0.2), np.array([-1.0, 0.0, 0.49, -1.0, 3.0, 4.0, 1.0, 3.0, 4.0])
     for friction, held in ((0.3, 0.5), (0.0, 0.2)):
         start[2] = held - 0.01

@@ -111,9 +111,7 @@ def slid(speed=None, distance=0.05, steps=3):
     ids=["coulomb", "load index", "load index above 1", "adhesive"],
 )
 def test_a_slab_slides_with_the_force_of_its_uniform_pressure(law, ratio, near):
-    """The law of the whole slab is that of its nodes up to the roll of a pad 200 times as wide as
-    high.
-    """
+    """The law of the whole slab is that of its nodes up to the roll of a pad 200 times as wide as high."""
     for sign in (1.0, -1.0):
         result = ev.simulate(slab(law, slid(distance=sign * 0.05)))
         assert result.tangential_force[-1] == pytest.approx(sign * ratio * N, rel=near)

@@ -21,9 +21,7 @@ from evfem.contact.solve import solve_contact
 
 
 def random_problem(seed, k, friction):
-    """A random SPD compliance with strong coupling of neighbours and of normal and tangential
-    directions.
-    """
+    """A random SPD compliance with strong coupling of neighbours and of normal and tangential directions."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(2 * k, 2 * k))
     compliance = np.eye(2 * k) + 0.6 * A @ A.T / k
@@ -31,9 +29,7 @@ def random_problem(seed, k, friction):
 
 
 def half_plane(k, friction, push=0.02, shift=0.01):
-    """Compliance like that of a half plane under a parabolic punch: logarithmic decay, odd
-    coupling.
-    """
+    """Compliance like that of a half plane under a parabolic punch: logarithmic decay, odd coupling."""
     x = np.linspace(-1.0, 1.0, k)
     distance = np.abs(np.subtract.outer(x, x))
     direct = np.log(4.0 / (distance + 0.6 / k))
@@ -49,9 +45,7 @@ def closed(k):
 
 
 def violation(problem, force, state, status=None):
-    """Largest violation of Signorini's and Coulomb's conditions, from forces, gaps and slips
-    alone.
-    """
+    """Largest violation of Signorini's and Coulomb's conditions, from forces, gaps and slips alone."""
     (normal, shear), (gap, slip) = force.reshape(-1, 2).T, state.reshape(-1, 2).T
     limit = problem.friction * normal
     touching = normal > 1e-9

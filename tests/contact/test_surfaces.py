@@ -1,6 +1,4 @@
-"""Surfaces: heights against their formulas, derivatives by differences, friction tables, refused
-input.
-"""
+"""Surfaces: heights against their formulas, derivatives by differences, friction tables, refused input."""
 
 import numpy as np
 import pytest

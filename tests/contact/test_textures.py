@@ -1,6 +1,4 @@
-"""Gratings and self-affine roughness against their closed forms: areas, spectrum, root mean
-squares.
-"""
+"""Gratings and self-affine roughness against their closed forms: areas, spectrum, root mean squares."""
 
 import numpy as np
 import pytest

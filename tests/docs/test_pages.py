@@ -1,11 +1,10 @@
-"""The documentation: its examples run and print what stands below them, its links lead somewhere,
-the names that it uses exist, what it lists is complete, it builds.
+"""The documentation: its examples run and print what stands below them, its links lead somewhere, the names
+that it uses exist, what it lists is complete, it builds.
 
-A page's Python blocks run in order, in one namespace and a folder of their own. A `text` block
-after one is what it prints, `...` standing for anything. TOML blocks are scenes or sweeps, `evfem`
-lines in `sh` blocks are understood by the command. `<!-- not run: reason -->` or
-`<!-- needs vtk -->` before a block says why it does not run here; `<!-- needs fast -->` that it takes
-minutes without PARDISO.
+A page's Python blocks run in order, in one namespace and a folder of their own. A `text` block after one is
+what it prints, `...` standing for anything. TOML blocks are scenes or sweeps, `evfem` lines in `sh` blocks
+are understood by the command. `<!-- not run: reason -->` or `<!-- needs vtk -->` before a block says why it
+does not run here; `<!-- needs fast -->` that it takes minutes without PARDISO.
 """
 
 import doctest
@@ -68,9 +67,7 @@ def blocks(page):
 
 
 def run(page, wanted, capsys):
-    """Run the Python blocks whose mark is in `wanted`, compare what they print, read the other
-    blocks.
-    """
+    """Run the Python blocks whose mark is in `wanted`, compare what they print, read the other blocks."""
     namespace = {"__name__": "page"}
     printed = None
     for kind, text, mark, line in blocks(page):

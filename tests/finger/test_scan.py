@@ -1,6 +1,4 @@
-"""Scanned ridges: reliefs and outlines against the formulas they were made from, files, refused
-input.
-"""
+"""Scanned ridges: reliefs and outlines against the formulas they were made from, files, refused input."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,4 @@
-"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is
-renewed.
-"""
+"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is renewed."""
 
 from dataclasses import replace
 

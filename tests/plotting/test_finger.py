@@ -76,9 +76,7 @@ def test_flat_cells_are_drawn_where_they_moved_with_their_values(kind):
 
 
 def area(cells):
-    """Sum of the polygon areas by the shoelace formula, positive only if nodes go round
-    counter-clockwise.
-    """
+    """Sum of the polygon areas by the shoelace formula, positive only if nodes go round counter-clockwise."""
     total = 0.0
     for path in cells.get_paths():
         x, y = path.vertices.T

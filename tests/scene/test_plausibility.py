@@ -183,9 +183,7 @@ def sentences(shipped):
 
 
 def test_the_built_in_scene_and_those_of_the_pages_stay_silent():
-    """What the pages compute in Python is computed by the tests of the pages, where a warning is
-    an error.
-    """
+    """What the pages compute in Python is computed by the tests of the pages, where a warning is an error."""
     scenes = [default_scene()]
     for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
         for text in re.findall(r"^```toml\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S):

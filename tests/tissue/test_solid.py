@@ -45,9 +45,7 @@ def isochoric(x, y, z):
 
 @cache
 def manufactured_error(element, field, nu, n):
-    """L2 error on n x n x n cells for the load int P(F) : grad v of `field` and its values
-    outside.
-    """
+    """L2 error on n x n x n cells for the load int P(F) : grad v of `field` and its values outside."""
     law = NeoHookean(E=1.0, nu=nu)
     space = box(element, (n, n, n), warp=bend)
     exact = field(*space.mesh.points.T)[0].T

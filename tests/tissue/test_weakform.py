@@ -125,8 +125,7 @@ def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(elem
 def twin_energy(space, u):
     """Neo-Hookean energy of the element, safe for complex u, on scikit-fem's own shapes.
 
-    theta: ln J pointwise, at the centroid, or its weighted least-squares plane over the points of
-    the cell.
+    theta: ln J pointwise, at the centroid, or its weighted least-squares plane over the points of the cell.
     """
     kind, intorder, sampling = ELEMENTS[space.element]
     x, dx, _, gradient, nodes = fine_points(space, intorder)
@@ -153,9 +152,7 @@ def twin_energy(space, u):
 @plane_element
 @pytest.mark.parametrize("compiled", [True, False])
 def test_forces_equal_the_complex_step_of_an_independent_energy(element, compiled):
-    """One energy written from its formula gives energy and forces of every element, compiled or
-    not.
-    """
+    """One energy written from its formula gives energy and forces of every element, compiled or not."""
     space = rectangle(element, (2, 1), warp=grids.bend)
     tissue = Tissue(space, {"lower": LAWS["neo_hookean"]})
     if not compiled:

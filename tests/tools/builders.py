@@ -47,9 +47,7 @@ def benchmark_scene(kind, level, element=None, steps=15):
 
 
 def balance(result):
-    """Out-of-balance force of every row (rows, 2) relative to its largest force (at least 1e-6
-    N/mm).
-    """
+    """Out-of-balance force of every row (rows, 2) relative to its largest force (at least 1e-6 N/mm)."""
     x = [result.applied_tangential_force, -result.tangential_force, result.electrostatic_force_x]
     y = [-result.applied_force, result.normal_force, -result.electrostatic_force]
     forces = np.array([x, y])

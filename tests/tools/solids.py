@@ -29,11 +29,10 @@ def wavy(points, size=0.06):
 
 
 def block(divisions, size=(1.0, 1.0, 1.0), jitter=0.0, split=None):
-    """[0, w] x [0, h] x [0, d] in nx x ny x nz hexahedra; node sets are its six sides and
-    `outside`.
+    """[0, w] x [0, h] x [0, d] in nx x ny x nz hexahedra; node sets are its six sides and `outside`.
 
-    `jitter` moves inner nodes at random by that share of a cell; `split(x, y, z)` at the centre of
-    a cell is True in region `upper`, the rest is `lower`.
+    `jitter` moves inner nodes at random by that share of a cell; `split(x, y, z)` at the centre of a cell is
+    True in region `upper`, the rest is `lower`.
     """
     divisions, size = np.array(divisions), np.asarray(size, dtype=float)
     grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in divisions), indexing="ij"), axis=-1)
