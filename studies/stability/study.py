@@ -1,8 +1,8 @@
 """Hard cases: does it converge to the right physics, or say why not, and what does it cost?
 
 Every case states its expected physics and is judged by a number; one that does not converge is
-listed with its message. Outcomes: passed; refused or stopped with a sentence, where that is right;
-wrong; not converged; error. Beside json, csv and picture the table is written as stability.md.
+listed with its message. Outcomes: passed; wrong; not converged; error. Beside json, csv and picture the
+table is written as stability.md.
 """
 
 from collections import Counter
@@ -29,7 +29,7 @@ HEAD = (
     "found",
 )
 ASSUMPTIONS = {
-    "outcomes": "passed; refused, stopped: with a sentence, as expected; wrong; not converged; error",
+    "outcomes": "passed; wrong; not converged; error",
     "steps": "requested steps; parts: as many as were accepted; cuts: attempts that failed and were halved",
     "force": "largest sum of all forces in any step over the largest force; left out with inertia",
     "energy": "largest energy of any step that no column has, over the largest column of that step",
