@@ -46,8 +46,7 @@ def test_outcomes_of_a_judge():
     found = judged(lambda log: log.simulate(steep()))
     assert (found.outcome, found.good) == ("not converged", False)
     assert "did not converge" in found.said
-    assert found.steps >= 10  # what it cost is kept
-    assert found.cuts > 0
+    assert found.cuts > 0  # what it cost is kept
     found = judged(lambda log: 1 / 0)
     assert (found.outcome, found.said) == ("error", "ZeroDivisionError: division by zero")
 
