@@ -345,6 +345,7 @@ WRONG = [
     (OWN_MESH, MESH, '\nparticipant = "i"', "finger.participant", "no geometry"),
     (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", "tissue = zero"),
     (OWN_MESH, "E = 0.05", "E = -0.05", "finger.materials.tissue.E", "given -0.05"),
+    (OWN_MESH, "ness = 0.38", "ness = 0", "finger.electrical.stratum_corneum_thickness", "larger than 0"),
     (TEXTURE, "speed = 20.0", "", "motion[1].speed", "dynamics = viscous"),
     (TEXTURE, "viscosity = 1.0e-3", "", "finger.viscosity", "dynamics = viscous"),
 ]
