@@ -184,9 +184,12 @@ def scenes(folder):
     yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press, closing])
     rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
     yield Scene(FingerPad(), rough, motion=[press])
+    ended = Display(electrodes=[[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]])
+    yield Scene(FingerPad(), ended, StrongTroxel(), 10.0, [press], field="full", grounded=False)
+    yield Scene(FingerPad(), Display(), StrongTroxel(), 10.0, [press], field="auto")
 
 
-@pytest.mark.parametrize("number", range(7))
+@pytest.mark.parametrize("number", range(9))
 def test_what_is_written_is_read_back(folder, number):
     scene = list(scenes(folder))[number]
     text = dump(scene)
