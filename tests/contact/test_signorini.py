@@ -261,6 +261,17 @@ def test_a_node_that_adheres_sticks_up_to_its_cohesion_more(slip, status):
     )
 
 
+def test_cohesion_alone_is_friction_and_an_open_node_has_none():
+    alone = ContactProblem(np.array([-0.2, 0.04]), 0.1 * np.eye(2), np.zeros(1), cohesion=np.array([0.5]))
+    found = solve_contact(alone, np.array([FORWARD]))
+    assert found.status.tolist() == [STICK]
+    assert found.force[1] == pytest.approx(-0.4, rel=1e-12)
+    lifted = ContactProblem(np.array([0.2, 0.5]), 0.1 * np.eye(2), np.zeros(1), cohesion=np.array([0.5]))
+    opened = solve_contact(lifted, np.array([FORWARD]))
+    assert opened.status.tolist() == [OPEN]
+    assert not opened.force.any()
+
+
 def test_extra_unknowns_feel_the_cohesion():
     """lam_t - 2 d = 3 with the lam_t = 0.3 2 + 0.5 of a backward slip."""
     extra = ExtraUnknowns(
