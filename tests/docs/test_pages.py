@@ -29,9 +29,8 @@ from evfem.scene.motion import Motion
 from evfem.simulation.result import COLUMNS
 from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
-from evfem.textures.importing import IMPORTERS
+from evfem.textures.importers import IMPORTERS
 from evfem.tissue import space
-from evfem.tissue import space as elements
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -97,8 +96,7 @@ def understood(text):
 @pytest.mark.filterwarnings("ignore:at .* V touching skin")  # told to users of smooth screens, too
 def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
-    monkeypatch.setattr(elements, "ELEMENTS", table)
+    monkeypatch.setattr(space, "ELEMENTS", dict(space.ELEMENTS))  # a page adds one
     families = FORCE_LAWS, IMPORTERS, Motion.kinds, NamedFriction.kinds
     with ExitStack() as kept:  # what a page adds to a family goes with it
         for family in families:
