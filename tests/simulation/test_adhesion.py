@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from simulation.test_core import SCALE, WORK, block
 from simulation.test_spheres import paraboloid
+from tools.builders import resumed
 from tools.domes import Dome, dome_scene
 
 import evfem as ev
@@ -224,17 +225,8 @@ def test_what_is_no_adhesion_is_refused(make, message):
 
 
 def test_a_resumed_run_remembers_where_it_came_off():
-    class Stop:
-        def step(self, row, frame, checkpoint):
-            if row["step"] == 4:
-                self.saved = checkpoint()
-                raise ev.StopRun("enough")
-
     motion = [ev.Press(indentation=0.1, steps=1), ev.Press(indentation=-0.25, steps=4)]
-    scene = ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, adhesion=MOIST)
-    whole, stop = ev.simulate(scene), Stop()
-    part = ev.simulate(scene, observers=[stop])
-    again = ev.simulate(scene, resume=ev.result.Saved(stop.saved, part.rows))
+    whole, again = resumed(ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, adhesion=MOIST), 4)
     for name in ("applied_force", "adhesive_force", "adhesive_work"):
         assert again[name].tolist() == whole[name].tolist()
     assert again.warnings == whole.warnings

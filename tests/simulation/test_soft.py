@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from tools.builders import balance, pad_state
+from tools.builders import balance, pad_state, resumed
 from tools.domes import Dome, dome, dome_scene
 from tools.meshes import both_sides, contact_block, graded, parabola
 
@@ -237,22 +237,8 @@ def test_a_mirrored_slide_is_the_slide_mirrored():
 
 
 def test_a_resumed_run_repeats_itself(tmp_path):
-    class Stop:
-        def __init__(self, after):
-            self.after, self.saved = after, None
-
-        def step(self, row, frame, checkpoint):
-            if row["step"] == self.after:
-                self.saved = checkpoint()
-                raise ev.StopRun("enough")
-
     motion = [ev.Press(force=0.05, steps=2), ev.Slide(0.8, steps=4)]
-    surface = ev.Display(elastic=SOFT)
-    scene = ev.Scene(PAD, surface, ev.StrongTroxel(), 800.0, motion)
-    whole, stop = ev.simulate(scene), Stop(3)
-    part = ev.simulate(scene, observers=[stop])
-    saved = ev.result.Saved(stop.saved, part.rows)
-    again = ev.simulate(scene, resume=saved)
+    whole, again = resumed(ev.Scene(PAD, ev.Display(elastic=SOFT), ev.StrongTroxel(), 800.0, motion), 3)
     for name in ("applied_force", "tangential_force", "surface_sink", "stored_energy"):
         assert again[name].tolist() == whole[name].tolist()
 
