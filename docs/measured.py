@@ -273,8 +273,8 @@ def fingertip(found: Found) -> str:
     wanted, other = n["variant.wanted_over_unchanged"] - 1.0, max(gains.values())
     return filled(
         f"From 0.05 to 1 N Table 2's pad touches {gross} of Adams' gross area and {ridge} of his ridge area; "
-        f"half of all moduli add {percent(half)} at 0.5 N where {percent(wanted)} are wanted, no other single "
-        f"change more than {percent(other)}.",
+        f"half of all moduli add {percent(half)} at 0.5 N where {percent(wanted)} are wanted, no other "
+        f"single change more than {percent(other)}.",
         f"A cross-section has the same force over {width} mm.",
         f"Hovering ridged pads have {kaczmarek} of the measured medians by Kaczmarek's law and {troxel} by "
         "Strong and Troxel's.",
