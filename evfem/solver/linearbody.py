@@ -44,27 +44,6 @@ class LinearTissue:
         return self._body.full.tissue.cell_stress(self._body.whole(u))
 
 
-class LinearDrag:
-    """Drag condensed as the tissue is: its tangent at rate 1 times the rate."""
-
-    def __init__(self, matrix: Floats, pad: Ints) -> None:
-        self.matrix, self.pad = matrix, pad
-        self.rate, self._begin = 0.0, np.zeros(0)
-
-    def begin(self, u: Floats, rate: float) -> None:
-        """Start a step of `rate` > 0 from displacements u (N, dim) at rest."""
-        self.rate, self._begin = rate, u[self.pad].ravel()
-
-    def forces(self, u: Floats) -> Floats:
-        """Forces (P, dim) on the pad."""
-        return (self.rate * self.matrix @ (u[self.pad].ravel() - self._begin)).reshape(-1, u.shape[1])
-
-    def dissipation(self, u: Floats) -> float:
-        """Dissipation in the step that ends at u: N mm, in the plane per mm of depth."""
-        moved = u[self.pad].ravel() - self._begin
-        return float(self.rate * moved @ self.matrix @ moved)
-
-
 class LinearBody(Body):
     """`full` linear about displacements u (N, dim), on the nodes `pad` (P,)."""
 
@@ -102,8 +81,25 @@ class LinearBody(Body):
         pulled = self._at_base + (self.matrix @ self._strain(u)).reshape(-1, self.space.dim)
         total = np.zeros_like(u)
         total[self._bone] = -pulled.sum(axis=0)
-        total[self.pad] = pulled if self.drag_rate == 0.0 else pulled + self.drag.forces(u)
+        total[self.pad] = pulled if self.drag_rate == 0.0 else pulled + self._held(u)
         return total
+
+    def _held(self, u: Floats) -> Floats:
+        """Drag (P, dim) on the pad since the release."""
+        return (self.drag_rate * self._drag @ self._since(u)).reshape(-1, self.space.dim)
+
+    def _since(self, u: Floats) -> Floats:
+        return u[self.pad].ravel() - self._released
+
+    def release(self, u: Floats, rate: float) -> None:
+        """From now on drag of this rate holds the body back at u (N, dim); none if it is 0."""
+        self.drag_rate, self._released = rate, u[self.pad].ravel()
+
+    def drag_dissipation(self, u: Floats) -> float:
+        """Dissipation by drag in the step that ends at u: N mm, in the plane per mm of depth."""
+        if self.drag_rate == 0.0:
+            return 0.0
+        return float(self.drag_rate * self._since(u) @ self._drag @ self._since(u))
 
     def given_forces(self, u: Floats) -> Floats:
         """None: a form of the user is not linearised."""
@@ -118,7 +114,7 @@ class LinearBody(Body):
         whole[:-dim, -dim:], whole[-dim:, :-dim] = to_bone, to_bone.T
         whole[-dim:, -dim:] = -to_bone.reshape(-1, dim, dim).sum(axis=0)
         if self.drag_rate > 0.0:
-            whole[:-dim, :-dim] += self.drag_rate * self.drag.matrix
+            whole[:-dim, :-dim] += self.drag_rate * self._drag
         return np.ascontiguousarray(whole[np.triu_indices(m)])
 
     def energy(self, u: Floats) -> float:
@@ -128,8 +124,8 @@ class LinearBody(Body):
         return self.energy_at_base + float(mean @ strain)
 
     @cached_property
-    def drag(self) -> Any:
-        """Drag of a release, condensed."""
+    def _drag(self) -> Floats:
+        """Tangent of the drag at rate 1, condensed (2 P, 2 P)."""
         full, dim = self.full, self.space.dim
         full.release(self.base, 1.0)
         data = full.pattern.zeros()
@@ -137,7 +133,7 @@ class LinearBody(Body):
         full.release(self.base, 0.0)
         sparse = full.pattern.full(full.pattern.finish(data))
         shapes = np.stack([self._reached(np.eye(1, self.size, k)[0]) for k in range(self.size - dim)], axis=1)
-        return LinearDrag(shapes.T @ (sparse @ shapes), self.pad)
+        return np.asarray(shapes.T @ (sparse @ shapes))
 
     @cached_property
     def _still(self) -> Floats:
