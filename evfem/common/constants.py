@@ -62,7 +62,7 @@ FALLING = 0.9
 #: earlier iterations that are combined [A, B]
 ANDERSON_DEPTH = 3
 #: dense systems of so many unknowns are factorised in single precision and refined; half or twice of this,
-#: `OLD_FACTORS`, `LARGE_SCHUR` or `INNER` change a small tip's time by less than the 10 % that it varies [space]
+#: `OLD_FACTORS`, `LARGE_SCHUR` or `INNER` change a small tip's time by less than it varies, 10 % [space]
 LARGE_SYSTEM = 300
 #: factors of an earlier matrix serve while each round of refinement leaves less than this fraction of the
 #: residual, a matrix's own while it leaves less than twice that [space]

@@ -16,7 +16,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.contact.fullfield import FieldAttraction
-from evfem.field.columns import Columns, Nearby
+from evfem.field.columns import Columns
 from evfem.field.meanattraction import mean_pull
 
 
@@ -55,12 +55,7 @@ class DrivenFieldAttraction(FieldAttraction):
     def _columns(self) -> Columns:
         return self._of_harmonics[0][1]
 
-    def _nearby(self, x: Floats, levels: Floats) -> None:
-        """Every field is solved anew: its forces need a second potential."""
-
-    def _solved(
-        self, x: Floats, levels: Floats, slope: Floats, near: Nearby | None = None
-    ) -> tuple[None, Floats]:
+    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[None, Floats]:
         """Mean forces (L, 2) on the lines at 1 V effective, whatever the slope below."""
         pulls = (
             weight * mean_pull(columns, x, levels, self._electrodes, self.floating).forces

@@ -11,8 +11,7 @@ gap in series. Nodal forces are derivatives of the discrete energy
 The tangent of a step is that of the column law, between rough faces scaled by the ratio of the forces
 (`tangent_factor`). Where it leads nowhere, among ridges or steep waves close to a thin insulator, it is the
 field's own by differences (`fringe_stiffness`): a node's field decays within a few nodes, so every
-`APART`-th one is moved at once, and the potential follows with the factor of where it began
-(`Columns.nearby`). In every accepted state C lies between its bounds (`certificate`).
+`APART`-th one is moved at once. In every accepted state C lies between its bounds (`certificate`).
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
-from evfem.field.columns import Capacitance, Columns, Nearby
+from evfem.field.columns import Capacitance, Columns
 from evfem.surface.pad import Pad, surface_state
 
 #: gap of touching nodes, as a fraction of the insulator's reduced thickness
@@ -254,20 +253,19 @@ class FieldAttraction(Attraction):
         return found
 
     def _above(
-        self, position: Floats, lines: Any, pressing: Floats | None, near: Nearby | None = None
+        self, position: Floats, lines: Any, pressing: Floats | None
     ) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
         x, levels = self.outline(position, lines, pressing)
-        slope = surface_state(self.surface, lines @ position).slope[:, 0]
-        field, forces = self._solved(x, levels, slope, near)
+        field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope[:, 0])
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
         """Derivative of `forces` by positions, sparse (2 P, 2 P); touching nodes move along the surface."""
         lines, frame = self.visible(position), surface_state(self.surface, position)
         nodes = in_line(self._plane, self.edges)
-        closed, near = frame.gap <= TOUCHING, self._nearby(*self.outline(position, lines, pressing))
-        start = self._above(position, lines, pressing, near)[1]
+        closed = frame.gap <= TOUCHING
+        start = self._above(position, lines, pressing)[1]
         directions = np.zeros((2, self._size, 2))
         directions[0, :, 0] = 1.0
         directions[0, closed, 1], directions[1, ~closed, 1] = frame.slope[closed, 0], 1.0
@@ -276,7 +274,7 @@ class FieldAttraction(Attraction):
             moved = nodes[first::APART]
             place = position.copy()
             place[moved] += MOVED * directions[axis, moved]
-            rate = voltage**2 / MOVED * (self._above(place, lines, pressing, near)[1] - start)[nodes]
+            rate = voltage**2 / MOVED * (self._above(place, lines, pressing)[1] - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
             triplets += [(rate[:, k], 2 * nodes + k, column) for k in range(2)]
@@ -286,15 +284,9 @@ class FieldAttraction(Attraction):
         scale = sparse.diags_array(np.repeat(self.voltage_fraction(position[:, 0]) ** 2, 2))
         return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(scale @ outer)
 
-    def _nearby(self, x: Floats, levels: Floats) -> Nearby | None:
-        """Start values of the fields of close outlines; None if each is solved anew."""
-        return None if self.floating or self._electrodes is not None else self._columns.nearby(x, levels)
-
-    def _solved(
-        self, x: Floats, levels: Floats, slope: Floats, near: Nearby | None = None
-    ) -> tuple[Capacitance | None, Floats]:
+    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
         """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""
-        found = self._columns.solve(x, levels, self._electrodes, self.floating, near)
+        found = self._columns.solve(x, levels, self._electrodes, self.floating)
         along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
         return found, 0.5 * np.stack([along, found.by_level[2:].sum(axis=0)], axis=1)
 

@@ -62,10 +62,6 @@ class HeightControl:
         """The extra unknown, the bone's travel from `height` in mm, or nothing."""
         return ()
 
-    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
-        """The control at `fraction` of the way to another one of its kind."""
-        return end
-
 
 @dataclass(frozen=True)
 class Indentation(HeightControl):
@@ -75,10 +71,6 @@ class Indentation(HeightControl):
 
     def known(self, height: float) -> float:
         return self.height
-
-    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
-        assert isinstance(end, Indentation)
-        return Indentation(self.height + fraction * (end.height - self.height))
 
 
 @dataclass(frozen=True)
@@ -94,23 +86,11 @@ class Force(HeightControl):
     def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
         return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
 
-    def towards(self, end: HeightControl, fraction: float) -> Force:
-        if isinstance(end, Unsupported):
-            return self
-        assert isinstance(end, Force)
-        return Force(self.force + fraction * (end.force - self.force))
-
 
 class Unsupported(Indentation):
-    """A finger that carries no force and that nothing touches stays at `height`; touched on the way, by a
-    crest or by tissue that recovers, it gives way (`Equilibrium.step`).
-
-    >>> Unsupported(0.3).towards(Force(0.0), 0.5)
-    Force(force=0.0)
+    """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
+    begins; touched on the way, by a crest or by tissue that recovers, it gives way (`Equilibrium.step`).
     """
-
-    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
-        return end
 
 
 @dataclass(frozen=True)

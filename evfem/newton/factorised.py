@@ -384,11 +384,11 @@ class FactorisedBody:
         duration = 0.0 if dynamics is None else dynamics.step
         return Reusable(linearisation.candidates, linearisation.reusable, duration)
 
-    def resume(self, state: State, carried: Reusable) -> None:
+    def resume(self, carried: Reusable) -> None:
         """Make the factorisation again that the interrupted run had at hand."""
         self.linearisation.candidates = carried.candidates
         if (at := carried.tangent_point) is not None:
-            self.pressure.check(at.pressure)
-            self.linearisation.restore(state, at)
+            self.pressure.check(at.state.pressure)
+            self.linearisation.restore(at)
         if self.body.dynamics is not None:
             self.body.dynamics.step = carried.duration

@@ -122,10 +122,9 @@ class Interface:
         self.jumps = FrictionJumps(
             surface.friction_steps(constants.SHORT_RAMP * self.length), self.points[:, ::2]
         )
-        elastic, least = getattr(surface, "elastic", None), constants.SHORTEST_LENGTH * self.length
-        self.bed: Bed | None = None
-        if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
-            self.bed = Bed(elastic, pad, self.length, least)
+        elastic = getattr(surface, "elastic", None)
+        self._least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
+        self.bed = None if elastic is None else Bed(elastic, pad, self.length, self._least)
         self.law: FrictionLaw | None = None
         self._oscillating = OscillatingNodes(pad.nodes.size)
         self.duration = 0.0
@@ -156,8 +155,8 @@ class Interface:
                 return found
         found = surface_state(self.surface, self.places(state))
         if self.bed is not None:
-            shortened, sunk = state.strain.T
-            found = replace(found, slope=(found.slope - sunk[:, None]) / (1.0 - shortened)[:, None])
+            slope = np.linalg.solve(self._kept(state), (found.slope - state.strain[:, :, 1])[:, :, None])
+            found = replace(found, slope=np.asarray(slope[:, :, 0]))
         self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
 
@@ -176,15 +175,21 @@ class Interface:
         """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
         if self.bed is None:
             return force
-        (shortened, sunk), (along, up) = state.strain.T, force.T
-        return np.stack([(along + sunk * up) / (1.0 - shortened), up], axis=1)
+        found, pushed = force.copy(), force[:, ::2] + state.strain[:, :, 1] * force[:, 1:2]
+        found[:, ::2] = np.linalg.solve(self._kept(state), pushed[:, :, None])[:, :, 0]
+        return found
 
     def untilted(self, state: State, force: Floats) -> Floats:
         """The same attraction as above a surface that has not sunk, whose work is that of the field."""
         if self.bed is None:
             return force
-        (shortened, sunk), (along, up) = state.strain.T, force.T
-        return np.stack([along * (1.0 - shortened) - sunk * up, up], axis=1)
+        found, along = force.copy(), np.einsum("pkj,pj->pk", self._kept(state), force[:, ::2])
+        found[:, ::2] = along - state.strain[:, :, 1] * force[:, 1:2]
+        return found
+
+    def _kept(self, state: State) -> Floats:
+        """How long lengths on an elastic surface along x[, z] are for what they were, (P, d, d)."""
+        return np.asarray(np.eye(self.dim - 1) - state.strain[:, :, ::2])
 
     def unyielded(self, state: State, force: Floats) -> float:
         """By how much, relative, an elastic surface misses what forces on the nodes (P, 2) sink it by."""
@@ -280,8 +285,7 @@ class Interface:
 
     def tributary_of(self, position: Floats) -> Floats:
         """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
-        least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
-        return np.maximum(self.pad.tributary(position), least)
+        return np.maximum(self.pad.tributary(position), self._least)
 
     def tributary(self, state: State) -> Floats:
         """Tributary lengths or areas (P,) in a state."""

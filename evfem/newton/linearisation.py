@@ -30,7 +30,6 @@ from evfem.newton.interface import Interface
 from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import surface_state
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import Past
 
 
 def no_progress(residuals: list[float], same: bool) -> bool:
@@ -185,10 +184,7 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        begin, seconds, inner, past = self.body.beginning
-        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
-        more = (past.rates, past.seconds, state.given, state.strain)
-        self._made_at = TangentPoint(*at, state.status, state.pressure, inner, *more)
+        self._made_at = TangentPoint(state, self.touching, self.frozen, *self.body.beginning)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
@@ -202,21 +198,19 @@ class Linearisation:
 
     def made_at(self, state: State) -> bool:
         """Whether the factorisation is that of `state`."""
-        return self._made_at is not None and self._made_at.u is state.u
+        return self._made_at is not None and self._made_at.state.u is state.u
 
     @property
     def reusable(self) -> TangentPoint | None:
         """Point of the factorisation that the next step may use; none with the field's own stiffness."""
         return None if self.factor is None or self.fringes else self._made_at
 
-    def restore(self, state: State, at: TangentPoint) -> None:
-        """Repeats the factorisation made at `at` by the run that is resumed from `state`."""
-        self.touching, self.frozen = at.touching, at.frozen
+    def restore(self, at: TangentPoint) -> None:
+        """Repeats the factorisation that the run that is resumed made at `at`."""
+        self.touching, self.frozen = at.touched, at.frozen
         if self.body.dynamics is not None:
-            still, past = np.zeros_like(at.begin), Past(at.seconds, at.rates)
-            self.body.dynamics.begin(at.begin, still, at.duration, at.inner, past)
-        there = replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure)
-        self.factorise(replace(there, given=at.given, strain=at.strain))
+            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner, at.past)
+        self.factorise(at.state)
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:

@@ -59,8 +59,8 @@ class State:
     resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
     (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
     `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface
-    adds to the places of the pad's nodes relative to it is `given` (P, 2) in mm, its derivative along x
-    `strain` (P, 2).
+    adds to the places of the pad's nodes relative to it is `given` (P, dim) in mm, its derivatives along x[,
+    z] `strain` (P, d, dim).
     """
 
     u: Floats
@@ -95,25 +95,18 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Point of a tangent: displacements u (N, dim), voltage, pad nodes that touched (P,) when the step began,
-    whether the attraction was frozen, the displacements at the beginning of the time step (N, dim) and its
-    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, the branches' inner
-    variables when the step began, and mean rates and seconds of the part before.
+    """Where a tangent was made: at an iterate, with the pad nodes that `touched` (P,) when the step began, a
+    `frozen` attraction or not, and of the time step the displacements (N, dim) that it began with, its
+    seconds, what branches had kept, and the part before (`Body.beginning`).
     """
 
-    u: Floats
-    voltage: float
-    touching: Any
+    state: State
+    touched: Any
     frozen: bool
     begin: Floats
     duration: float
-    status: Ints
-    pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
-    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
-    rates: Floats = field(default_factory=lambda: NO_RATES)
-    seconds: float = 0.0
-    given: Floats = field(default_factory=lambda: NO_BED)
-    strain: Floats = field(default_factory=lambda: NO_BED)
+    inner: Floats
+    past: Past
 
 
 @dataclass(frozen=True, eq=False)

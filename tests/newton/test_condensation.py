@@ -53,9 +53,7 @@ def random_problem(signs=1.0, seed=4, size=40, count=70):
 
 
 def indefinite_problem():
-    """Every fourth cell negative: the interior has eigenvalues of both signs, safely away from
-    zero.
-    """
+    """Every fourth cell negative: the interior has eigenvalues of both signs, safely away from zero."""
     problem = random_problem(np.where(np.arange(70) % 4, 1.0, -1.0))
     i = np.setdiff1d(np.arange(40), KEPT)
     values = np.linalg.eigvalsh(problem.dense[np.ix_(i, i)])
@@ -132,9 +130,7 @@ def test_single_precision_is_taken_where_it_moves_the_interior_alike(stiff, real
 @every_back_end
 @pytest.mark.parametrize("case", ["rigid", "empty", "nan"])
 def test_singular_interior_is_reported_and_survived(back_end, case):
-    """An interior without an answer raises, and the next good matrix is factorised as if nothing
-    had been.
-    """
+    """An interior without an answer raises, and the next good matrix is factorised as if nothing had been."""
     unknowns = np.array([[0, 1, 2], [2, 3, 4]])
     cell = {
         "rigid": np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
