@@ -207,7 +207,7 @@ class Pardiso:
 class SuperLU:
     """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc."""
 
-    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
+    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         self.pattern, self.kept = pattern, kept
         self._interior = np.setdiff1d(np.arange(pattern.size), kept)
         self._ordering: Ints | None = None
@@ -283,7 +283,6 @@ def _has_pardiso() -> bool:
 
 
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
-    """PARDISO where evfem[fast] is installed, else SuperLU, which has no factors of `single` precision."""
-    if _has_pardiso() and not _OTHER.get():
-        return Pardiso(pattern, kept, threads, single)
-    return SuperLU(pattern, kept, threads)
+    """PARDISO where evfem[fast] is installed, else SuperLU, whose factors are never of `single` precision."""
+    kind = Pardiso if _has_pardiso() and not _OTHER.get() else SuperLU
+    return kind(pattern, kept, threads, single)
