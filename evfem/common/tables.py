@@ -182,14 +182,16 @@ def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
     allowed = f"a readable csv file with the header {','.join(header)}"
     table = read_headed(path, key, allowed, gaps=False)
     if table.names != header:
-        raise InputError(key, f"{path.name}, which starts with {','.join(table.names)[:60]!r}", allowed)
+        bare = table.names == [str(i) for i in range(1, len(table.names) + 1)]
+        start = "has no header" if bare else f"starts with {','.join(table.names)[:60]!r}"
+        raise InputError(key, f"{path.name}, which {start}", allowed)
     return [table.column(f"{key}.{name}", name, (IN.get(name),)) for name in header]
 
 
 #: a cell of a line of units
 UNIT = re.compile(r"[\[(]?([cµμunm]?m|[mu]?s|[mk]?N|N/mm|mm2|k?V|[kM]?Pa|g|m/s\^?2|1/mm|1|-|)[\])]?")
-#: name and unit in a header: x [mm], x (mm), x/mm, "x, mm", x_mm
-NAMED = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\)|[/,]\s*([^/,]+)|_([µμunm]?m|[mu]?s))?")
+#: name and unit in a header: x [mm], x (mm), x/mm, "x, mm", x_mm, x mm
+NAMED = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\)|[/,]\s*([^/,]+)|_([µμunm]?m|[mu]?s)|\s([µμunm]?m|[mk]?N))?")
 
 
 def read_headed(
@@ -222,10 +224,14 @@ def read_headed(
     if len(heads) > 1 and len(heads[-2]) == len(parts) and all(map(UNIT.fullmatch, heads[-1])):
         parts = [(name.lower(), unit.strip("[]()")) for name, unit in zip(*heads[-2:], strict=True)]
     parts = parts or [(str(i), None) for i in range(1, width + 1)]
+    while len(parts) > 1 and not parts[-1][0]:  # a separator at the end of the header
+        parts.pop()
     width = len(parts)
     values = []
     for number, line in rows:
         row = _numbers(_cells(line, separator))
+        while len(row) > width and math.isnan(row[-1]):  # separators at the end of a line
+            row.pop()
         if len(row) != width or not (gaps or all(map(math.isfinite, row))):
             rule = f"{width} {'' if gaps else 'finite '}numbers on each line"
             raise InputError(key, f"{path.name}, line {number}: {line[:60]!r}", rule)

@@ -217,7 +217,7 @@ def draw_outline(ax: Axes, mesh: Mesh, frame: Frame, field: str, scale: Scale) -
 
 def half_edges(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
     """The pad's edges in halves (H, 2, 2), and the node that each belongs to (H,)."""
-    edges = mesh.edges_of("pad")
+    edges = mesh.sides_of("pad")
     pairs = edges[:, :2] if edges.shape[1] == 2 else np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])
     start, end = points[pairs[:, 0]], points[pairs[:, 1]]
     middle = 0.5 * (start + end)

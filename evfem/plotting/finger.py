@@ -270,8 +270,8 @@ def _draw_tissue(
 def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
     from matplotlib.collections import LineCollection
 
-    edges = mesh.cell_edges.reshape(-1, mesh.cell_edges.shape[-1])
-    owner, number = np.repeat(mesh.region, mesh.corners), mesh.edges[1].ravel()
+    edges = mesh.cell_sides.reshape(-1, mesh.order + 1)
+    owner, number = np.repeat(mesh.region, mesh.corners), mesh.sides[1].ravel()
     _, first, count = np.unique(number, return_index=True, return_counts=True)
     border = edges[first[(count == 1) | (np.bincount(number, owner) != count * owner[first])]]
     order = [0, 2, 1] if mesh.order == 2 else [0, 1]
@@ -280,7 +280,7 @@ def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
 
 def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: fields.Window) -> None:
     """What the hole in the middle is, where the tissue has one around the bone."""
-    edges = mesh.edges_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
+    edges = mesh.sides_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
     around, count = np.unique(edges, return_counts=True)
     if not count.size or np.any(count != 2):
         return

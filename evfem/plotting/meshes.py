@@ -76,7 +76,7 @@ def cut_open(mesh: Mesh) -> tuple[Ints, Ints]:
     """Outer faces (K, 4 or 9), and their regions (K,), of the cells behind the middle of a solid's length."""
     middle = 0.5 * (mesh.points[:, 2].min() + mesh.points[:, 2].max())
     kept = mesh.points[mesh.cells[:, :8], 2].mean(axis=1) < middle
-    _, of_cell = mesh.faces
+    _, of_cell = mesh.sides
     alone = np.bincount(of_cell[kept].ravel(), minlength=len(of_cell) * 6)[of_cell[kept]] == 1
     region = np.broadcast_to(mesh.region[kept, None], alone.shape)
-    return mesh.cell_faces[kept][alone], region[alone]
+    return mesh.cell_sides[kept][alone], region[alone]

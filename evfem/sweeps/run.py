@@ -96,7 +96,11 @@ def sweep(
     >>> result.rows[2]["message"]
     'motion[0].gap: given -1.0; allowed: a gap in mm from 0 to 200'
     """
-    plan = plan if isinstance(plan, Sweep) else load(plan)
+    if isinstance(plan, (str, Path)):
+        plan = load(plan)
+    if not isinstance(plan, Sweep):
+        allowed = "Sweep(scene, grid={key: values}), or the path of a sweep file"
+        raise InputError("sweep", f"a {type(plan).__name__}", allowed)
     with ExitStack() as stack:
         pool = stack.enter_context(open_pool(workers, scheduler))
         folder = None if out is None else SweepFolder(Path(out), resume, overwrite)

@@ -134,10 +134,7 @@ MISTAKES = [
     ),
     ("[grid]\nsurface.friction = [0.1]\n[gird]", "gird: given an unknown key; allowed: grid?"),
     ("outputs = ['force.last']\n[grid]\nsurface.y = [0.1]", "outputs: force.last: given an unknown key"),
-    (
-        "outputs = ['voltage']\n[grid]\nsurface.y = [0.1]",
-        'outputs: given "voltage"; allowed: COLUMN.STATISTIC',
-    ),
+    ("outputs = ['voltage']\n[grid]\nsurface.y = [0.1]", 'outputs: given "voltage"; allowed'),
     (
         "outputs = ['voltage.max.2']\n[grid]\nsurface.y = [0.1]",
         'given "voltage.max.2"; allowed: motions from 0 to 1',
