@@ -154,6 +154,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int | None]:
         "plan": _plan,
         "check": _check,
         "sensitivities": _sensitivities,
+        "impedance": _impedance,
         "study": _study,
         "sweep": _sweep,
         "mesh": _mesh,
@@ -299,15 +300,25 @@ def _check(given: argparse.Namespace) -> int:
 
 
 def _sensitivities(given: argparse.Namespace) -> None:
+    from evfem.response.file import load
     from evfem.response.sensitivities import sensitivities
     from evfem.runfolder import write_sensitivities
 
-    scene = _scene(given.scene)
-    folder = given.out or Path(f"{scene.name}-out")
-    found = sensitivities(scene, given.by, progress=True)
+    scene, by, columns = (_scene(given.scene), given.by, None) if given.by else load(given.scene)
+    folder = given.out or Path(f"{given.scene.stem}-out")
+    found = sensitivities(scene, by, columns, progress=True)
     for key in (key for key in found.parameters if key in found.reasons):
         notices.tell(f"{key}: {found.reasons[key]}")
     print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
+
+
+def _impedance(given: argparse.Namespace) -> None:
+    from evfem.response.impedance import impedance
+    from evfem.runfolder import write_impedance
+
+    found = impedance(_scene(given.scene), given.frequencies, given.axis)
+    folder = given.out or Path(f"{given.scene.stem}-out")
+    print(f"{found}\ntable in {write_impedance(found, folder)}", flush=True)
 
 
 def _study(given: argparse.Namespace) -> None:

@@ -211,12 +211,9 @@ def skin_of(mesh: Mesh) -> tuple[Mesh, Ints, Ints]:
     """
     if mesh.dim != 3:
         raise InputError("skin", f"the mesh of a cross-section ({mesh.kind})", "a finger in three dimensions")
-    _, of_cell = mesh.faces
-    behind = np.nonzero(np.bincount(of_cell.ravel())[of_cell] == 1)[0]
-    outer = mesh.outer_faces
-    on_pad = np.isin(outer, mesh.node_sets["pad"]).all(axis=1)
-    nodes, cells = np.unique(outer[on_pad], return_inverse=True)
-    behind = behind[on_pad]
+    behind = np.nonzero(mesh.in_set("pad"))[0]
+    outer = mesh.sides_of("pad")
+    nodes, cells = np.unique(outer, return_inverse=True)
     kind = "quad" if mesh.order == 1 else "quad9"
     faces = cells.reshape(-1, outer.shape[1])
     return Mesh(mesh.points[nodes], faces, kind, mesh.region[behind], mesh.region_names), nodes, behind

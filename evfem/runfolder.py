@@ -26,6 +26,7 @@ from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
+from evfem.response.impedance import Impedance
 from evfem.response.sensitivities import Sensitivities
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import ANOTHER, Checkpoint
@@ -34,6 +35,8 @@ from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import columns_of, csv_header, csv_line, read_rows
 from evfem.simulation.result import Frame, Result, Row, Saved, provenance
 
+#: what a picture of derivatives shows if it can, the first first
+FORCES = ("tangential_force", "normal_force", "electrostatic_force")
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000
 MANIFEST = ".evfem-files"
@@ -374,10 +377,21 @@ def write_sensitivities(found: Sensitivities, folder: Path) -> Path:
     with disk(f"write to {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
     found.to_csv(table := folder / "sensitivities.csv")
-    for column in ("tangential_force", "normal_force", "electrostatic_force"):
-        if np.isfinite(list(found.effects(column)[0].values())).any():
+    for column in (*FORCES, *found.columns):
+        if column in found.columns and np.isfinite(list(found.effects(column)[0].values())).any():
             _save(tornado(found, column).figure, folder / "sensitivities.png")
             break
+    return table
+
+
+def write_impedance(found: Impedance, folder: Path) -> Path:
+    """Write `impedance.csv` and its picture into a folder; returns the table's path."""
+    from evfem.plotting.response import impedance
+
+    with disk(f"write to {folder}"):
+        folder.mkdir(parents=True, exist_ok=True)
+    found.to_csv(table := folder / "impedance.csv")
+    _save(impedance(found).figure, folder / "impedance.png")
     return table
 
 

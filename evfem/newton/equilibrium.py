@@ -72,7 +72,7 @@ class Equilibrium:
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
             given=NO_BED if self.interface.bed is None else zero,
-            strain=NO_BED if self.interface.bed is None else zero,
+            strain=NO_BED if self.interface.bed is None else np.zeros((nodes, dim - 1, dim)),
             rates=np.zeros_like(self.body.body.rates(still)),
         )
         attraction = self.attraction_at(state, state, voltage)
@@ -117,9 +117,8 @@ class Equilibrium:
         return self._given_way(old, held, frozen, found) if found.touching.any() else found
 
     def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
-        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`.
-
-        Without mass every height above is an equilibrium too: its lowest node then just does not touch.
+        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`: of all
+        heights above, which are equilibria too, the one where its lowest node just does not touch.
         """
         lifted = self._followed(old, replace(target, height=Force(0.0)), frozen, touched)
         gap = float(self.interface.surface_at(lifted).gap.min())

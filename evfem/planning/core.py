@@ -186,8 +186,8 @@ class Closing:
 
     @property
     def _nodes(self) -> Ints:
-        mesh = self.mesh
-        return np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
+        """Nodes of the pad (P,)."""
+        return np.unique(self.mesh.sides_of("pad"))
 
     @cached_property
     def closed(self) -> float:
@@ -208,7 +208,7 @@ class Closing:
         of no stiffness of their own have another's, and resolve everything.
         """
         mesh, laws = self.mesh, self.scene.finger.materials
-        sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
+        sides = mesh.cell_sides
         on_pad = np.isin(sides, self._nodes)
         cell, side = np.nonzero(on_pad.all(axis=2))
         nodes, place = np.unique(sides[cell, side], return_inverse=True)

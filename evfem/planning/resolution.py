@@ -85,9 +85,10 @@ def _unresolved(scene: Scene, mesh: Mesh, axis: int) -> str | None:
 
 def _pad_edges(mesh: Mesh, axis: int) -> Ints:
     """Ends (K, 2) of the pad's edges; in space of its faces' that run more along x (`axis` 0) or z (1)."""
+    sides = mesh.sides_of("pad")
     if mesh.dim == 2:
-        return mesh.edges_of("pad")[:, :2]
-    faces = mesh.faces_of("pad")[:, :4]
+        return sides[:, :2]
+    faces = sides[:, :4]
     edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     way = np.abs(np.diff(mesh.points[edges], axis=1)[:, 0, ::2])
     return edges[way[:, axis] > way[:, 1 - axis]]

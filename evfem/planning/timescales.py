@@ -54,12 +54,11 @@ def _charge(scene: Scene) -> list[str]:
     solid, film = (Layer(one.thickness, Dielectric(*_constants(one, seen.frequency))) for one in layers)
     leak = scene.drive.gap_conductivity
     stack = Sandwich.of(solid, film, frequency=None, gap_conductivity=leak, gap_eps_r=seen.gap_eps_r)
-    skin, gap, _ = (float(np.max(rate)) for rate in stack.rates)
+    (skin, gap, _), (upper, _, lower) = stack.rates, stack.reduced(0.0)
     said = []
     if gap > 0.0:
         said.append(f"charge: the gap leaks below {gap / (2.0 * np.pi):.3g} Hz")
     if skin > 0.0:
-        upper, lower = (float(np.max(one.thickness)) for one in (stack.skin, stack.insulator))
         corner = skin / (1.0 + upper / lower) / (2.0 * np.pi)
         said.append(f"charge: the skin conducts below {corner:.3g} Hz")
     relaxing = _relaxing(seen.sandwich) if scene.drive.resolved else []

@@ -16,7 +16,7 @@ from evfem.common.checks import Values
 from evfem.electrostatics.dielectrics import seen_at
 from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
-from evfem.electrostatics.relaxation import Sandwich, stack_of
+from evfem.electrostatics.relaxation import Sandwich
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
@@ -136,7 +136,7 @@ class Electrics:
         """The layers of a resolved drive as its charges see them."""
         assert self.drive is not None
         gap = {"gap_conductivity": self.drive.gap_conductivity, "gap_eps_r": self.gap_eps_r}
-        return stack_of(self.skin, self.insulator, frequency=self.frequency, **gap)
+        return Sandwich.of(self.skin, self.insulator, frequency=self.frequency, **gap)
 
     @property
     def conducts(self) -> bool:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
+from evfem.surface.skin import make_skin
 
 SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
 #: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, which grow with the
@@ -23,7 +24,8 @@ PACKAGES, BODY, BODY_GROWTH, CONTACT = 0.13e9, 0.0226e9, 1.1, 27.0
 def check_space(scene: Scene, mesh: Mesh) -> None:
     """Raise InputError for what a finger of this mesh cannot do."""
     mistakes = Mistakes()
-    mistakes.found = [InputError(*one) for one in (_beyond_space if mesh.dim == 3 else _beyond_plane)(scene)]
+    beyond = _beyond_space(scene, mesh) if mesh.dim == 3 else _beyond_plane(scene)
+    mistakes.found = [InputError(*one) for one in beyond]
     mistakes.report()
 
 
@@ -36,9 +38,12 @@ def _beyond_plane(scene: Scene) -> Iterator[tuple[str, str, str]]:
         yield "surface", f"heights or friction over x and z {PLANE}", allowed
 
 
-def _beyond_space(scene: Scene) -> Iterator[tuple[str, str, str]]:
-    if scene.ground.elastic is not None:
-        yield "surface.elastic", f"an elastic surface {SOLID}", "a rigid one, or a finger in the plane"
+def _beyond_space(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, str, str]]:
+    skin = make_skin(mesh)
+    apart, layers = skin.spacing(mesh.points[skin.nodes]), getattr(scene.ground.elastic, "layers", ())
+    if layers and layers[0].thickness < apart:
+        allowed = f"an upper layer at least as thick as the pad's nodes are apart, {apart:.2g} mm"
+        yield "surface.elastic", f"one {layers[0].thickness:g} mm thick {SOLID}", allowed
     if scene.solver.contact != "exact":
         yield "solver.contact", f"{scene.solver.contact} {SOLID}", "exact"
     if scene.law is not None and scene.field != "local":

@@ -40,7 +40,7 @@ SUNK = 1e-6
 def outside(model: Model) -> Ints:
     """Nodes of the finger's boundary that no contact holds: all but those of `pad` that may touch."""
     mesh, pad = model.mesh, model.pad
-    facets = mesh.outer_edges if mesh.dim == 2 else mesh.outer_faces
+    facets = mesh.outer_sides
     return np.setdiff1d(facets, pad.nodes[pad.free])
 
 

@@ -181,7 +181,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         step=row["step"],
         time=row["time"],
         position=row["position"],
-        displacement=state.u.copy(),
+        displacement=model.body.whole(state.u).copy(),
         gap=on_pad(surface.gap, np.nan),
         contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
         shear_traction=on_pad(_shear(state) / share, 0.0),

@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
 from evfem.common import notices
 from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.common.pools import blas_limits, loaded_blas
-from evfem.errors import ABSENT, InputError, StopRun
+from evfem.errors import ABSENT, InputError, NotConverged, StopRun
 from evfem.newton.control import Target
 from evfem.planning.core import Closing
 from evfem.protocols import Observer, TimeSignal
@@ -27,6 +30,9 @@ from evfem.scene.scene import SIGNALS, Scene
 from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import Request, Run, Start
 from evfem.solver.stepping import Path
+
+#: forces that have an error; those below `FAINT` of the largest have none of their own
+FORCES, FAINT = ("normal_force", "tangential_force", "electrostatic_force"), 1e-3
 
 _PLACE = number("a place in mm between -1000 and 1000", Within(-1000.0, 1000.0), "mm")
 _SECONDS = number("a time in s, not negative, up to 1e6", Within(0.0, 1e6), "s")
@@ -107,6 +113,15 @@ class Loop:
         last, rows = scene.courses[-1:], self._run.rows
         held = any(one.force is not None or one.hold == "force" for one in last)
         self._load: float | None = rows[-1]["applied_force"] if held else None
+        self._true: Loop | None = None
+        self._asked: list[Asked] = []
+
+    def linearised(self) -> Loop:
+        """The same with tissue linear from now on; this one goes on behind it, when its error is read."""
+        loop = copy(self)
+        loop._run, loop._true, loop._reasons = self._run.linearised(), self, self._reasons.copy()
+        self._observers = ()
+        return loop
 
     def step(
         self,
@@ -161,6 +176,8 @@ class Loop:
             self._load = self._run.rows[-1]["applied_force"]
         elif course.indentation is not None:
             self._load = None
+        if self._true is not None:
+            self._asked.append(asked)
         reasons = self._told(frame)
         self._reasons += reasons
         if reasons:
@@ -178,6 +195,26 @@ class Loop:
             found.provenance["stopped"] = "; ".join(self._reasons)
         self._tell("finished", found)
         return found
+
+    @property
+    def error(self) -> float:
+        """Largest error of a force in any step so far, relative to its largest size; 0 unless linearised.
+
+        Of the normal, the tangential and the electrostatic force. The steps since it was last read are done
+        again without linearisation, which takes as long as that does. Infinite where one of them fails.
+        """
+        if self._true is None:
+            return 0.0
+        try:
+            while self._asked:
+                self._true.step(**vars(self._asked[0]))
+                del self._asked[0]
+        except NotConverged:
+            return math.inf
+        runs = self._run, self._true._run
+        found, true = (np.array([[row[name] for name in FORCES] for row in run.rows]) for run in runs)
+        size = np.abs(true).max(axis=0)
+        return float((np.abs(found - true).max(axis=0) / np.maximum(size, FAINT * size.max())).max())
 
     def __repr__(self) -> str:
         """Number of steps, place and forces."""
@@ -278,6 +315,8 @@ class Loop:
         run, voltage = self._run, abs(course.voltage or 0.0)
         if voltage <= self._largest:
             return
+        if self._true is not None:
+            raise InputError("voltage", voltage, "at most `largest_voltage` of a loop that is linearised")
         scene = self._moved(self._at_will.and_then(course))
         cored = (Closing(scene, run.model.mesh).core is None) != (run.model.closing.core is None)
         if cored or not run.scene.electrics.acts:
@@ -312,6 +351,7 @@ def _exactly(path: Path, asked: Asked) -> Path:
 def loop(
     scene: Scene | str | PathLike[str],
     *,
+    linearised: bool = False,
     observers: Sequence[Observer] = (),
     largest_voltage: float | None = None,
 ) -> Loop:
@@ -321,6 +361,10 @@ def loop(
     ----------
     scene
         A `Scene`, whose `motion` may be empty, or the path of a scene file.
+    linearised
+        The tissue is linear from the end of the scene's motion on, which is quicker; contact, friction and
+        attraction stay exact, and `Loop.error` tells what the forces lack. Not in time, and without forms
+        of one's own.
     observers
         Told as in `simulate`: `started` at once, `step` after every step, `finished` with every
         `Loop.result()`.
@@ -345,4 +389,5 @@ def loop(
     >>> steps.step(indentation=0.1).motion, len(steps.result().rows)
     ('step', 3)
     """
-    return Loop(scene_at(scene), observers, largest_voltage)
+    whole = Loop(scene_at(scene), observers, largest_voltage)
+    return whole.linearised() if linearised else whole

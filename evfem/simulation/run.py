@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -53,7 +54,7 @@ from evfem.simulation.checkpoint import (
 )
 from evfem.simulation.doubtful import advice, deepest, doubtful, off, outside, through, unheld
 from evfem.simulation.ledger import Ledger, frame_of
-from evfem.simulation.model import Model, make_model
+from evfem.simulation.model import Model, linearised, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.simulation.works import SubstepWork
 from evfem.solver.stepping import Path, Stepper
@@ -162,13 +163,9 @@ class Run:
         self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
-        self.stepper = Stepper(
-            self.model.equilibrium,
-            scene.coupling,
-            body=self.model.body,
-            allowed=allowed_error(scene),
-            rise=lambda old, new, target: rise(SubstepWork(self.model, old, new), target),
-        )
+        allowed, body = allowed_error(scene), self.model.body
+        equilibrium = self.model.equilibrium
+        self.stepper = Stepper(equilibrium, scene.coupling, body=body, allowed=allowed, rise=self._rise)
         if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
@@ -186,6 +183,19 @@ class Run:
             self.state = replace(self.state, hand=at_rest(self.state.bone.size))
         if resume is not None:
             self._restore(resume)
+
+    def _rise(self, old: State, new: State, target: Target) -> float:
+        """The climb between two states."""
+        return rise(SubstepWork(self.model, old, new), target)
+
+    def linearised(self) -> Run:
+        """Another run that goes on from here with tissue that is linear about the present state."""
+        run = copy(self)
+        run.model = model = linearised(self.model, self.state)
+        run.ledger = replace(self.ledger, model=model, sums=self.ledger.sums.copy())
+        run.stepper = replace(self.stepper, equilibrium=model.equilibrium, body=model.body, rise=run._rise)
+        run.rows, run.frames, run.probed = self.rows.copy(), self.frames.copy(), self.probed.copy()
+        return run
 
     @property
     def voltage(self) -> Any:
@@ -337,7 +347,7 @@ class Run:
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if self.probes is not None:
-            self.probed.append(self.probes.at(self.state.u, self.state.inner))
+            self.probed.append(self.probes.at(self.model.body.whole(self.state.u), self.state.inner))
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))

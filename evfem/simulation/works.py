@@ -299,7 +299,7 @@ class SubstepWork:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
         places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
         pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
-        forces = attraction.way_forces(places, volts, old.touching, pressing)
+        forces = attraction.column_law.forces_along(places, volts, old.touching, pressing)
         return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:
@@ -319,7 +319,10 @@ class SubstepWork:
         """Ways (P,) along an elastic surface, as long as it is stretched."""
         if not self.new.strain.size:
             return length
-        return np.asarray(length * (1.0 - 0.5 * (self.old.strain + self.new.strain)[:, 0]))
+        way = self.places[1] - self.places[0]
+        along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        stretch = 0.5 * (self.old.strain + self.new.strain)[:, :, ::2]
+        return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
     @property
     def _seconds(self) -> float:

@@ -1,6 +1,4 @@
-"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is
-renewed.
-"""
+"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is renewed."""
 
 from dataclasses import replace
 
@@ -141,6 +139,8 @@ HISTORIES = [
     ([1e-3, 2e-3], True),  # grows
     ([10.0, 0.2], True),  # still far away, however quick
     ([2e-8, 9e-9], False),  # there
+    ([0.0, 0.04], True),  # grows from a balanced start
+    ([0.0, 0.0], False),  # balanced, contact not settled
 ]
 
 
@@ -151,7 +151,7 @@ def test_a_factorisation_is_kept_while_few_iterations_are_left(history, anew):
     assert linear.refactorise_if_needed(state, history)  # there is none
     assert linear.refactorise_if_needed(state, history) == anew
     assert linear.record.factorisations == 1 + anew
-    linear.discard()
+    linear.factor = None
     assert linear.reusable is None
     assert linear.refactorise_if_needed(state, history)
 

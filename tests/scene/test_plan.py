@@ -1,6 +1,4 @@
-"""What a scene needs: terms that are left out must not matter, and the numbers are those of the
-mesh.
-"""
+"""What a scene needs: terms that are left out must not matter, and the numbers are those of the mesh."""
 
 from dataclasses import replace
 

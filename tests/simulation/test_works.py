@@ -1,6 +1,4 @@
-"""Closed books: works, energies and dissipations of every row add up, each from its own
-definition.
-"""
+"""Closed books: works, energies and dissipations of every row add up, each from its own definition."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -102,9 +100,7 @@ def test_what_the_way_loses_falls_with_the_square_of_the_step(name):
 
 @pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_body_that_swings_loses_its_energy_to_the_integrator():
-    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half
-    the step.
-    """
+    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half the step."""
     lost = []
     for times in (1, 2):
         motion = (
