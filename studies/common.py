@@ -1,6 +1,8 @@
 """What the studies share: writing a study down, runs side by side, laws and measurements."""
 
 import json
+import platform
+import subprocess
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -70,7 +72,7 @@ class Study:
         printed = {key: one.described() for key, one in self.paper.items()}
         said = {"tables": self.tables, "printed": printed}
         made = {"eps_0_F_per_m": ev.eps_0, "quick": quick, "parameters": self.parameters}
-        made |= {"seconds": since_begin()}
+        made |= {"seconds": since_begin(), "commit": commit(), "processor": processor()}
         result = {
             "study": self.name,
             "numbers": {key: float(value) for key, value in self.numbers.items()},
@@ -103,6 +105,24 @@ class Study:
         for title, lines in self.tables.items():
             blocks += [f"## {title}", "\n".join(lines)]
         return "\n\n".join(blocks) + "\n"
+
+
+def commit() -> str | None:
+    """The commit of the checkout that runs, with `-dirty` where files differ; None outside of one."""
+    words = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=8"]
+    try:
+        return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def processor() -> str:
+    """Name of the processor, or its kind where the system does not say more."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.machine()
 
 
 def since_begin() -> float | None:

@@ -196,7 +196,7 @@ def full_over_columns(participant: str, gap: float) -> float:
         finger = replace(ev.FingerPad.participant(participant, resolution="coarse"), ridges=ridges)
         model, position = rigid_pad(finger, gap)
         attraction = model.attraction
-        forces = attraction.forces if ridges else attraction.column_forces
+        forces = attraction.forces if ridges else attraction.column_law.forces
         pull[ridges] = forces(position, 1.0, None)[:, 1].sum()
     return float(pull[True] / pull[False])
 

@@ -71,5 +71,6 @@ def draw(series: list[Series], rigid: dict[str, float]) -> Figure:
             ax.plot(one.x, one.y, "o-", color=colour, lw=1.2, ms=4, label=f"{thickness} mm thick")
         ax.axhline(rigid[name], color="black", ls="--", lw=0.8, label="rigid")
         ax.set(xlabel="modulus of the surface (MPa)", ylabel=label, xscale="log")
+        ax.margins(y=0.1)
     axes[0].legend(fontsize=7)
     return figure

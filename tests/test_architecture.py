@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray"},
-        "arrays quadrature constants notices checks views pools digest storage manifest tables pictures",
+        "constants arrays quadrature notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces solids quality groups file"),
     "tissue": (
@@ -55,15 +55,14 @@ ROOMS = {
         "strategy state hand control condensation interface linearisation pressure anderson travel "
         "factorised equilibrium",
     ),
-    "solver": ({"numpy"}, "relaxation hold path stepping"),
+    "solver": ({"numpy"}, "relaxation hold path stepping linearbody"),
     "scene": (
         {"numpy", "tomli_w"},
         "motion terms electrics keys probes options scene serialiser format schema file spatial",
     ),
     "planning": (
         {"numpy"},
-        "resolution loaddrift partchecks parts plausibility fieldchoice core adhesion timescales "
-        "pathdependence plan",
+        "resolution loaddrift parts plausibility fieldchoice core timescales plan",
     ),
     "simulation": (
         {"numpy", "scipy"},
@@ -72,7 +71,7 @@ ROOMS = {
     "sweeps": ({"numpy", "tomli_w", "tqdm", "pyarrow"}, "samples file folder table run check"),
     "response": (
         {"numpy", "scipy"},
-        "parameters parts tangent lines sensitivities uncertainty design impedance",
+        "parameters parts tangent lines sensitivities file uncertainty design impedance",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (

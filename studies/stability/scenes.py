@@ -54,9 +54,9 @@ def block(columns: int = 8, rows: int = 4, width: float = 4.0, height: float = 2
 
 def shaken(mesh: Mesh, share: float, seed: int = 7) -> Mesh:
     """Inner nodes moved at random by up to that share of the shortest edge at hand."""
-    outer = np.unique(mesh.outer_edges[:, :2])
+    outer = np.unique(mesh.outer_sides[:, :2])
     inner = np.setdiff1d(np.arange(len(mesh.points)), outer)
-    edges, _ = mesh.edges
+    edges, _ = mesh.sides
     length = np.linalg.norm(np.diff(mesh.points[edges], axis=1)[:, 0], axis=1)
     shortest = np.full(len(mesh.points), np.inf)
     np.minimum.at(shortest, edges.ravel(), np.repeat(length, 2))

@@ -192,6 +192,14 @@ def test_what_is_no_measurement_is_refused(make, sentence):
         make()
 
 
+def test_separators_at_the_ends_of_lines_and_units_after_a_blank(tmp_path):
+    """As profilometers write: a header and lines that end with one comma, or two."""
+    path = tmp_path / "scan.csv"
+    path.write_text("Lateral um,Load mN,\n0.0,-2.0,,\n500.0,4.0,,\n")
+    curve = MeasuredCurve.from_csv(path, columns={"position": 1, "normal_force": 2})
+    assert (curve.at.tolist(), curve.values.tolist()) == ([0.0, 0.5], [-0.002, 0.004])
+
+
 def test_a_file_in_newtons_is_divided_by_its_depth(tmp_path):
     path = tmp_path / "load.csv"
     path.write_text("applied_force,contact_width,sd\n0.2,30,1\n0.5,45,2\n")

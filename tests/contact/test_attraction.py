@@ -223,8 +223,8 @@ def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, 
     position = (mesh.points + u)[pad.nodes]
     rule = Attraction(Kaczmarek(), LAYERS, pad, surface)
     weights = {1: [1 / 2, 1 / 2], 2: [1 / 6, 4 / 6, 1 / 6]}[order]
-    quadrature = (np.linspace(0.0, 1.0, order + 1)[None], np.array(weights))
-    points = facet_points(space, "pad", quadrature)
+    places = (np.linspace(0.0, 1.0, order + 1)[:, None], np.array(weights))
+    points = facet_points(space, "pad", places)
     w = SimpleNamespace(
         x=points.x, n=points.normal, law=rule.law, layers=LAYERS, voltage=800.0, surface=surface
     )

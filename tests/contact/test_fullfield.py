@@ -389,7 +389,7 @@ def test_harmonics_of_a_square_wave_add_up():
     square = replace(DRY, waveform="square")  # a skin whose permittivity falls with the frequency
     hover = [ev.Hover(gap=0.02)]
     attraction = make_model(driven("full", square, hover)).attraction
-    assert sum(one.share for one in attraction.harmonics) == pytest.approx(1.0)
+    assert sum(one.weight for one in attraction.harmonics) == pytest.approx(1.0)
     local = make_model(driven("local", square, hover)).attraction
     pad, points = arc(12, 3.0, 2.0)
     points[:, 1] = 0.0003
@@ -399,7 +399,7 @@ def test_harmonics_of_a_square_wave_add_up():
     given = {"edges": facing(pad, points), "skin": skin, "harmonics": attraction.harmonics}
     flat = type(attraction)(*of, pad, surface, "normal", **given)
     pulls = [forces[:, 1].sum() for forces in (flat.forces(points, 50.0, None),
-                                               flat.column_forces(points, 50.0, None))]  # fmt: skip
+                                               flat.column_law.forces(points, 50.0, None))]  # fmt: skip
     assert pulls[0] == pytest.approx(pulls[1], rel=1e-3)
 
 
@@ -425,8 +425,8 @@ def test_the_exact_encoding_drives_the_full_field():
     assert result.applied_force == pytest.approx(left, rel=1e-6)
 
 
-def test_the_stiffness_under_an_electrode_that_ends_is_solved_anew(monkeypatch):
-    """A field that starts from nearby knows of one electrode without end alone."""
+def test_the_stiffness_under_an_electrode_that_ends(monkeypatch):
+    """One column against differences of forces."""
     pad, points = arc(12, 3.0, 1.0)
     points[:, 1] += 0.01
     _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, 0.13, 1.0]]))

@@ -76,9 +76,9 @@ def test_a_mesh_without_a_pad_edge_is_refused(sets):
 def test_gradient_of_the_lengths_by_central_differences(edges):
     pad = pad_of(edges)
     x = np.array([0.0, 3.1, 1.2, 2.7, 5.0])[: pad.nodes.size]
-    of, moved, value = pad.length_gradient(x)
+    of, moved, value = pad.tributary_gradient(np.column_stack([x, x]))
     gradient = np.zeros((pad.nodes.size, pad.nodes.size))
-    np.add.at(gradient, (of, moved), value)
+    np.add.at(gradient, (of, moved // 2), value)
     h = 1e-4
     for i, unit in enumerate(np.eye(pad.nodes.size)):
         difference = (pad.length(x + h * unit) - pad.length(x - h * unit)) / (2 * h)

@@ -134,6 +134,10 @@ def test_profile_from_a_file(tmp_path):
         ("x,height\n0,1\n", "at least two points"),
         ("x,height\n0,1\n2,1\n1,1\n", "2, then 1 .points 2, 3"),
         ("x,height\n0,1\n0,2\n", "increasing"),
+        (
+            "0.0 0.1\n1.0 0.2\n",
+            "scan.csv, which has no header; allowed: a readable csv file with the header x,height",
+        ),
     ],
 )
 def test_wrong_files_are_refused_with_the_place(tmp_path, text, words):

@@ -62,14 +62,14 @@ def test_volume(offset):
 def test_surface_is_pad_bone_and_rim(ridges, order):
     """No cracks: the faces of one cell only are those of the three sets, and every node has a cell."""
     mesh = tip(ridges=ridges).mesh(order)
-    faces = [mesh.faces_of(name) for name in ("pad", "bone", "rim")]
+    faces = [mesh.sides_of(name) for name in ("pad", "bone", "rim")]
     if order == 2:
         assert {len(face) for face in faces[0]} == {9}
-    assert sum(len(one) for one in faces[:2]) == len(mesh.outer_faces)
+    assert sum(len(one) for one in faces[:2]) == len(mesh.outer_sides)
     assert len(faces[2]) > 0
     assert len(np.unique(mesh.cells)) == len(mesh.points)
     free = ev.Fingertip(ridges=ridges, resolution="coarse", rim="free").mesh(order)
-    assert len(free.faces_of("bone")) == len(faces[1]) - len(faces[2])
+    assert len(free.sides_of("bone")) == len(faces[1]) - len(faces[2])
     np.testing.assert_array_equal(free.node_sets["rim"], mesh.node_sets["rim"])
 
 

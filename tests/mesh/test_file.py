@@ -108,7 +108,7 @@ def test_pad_is_reduced_to_the_outline(tmp_path):
     parts["point_data"]["pad"][:] = 1.0
     meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
     mesh = meshfile.read(tmp_path / "mesh.vtu", REGIONS)
-    np.testing.assert_array_equal(mesh.node_sets["pad"], np.unique(mesh.outer_edges))
+    np.testing.assert_array_equal(mesh.node_sets["pad"], np.unique(mesh.outer_sides))
 
 
 @pytest.mark.parametrize(

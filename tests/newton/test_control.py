@@ -7,7 +7,7 @@ import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import OPEN, STICK
-from evfem.newton.control import FollowFriction, Force, GivenVoltage, Unsupported, VoltageProblem
+from evfem.newton.control import FollowFriction, Force, GivenVoltage, VoltageProblem
 
 REACTION = np.array([0.2, -3.0])
 
@@ -18,7 +18,6 @@ def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
     assert (force.free, force.known(0.7)) == (True, 0.7)
     assert force.missing(0.7, REACTION) == pytest.approx(-2.0)
     assert force.missing(0.7, np.array([0.2, -5.0])) == 0.0
-    assert force.towards(Force(9.0), 0.25) == Force(6.0)
 
 
 # -- the voltage that follows a friction force ----------------------------------------------------------
@@ -97,10 +96,3 @@ def test_only_at_the_limit_of_a_pad_that_sticks_the_old_voltage_is_kept(wish, st
     assert control.fallback(old, found) == (GivenVoltage(321.0) if kept else None)
     assert control.fallback(old, None) == GivenVoltage(321.0)
     assert GivenVoltage(5.0).fallback(old, None) is None
-
-
-def test_a_force_acts_on_the_way_from_or_to_a_loose_finger():
-    """The ends themselves keep their own controls (`Run._path`)."""
-    for force in (0.0, 1e-9):
-        assert Unsupported(0.3).towards(Force(force), 0.5) == Force(force)
-        assert Force(force).towards(Unsupported(0.3), 0.5) == Force(force)

@@ -78,7 +78,7 @@ def test_one_iteration_of_the_whole_step_leaves_a_quadratic_rest(options, move):
     state = equilibrium.step(state, Target.held(state.bone + 1e-2 * np.array(move) * [1.0, -1.0], voltage))
     rest = []
     for size in (2e-3, 5e-4):
-        equilibrium.body.linearisation.discard()
+        equilibrium.body.discard()
         equilibrium.step(
             replace(state, last_increment=0.0 * state.last_increment),
             Target.held(state.bone + size * np.array(move) * [1.0, -1.0], voltage),

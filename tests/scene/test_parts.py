@@ -192,7 +192,7 @@ FRICTION = [
     (friction(lambda pressure, mu, speed, age: None), f"{NAMES} that returns None"),
     (
         friction(lambda pressure, mu, speed, age: np.zeros(2)),
-        "a bound of shape (2,) for arrays of shape (6,)",
+        "bound(pressure, mu, speed, age) of shape (2,) for arrays of shape (6,)",
     ),
 ]
 ROUGH = [

@@ -36,7 +36,7 @@ def test_a_boundary_outside_the_pad_that_passes_the_glass_is_told_with_its_place
     assert ev.simulate(scene(10.0)).warnings == []
     result = ev.simulate(scene(0.5))
     mesh, frame = result.mesh, result.frames[-1]
-    facets = mesh.outer_edges if mesh.dim == 2 else mesh.outer_faces
+    facets = mesh.outer_sides
     nodes = np.setdiff1d(facets, mesh.node_sets["pad"])
     glass = mesh.points[mesh.node_sets["pad"], 1].min()
     depth = glass - (mesh.points + frame.displacement)[nodes, 1]

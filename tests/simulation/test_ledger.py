@@ -309,7 +309,7 @@ def shares(state):
     result, model, _ = run()
     left, right = np.full(len(model.mesh.points), np.inf), np.full(len(model.mesh.points), -np.inf)
     x = model.mesh.points[:, 0] + state.u[:, 0]
-    for start, end, middle in result.mesh.edges_of("pad"):
+    for start, end, middle in result.mesh.sides_of("pad"):
         a, L = x[start], x[end] - x[start]
         for node, begin, finish in ((start, 0.0, 1 / 6), (middle, 1 / 6, 5 / 6), (end, 5 / 6, 1.0)):
             left[node] = min(left[node], a + begin * L)

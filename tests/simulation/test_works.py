@@ -277,7 +277,9 @@ def test_the_field_stretches_with_the_forces_on_the_way():
         SimpleNamespace(place=long * np.ones((3, 2)), contact_force=load * np.ones((3, 2)))
         for long, load in ((1.0, 0.2), (1.5, 0.6))
     )
-    assert SubstepWork(model, old, new)._stretching() == pytest.approx(3 * 0.5, rel=1e-12)
+    assert SubstepWork(model, old, new)._stretching(model.attraction.charging) == pytest.approx(
+        3 * 0.5, rel=1e-12
+    )
     np.testing.assert_allclose(seen, 0.2 + 0.4 * np.outer(works.WAY, nodes), rtol=1e-12)
 
 

@@ -147,8 +147,14 @@ MISTAKES = [
     ),
     (f"{SAMPLED}surface.y = {{ normal = [2.0, 0.0] }}", "samples.parameters.surface.y.normal: given 0.0"),
     (f"{SAMPLED}surface.y = {{ normal = [2.0] }}", "samples.parameters.surface.y.normal: given [2.0]"),
-    (f"{SAMPLED}surface.y = {{ between = [0.0, 1.0] }}", "samples.parameters.surface.y: given neither"),
-    (SAMPLED.replace("seed = 1\n", "") + "surface.y = { normal = [0.0, 1.0] }", "samples.seed: missing"),
+    (
+        f"{SAMPLED}surface.y = {{ between = [0.0, 1.0] }}",
+        "samples.parameters.surface.y.uniform: given neither uniform nor normal",
+    ),
+    (
+        SAMPLED.replace("seed = 1\n", "") + "surface.y = { normal = [0.0, 1.0] }",
+        "samples.seed: missing",
+    ),
     (
         SAMPLED.replace("seed = 1", "seed = -1") + "surface.y = { normal = [0.0, 1.0] }",
         "samples.seed: given -1",

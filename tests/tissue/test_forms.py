@@ -46,7 +46,7 @@ def test_nail_bed_by_hand(element):
     term = make_term(space, nail_bed, "top", boundary=True)
     u = np.tile([0.3, -0.1], (space.size, 1))
     expected = np.zeros_like(u)
-    for edge in space.mesh.edges_of("top"):
+    for edge in space.mesh.sides_of("top"):
         expected[edge] += 0.5 * 0.02 * np.outer(SHARES[element], [0.3, -0.1])
     np.testing.assert_allclose(term.forces(u), expected, atol=1e-16)
     # a linear field: work 0.02 int u^2 over the edge, u = (x, 1), from 0 to 2
