@@ -117,10 +117,13 @@ class Ledger:
         model = self.model
         if model.attraction is None or (adhesive := model.attraction.adhesive) is None:
             return np.zeros(state.bone.size), np.zeros_like(withheld)
-        found = model.equilibrium.adhesion_at(state)
+        electric = model.attraction.electric
+        found = state.attraction  # where nothing else attracts: staggered rounds end within the tolerance
+        if electric is not None and electric.acts(state.voltage):
+            found = model.equilibrium.interface.tilted(state, model.equilibrium.adhesion_at(state))
         own, both = adhesive.restored(ON), model.attraction.restored(state.voltage)
         share = 0.0 if own is None or both is None else own[0] / np.where(both[0] > 0.0, both[0], np.inf)
-        return model.equilibrium.interface.tilted(state, found).sum(axis=0), np.asarray(share * withheld)
+        return found.sum(axis=0), np.asarray(share * withheld)
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
         """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""

@@ -177,6 +177,24 @@ def test_friction_sees_adhesion_as_a_load():
     assert result.adhesive_force[-1] == pytest.approx(covered, rel=0.15)
 
 
+def test_staggered_rounds_without_a_voltage_have_no_electrostatic_force():
+    """Their attraction is that of the round before, within the tolerance of the last one."""
+    motion = [ev.Press(indentation=0.5, steps=2), ev.VoltageRamp(voltage=100.0, steps=1)]
+    surface = ev.Sinusoid(terms=[[0.0127, 1.2, 5.2]], insulator=ev.Layer(0.007, 3.0), friction=0.9)
+    scene = ev.Scene(
+        PAD,
+        surface,
+        ev.Kaczmarek(),
+        0.0,
+        motion,
+        adhesion=ev.Capillary(0.02, 78.5, 0.009),
+        coupling="staggered",
+    )
+    found = ev.simulate(scene)
+    assert found.electrostatic_force[:2].tolist() == [0.0, 0.0]
+    assert found.electrostatic_force[2] > 1e-6
+
+
 def test_rough_faces_out_of_reach_do_not_adhere():
     """Closed faces 2 um apart, a law that ends at 1 um: the friction is that without adhesion."""
     pad = ev.FingerPad(resolution="coarse", ridges=False)
