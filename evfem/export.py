@@ -285,7 +285,7 @@ class ParaViewSeries:
         if self.path.suffix != ".pvd":
             raise InputError("path", str(path), "a file name that ends in .pvd")
         self._mesh: Mesh | None = None
-        self._rows = [row for row in earlier if self.frame_path(int(row["step"])).exists()]
+        self.rows = [row for row in earlier if self.frame_path(int(row["step"])).exists()]
 
     def frame_path(self, step: int) -> Path:
         """File of the fields of a step."""
@@ -309,13 +309,13 @@ class ParaViewSeries:
             fields = {name: getattr(frame, name)[nodes] for name in ("displacement", *POINT_FIELDS)}
             frame = replace(frame, **fields, **{name: getattr(frame, name)[behind] for name in CELL_FIELDS})
         write_frame(mesh, frame, path, single=self.single, compressed=self.compressed)
-        self._rows = [old for old in self._rows if old["step"] < row["step"]] + [row]
+        self.rows = [old for old in self.rows if old["step"] < row["step"]] + [row]
 
     def write_index(self) -> None:
         """Write the .pvd file in one step; every file it names is complete."""
         root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
         collection = ElementTree.SubElement(root, "Collection")
-        for row, value in zip(self._rows, instants(self._rows), strict=True):
+        for row, value in zip(self.rows, instants(self.rows), strict=True):
             name = self.frame_path(int(row["step"])).name
             ElementTree.SubElement(collection, "DataSet", timestep=repr(value), part="0", file=name)
         ElementTree.indent(root)

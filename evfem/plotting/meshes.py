@@ -42,9 +42,8 @@ def _draw_plane(mesh: Mesh, ax: Axes) -> None:
     outlines = mesh.points[rounds(mesh)]
     for (name, number), color in zip(mesh.region_names.items(), cycle(REGIONS), strict=False):
         cells, label = list(outlines[mesh.region == number]), name.replace("_", " ")
-        ax.add_collection(
-            PolyCollection(cells, facecolors=color, edgecolors="white", linewidths=0.2, label=label)
-        )
+        patches = PolyCollection(cells, facecolors=color, edgecolors="white", linewidths=0.2, label=label)
+        ax.add_collection(patches)
     ax.set_xlabel("x (mm)")
     ax.set_ylabel("y (mm)")
 

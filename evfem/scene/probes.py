@@ -171,7 +171,6 @@ class ProbeHistory:
 
 
 def _components(dim: int) -> dict[str, tuple[str, ...]]:
-    """The components of every quantity in so many dimensions."""
     return {**QUANTITIES, **{name: QUANTITIES[name][:dim] for name in ("position", "displacement")}}
 
 

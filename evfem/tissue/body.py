@@ -115,6 +115,10 @@ class Body:
             term.add_tangent(u, self.pattern, data)
         return self.pattern.finish(data)
 
+    def whole(self, u: Floats) -> Floats:
+        """Displacements (N, dim) of all nodes in a state that has u: here the same."""
+        return u
+
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) at the end of a step that ends at u."""
         return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)

@@ -6,8 +6,8 @@ from tools.meshes import block
 
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh, raised
-from evfem.surface.pad import Pad, _near, fold, make_pad, reach, surface_state
-from evfem.surface.surfaces import Flat, Sinusoid
+from evfem.surface.pad import Pad, fold, make_pad, reach, surface_state
+from evfem.surface.surfaces import Sinusoid
 
 CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
 
@@ -129,13 +129,6 @@ def test_a_touching_node_that_faces_up_has_no_width():
     assert widths(CHAIN, np.array([0.0, 1.0, 3.0, 2.5]), [-1.0, -1.0, -1.0, 1.0]) == (0.0, 0.0)
 
 
-def test_frame_on_a_flat_surface():
-    found = surface_state(Flat(y=-0.5), np.array([[3.0, 0.25], [4.0, -0.75]]))
-    assert found.gap.tolist() == [0.75, -0.25]
-    assert found.normal_gap.tolist() == [0.75, -0.25]
-    assert found.stretch.tolist() == [1.0, 1.0]
-
-
 def test_frame_on_a_sinusoid_by_hand():
     # h = 0.2 sin(3 x) at x = 0: slope 0.6, no curvature; at 3 x = pi/2: crest, curvature -0.2 * 9
     surface = Sinusoid(terms=[[0.2, 3.0, 0.0]], y=1.0)
@@ -188,22 +181,6 @@ def test_a_stroke_beyond_the_end_of_another_crosses_nothing():
     assert folded(overhang) is None
     near = [[0.0, 0.0], [2.0, 1.0], [3.0, -1.0], [4.0, -1.0], [4.0, 2.0], [1.9, 1.2], [2.6, 0.9]]
     assert folded(near) is None
-
-
-@pytest.mark.parametrize("place", [(0.0, 0.0), (20.0, 0.0), (0.0, 20.0), (-30.0, 40.0)])
-def test_segments_are_near_where_their_boxes_overlap(place):
-    random = np.random.default_rng(4)
-    begin = random.uniform(0.0, 2.0, (12, 2)) + place
-    end = begin + random.uniform(-2.0, 2.0, (12, 2))
-
-    def overlap(a, b):
-        """Neither lies wholly to one side of the other, along x or y."""
-        low, high = np.minimum(begin, end), np.maximum(begin, end)
-        return all(high[a, i] >= low[b, i] and high[b, i] >= low[a, i] for i in (0, 1))
-
-    pairs = {(a, b) for a in range(12) for b in range(a + 1, 12) if overlap(a, b)}
-    assert 5 < len(pairs) < 60
-    assert set(zip(*(one.tolist() for one in _near(begin, end)), strict=True)) == pairs
 
 
 def test_neighbours_that_touch_must_not_change_places():

@@ -1,6 +1,4 @@
-"""The parametric finger: outline and ridges on their formula, layers as offsets, counts, symmetry,
-quality.
-"""
+"""The finger by parameters: outline and ridges on their formula, offset layers, counts, symmetry, quality."""
 
 import numpy as np
 import pytest

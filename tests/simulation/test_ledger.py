@@ -38,9 +38,7 @@ FINGER = MeshedFinger(block(20, 2, sag=0.05), {"tissue": LAW}, SKIN, TAU)
 
 @cache
 def run():
-    """The result, the scene's model, and the state before the first and after every step; no step
-    in parts.
-    """
+    """The result, the model, and the state before the first and after every step; no step in parts."""
     lowest = np.min(_outline()[:, 1] - WAVES.height(_outline()[:, 0]))
     surface = WAVES.shifted(lowest - G0)
     solver = Solver(element="q2", dynamics="inertial")

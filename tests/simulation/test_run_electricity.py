@@ -40,9 +40,7 @@ def test_staggered_iterations_end_where_the_monolithic_ones_do(direction):
 
 
 def direct_force(mesh, displacement, gap_to, voltage):
-    """Quadrature of (8b) over the deformed outline: vertical traction per projected length, edge
-    by edge.
-    """
+    """Quadrature of (8b) over the deformed outline: vertical traction per projected length, edge by edge."""
     s, weight = np.polynomial.legendre.leggauss(12)
     shape = np.array([0.5 * s * (s - 1.0), 0.5 * s * (s + 1.0), 1.0 - s**2])
     slope = np.array([s - 0.5, s + 0.5, -2.0 * s])

@@ -1,6 +1,4 @@
-"""Laws against their definitions, each other and linear elasticity; derivatives against
-differences.
-"""
+"""Laws against their definitions, each other and linear elasticity; derivatives against differences."""
 
 import numpy as np
 import pytest
