@@ -132,6 +132,7 @@ def test_two_layers_of_unlike_thickness_under_a_cylinder(below, half_width, expe
         assert one == pytest.approx(wanted, rel=off)
 
 
+@pytest.mark.slow  # the table of a stack 2500 times as thick as its upper layer
 @pytest.mark.parametrize(("half_width", "load"), [(0.5, 0.0037056526), (1.0, 0.0111773257)])
 def test_a_coated_half_plane_under_a_cylinder(half_width, load):
     stack = ev.ElasticStack([ev.ElasticLayer(*COATED), ev.ElasticLayer(0.08, 0.48, 500.0)])
