@@ -1,16 +1,11 @@
 r"""An elastic surface below the pad: how far it gives way under each node, and how it then slopes.
 
-Contact and attraction act on finger and surface, equal and opposite. With the nodal forces F on the finger
-and the surface's compliance C (`evfem.surface.elastic`) the surface gives way by -C F. Relative to it a node
-is, as it would be above a rigid one, at
-
-.. math:: r_i = x_i + u_i + (C F)_i ,
-
-so that gaps, slips, the places of heights, friction and voltage, and the attraction are functions of r. The
-energy :math:`F \cdot C F / 2` depends on the places of the nodes too: so contact and attraction act along the
-normal of the sunk surface, whose tangent is :math:`(1 + u_x', h' - w')`, with
-:math:`(-u_x', w')_i = \sum_j \partial_{x_i} C_{ij} F_j`; a slip is as long as that tangent. In space that
-holds along x and along z.
+With the nodal forces F on the finger and the surface's compliance C (`evfem.surface.elastic`) the surface
+gives way by -C F. Relative to it a node is, as it would be above a rigid one, at :math:`r_i = x_i + u_i + (C
+F)_i`: gaps, slips, friction and attraction are functions of r. The energy :math:`F \cdot C F / 2` depends on
+the places of the nodes too: so contact and attraction act along the normal of the sunk surface, whose tangent
+is :math:`(1 + u_x', h' - w')`, with :math:`(-u_x', w')_i = \sum_j \partial_{x_i} C_{ij} F_j`; in space
+along x and along z.
 
 Exact where the strain of the surface is small. A node's own length may change on the way, which moves the
 surface by less than the strain of the finger over the number of its nodes; no force belongs to that.

@@ -69,17 +69,22 @@ class Electrics:
         """The same below so much skin (mm)."""
         return replace(self, skin=(self.drive or Drive()).skin_layer(thickness, self.eps_r))
 
+    @property
+    def resolved(self) -> bool:
+        """Whether charges flow in time."""
+        return self.drive is not None and self.drive.resolved
+
     @cached_property
     def voltage(self) -> Any:
         """The scene's voltage in the run: constant, instantaneous (resolved drive) or rms (mean over the
         cycle of a periodic signal).
         """
         drive = self.drive
-        if drive is not None and not drive.resolved and (found := powers(self.given)) is not None:
-            return found[0]
-        if drive is None or not drive.resolved or not isinstance(self.given, float):
+        if drive is None:
             return self.given
-        return drive.signal(self.given)
+        if drive.resolved:
+            return drive.signal(self.given) if isinstance(self.given, float) else self.given
+        return self.given if (found := powers(self.given)) is None else found[0]
 
     @cached_property
     def frequency(self) -> float | None:

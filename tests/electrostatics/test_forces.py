@@ -1,6 +1,4 @@
-"""Closed-form forces: the paper's numbers, quadrature against an adaptive one, inversions of
-thresholds.
-"""
+"""Closed-form forces: the paper's numbers, quadrature against an adaptive one, inversions of thresholds."""
 
 import warnings
 
@@ -27,9 +25,7 @@ MIL = 0.0254
 
 
 def adaptive(law, pad, gap, layers, ellipse):
-    """The same integral by nested adaptive quadrature of pad.gap(x, y), x = a sin t and y = c sin
-    v.
-    """
+    """The same integral by nested adaptive quadrature of pad.gap(x, y), x = a sin t and y = c sin v."""
     scale = np.sqrt(gap + layers.reduced) / pad.height**0.5
 
     def over(function, end):

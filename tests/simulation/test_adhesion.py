@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from simulation.test_core import SCALE, WORK, block
 from simulation.test_spheres import paraboloid
+from tools.builders import resumed
 from tools.domes import Dome, dome_scene
 
 import evfem as ev
@@ -176,6 +177,24 @@ def test_friction_sees_adhesion_as_a_load():
     assert result.adhesive_force[-1] == pytest.approx(covered, rel=0.15)
 
 
+def test_staggered_rounds_without_a_voltage_have_no_electrostatic_force():
+    """Their attraction is that of the round before, within the tolerance of the last one."""
+    motion = [ev.Press(indentation=0.5, steps=2), ev.VoltageRamp(voltage=100.0, steps=1)]
+    surface = ev.Sinusoid(terms=[[0.0127, 1.2, 5.2]], insulator=ev.Layer(0.007, 3.0), friction=0.9)
+    scene = ev.Scene(
+        PAD,
+        surface,
+        ev.Kaczmarek(),
+        0.0,
+        motion,
+        adhesion=ev.Capillary(0.02, 78.5, 0.009),
+        coupling="staggered",
+    )
+    found = ev.simulate(scene)
+    assert found.electrostatic_force[:2].tolist() == [0.0, 0.0]
+    assert found.electrostatic_force[2] > 1e-6
+
+
 def test_rough_faces_out_of_reach_do_not_adhere():
     """Closed faces 2 um apart, a law that ends at 1 um: the friction is that without adhesion."""
     pad = ev.FingerPad(resolution="coarse", ridges=False)
@@ -224,17 +243,8 @@ def test_what_is_no_adhesion_is_refused(make, message):
 
 
 def test_a_resumed_run_remembers_where_it_came_off():
-    class Stop:
-        def step(self, row, frame, checkpoint):
-            if row["step"] == 4:
-                self.saved = checkpoint()
-                raise ev.StopRun("enough")
-
     motion = [ev.Press(indentation=0.1, steps=1), ev.Press(indentation=-0.25, steps=4)]
-    scene = ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, adhesion=MOIST)
-    whole, stop = ev.simulate(scene), Stop()
-    part = ev.simulate(scene, observers=[stop])
-    again = ev.simulate(scene, resume=ev.result.Saved(stop.saved, part.rows))
+    whole, again = resumed(ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, adhesion=MOIST), 4)
     for name in ("applied_force", "adhesive_force", "adhesive_work"):
         assert again[name].tolist() == whole[name].tolist()
     assert again.warnings == whole.warnings
