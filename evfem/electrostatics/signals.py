@@ -94,8 +94,7 @@ class VoltageProfile:
         inside = (self.position > start) & (self.position < stop)
         x = np.concatenate([[start], self.position[inside], [stop]])
         middle, half = 0.5 * (x[1:] + x[:-1]), 0.5 * np.diff(x)
-        point = 3.0**-0.5 * half  # Gauss: exact for squares of straight lines
-        square = sum(np.asarray(self(at)) ** 2 for at in (middle - point, middle + point))
+        square = sum(np.asarray(self(middle + side * half)) ** 2 for side in (-(3.0**-0.5), 3.0**-0.5))
         return float(np.sqrt(np.sum(half * square) / (stop - start)))
 
     def steepest(self) -> float:
