@@ -116,8 +116,8 @@ class Surface(Protocol):
 class Elastic(Protocol):
     """How a surface gives way under forces on strips of it, linear and quasi-static.
 
-    Optional: `compliance_slope(x, lengths)` (2n, 2n), its derivative by the place of the displaced strip;
-    otherwise it is differenced.
+    Optional: `compliance_slope(x, lengths)` (1, 2n, 2n), in space (2, 3n, 3n), its derivatives by the place
+    of what is displaced; otherwise it is differenced.
     """
 
     def compliance(self, x: Any, lengths: Any) -> Any:
@@ -125,6 +125,7 @@ class Elastic(Protocol):
 
         `x` and `lengths` (n,) are their middles and lengths in mm; first the n displacements into the
         surface, then the n along +x; columns in the same order, forces on the surface into it and along +x.
+        In space squares: `x` (n, 2) has their x and z, `lengths` their areas in mm2; (3n, 3n), last along +z.
         """
 
 

@@ -82,11 +82,11 @@ def draw(series: list[Series]) -> Figure:
     off = kept["off.friction"]
     left.plot(off.x, off.y, "o--", color="black", lw=1.0, ms=4, label="no voltage")
     keys = [name.removesuffix(".gain") for name in kept if name.endswith(".gain")]
-    for key, colour in zip(keys, colours, strict=False):
+    for key, colour, size in zip(keys, colours, (8, 4, 4), strict=False):
         label = key.replace("Hz", " Hz")
         one, gain = kept[f"{key}.friction"], kept[f"{key}.gain"]
-        left.plot(one.x, one.y, "o-", color=colour, lw=1.2, ms=4, label=label)
-        right.plot(gain.x, gain.y, "o-", color=colour, lw=1.2, ms=4, label=label)
+        left.plot(one.x, one.y, "o-", color=colour, lw=1.2, ms=size, label=label)
+        right.plot(gain.x, gain.y, "o-", color=colour, lw=1.2, ms=size, label=label)
     left.set(xlabel="film (um)", ylabel="friction (N/mm)", ylim=(0.0, None))
     right.set(xlabel="film (um)", ylabel="more friction by the voltage (%)", ylim=(0.0, None))
     left.legend(fontsize=7)

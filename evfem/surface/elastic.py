@@ -36,7 +36,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
-from evfem.surface.patches import Patches
+from evfem.surface.patches import Patches, assembled
 
 #: the table of a kernel: so many distances, up to so many lengths over which it falls off
 TABULATED, FARTHEST = 1500, 36.0
@@ -240,23 +240,16 @@ class Kernels:
 
     def compliance(self, x: Floats, lengths: Floats) -> Floats:
         """`Layered.compliance` (2n, 2n)."""
-        (i, j), (normal, tangent, cross) = np.triu_indices(x.size), self._means(x, lengths)[:, 1]
-        found = np.zeros((2, x.size, 2, x.size))
-        found[0, i, 0, j] = found[0, j, 0, i] = normal
-        found[1, i, 1, j] = found[1, j, 1, i] = tangent
-        found[0, j, 1, i] = found[1, i, 0, j] = -cross
-        found[0, i, 1, j] = found[1, j, 0, i] = cross
-        return found.reshape(2 * x.size, 2 * x.size)
+        return self._assembled(x, lengths, 1, 1.0)
 
     def slope(self, x: Floats, lengths: Floats) -> Floats:
-        """`Layered.compliance_slope` (2n, 2n)."""
-        (i, j), (normal, tangent, cross) = np.triu_indices(x.size), self._means(x, lengths)[:, 0] / self.unit
-        found = np.zeros((2, x.size, 2, x.size))
-        found[0, i, 0, j], found[0, j, 0, i] = normal, -normal
-        found[1, i, 1, j], found[1, j, 1, i] = tangent, -tangent
-        found[0, i, 1, j] = found[0, j, 1, i] = cross
-        found[1, i, 0, j] = found[1, j, 0, i] = -cross
-        return found.reshape(1, 2 * x.size, 2 * x.size)
+        """`Layered.compliance_slope` (1, 2n, 2n)."""
+        return self._assembled(x, lengths, 0, -1.0)[None] / self.unit
+
+    def _assembled(self, x: Floats, lengths: Floats, of: int, parity: float) -> Floats:
+        normal, tangent, cross = self._means(x, lengths)[:, of]
+        blocks = {(0, 0): normal, (1, 1): tangent, (0, 1): cross, (1, 0): -cross}
+        return assembled(np.triu_indices(x.size), blocks, x.size, parity)
 
     def _means(self, x: Floats, lengths: Floats) -> Floats:
         """Slopes and means of the three kernels over each pair of strips, (3, 2, pairs); the last kept."""

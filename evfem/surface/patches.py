@@ -18,6 +18,7 @@ Contact Mechanics (1985), doi:10.1017/CBO9781139171731, ch. 3. Units: mm, N, MPa
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -71,19 +72,23 @@ class Patches:
         """Mean displacements (3 n, 3 n) of squares of these areas (n,) at x (n, 2) by forces on them: first
         into the surface, then along both axes of x; forces likewise.
         """
-        i, j = np.triu_indices(len(x))
-        side = np.sqrt(areas)
-        return _assembled(i, j, self._means(x[i] - x[j], side[i], side[j]), len(x), 1.0)
+        return self._matrix(x, areas, self._means, 1.0)
 
     def slope(self, x: Floats, areas: Floats) -> Floats:
         """Derivatives (2, 3 n, 3 n) of `compliance` by the place of the displaced square along both axes."""
-        i, j = np.triu_indices(len(x))
-        side, step = np.sqrt(areas), STEP * float(np.sqrt(areas.min()))
-        found = []
-        for way in step * np.eye(2):
-            ahead, behind = (self._means(x[i] - x[j] + sign * way, side[i], side[j]) for sign in (1.0, -1.0))
-            found.append(_assembled(i, j, (ahead - behind) / (2.0 * step), len(x), -1.0))
-        return np.stack(found)
+        step = STEP * float(np.sqrt(areas.min()))
+
+        def rate(way: Floats, at: Floats, a: Floats, b: Floats) -> Floats:
+            return (self._means(at + way, a, b) - self._means(at - way, a, b)) / (2.0 * step)
+
+        return np.stack([self._matrix(x, areas, partial(rate, way), -1.0) for way in step * np.eye(2)])
+
+    def _matrix(self, x: Floats, areas: Floats, of: Callable[..., Floats], parity: float) -> Floats:
+        (i, j), side = np.triu_indices(len(x)), np.sqrt(areas)
+        normal, mean, along, turned, first, second = of(x[i] - x[j], side[i], side[j])
+        blocks = {(0, 0): normal, (1, 1): mean + along, (2, 2): mean - along, (1, 2): turned, (2, 1): turned}
+        blocks |= {(0, 1): first, (0, 2): second, (1, 0): -first, (2, 0): -second}
+        return assembled((i, j), blocks, len(x), parity)
 
     def _means(self, x: Floats, a: Floats, b: Floats) -> Floats:
         """N, A, D cos 2 theta, D sin 2 theta, K cos theta and K sin theta (6, m), as means over squares of
@@ -101,18 +106,19 @@ class Patches:
         return np.where(r > self.places[-1], 0.0, found)
 
 
-def _assembled(i: Ints, j: Ints, means: Floats, n: int, parity: float) -> Floats:
-    """Matrix (3 n, 3 n) of the kernels' means (6, m) between squares i and j (m,): with the places exchanged
-    those without K are the same times `parity`, those with K their opposite.
+def assembled(
+    pairs: tuple[Ints, Ints], blocks: dict[tuple[int, int], Floats], n: int, parity: float
+) -> Floats:
+    """Matrix of the kernels' means (m,) from component q of force to p of displacement, `blocks` (p, q),
+    between places `pairs` (m,), (m,) of n: exchanged, those of one kind, normal or tangential, are the same
+    times `parity`, those of two their opposite.
     """
-    normal, mean, along, turned, first, second = means
-    found = np.zeros((3, n, 3, n))
-    blocks = {(0, 0): normal, (1, 1): mean + along, (2, 2): mean - along, (1, 2): turned, (2, 1): turned}
-    blocks |= {(0, 1): first, (0, 2): second, (1, 0): -first, (2, 0): -second}
+    (i, j), size = pairs, 1 + max(p for p, _ in blocks)
+    found = np.zeros((size, n, size, n))
     for (p, q), value in blocks.items():
         found[p, i, q, j] = value
         found[p, j, q, i] = value * (parity if (p == 0) == (q == 0) else -parity)
-    return found.reshape(3 * n, 3 * n)
+    return found.reshape(size * n, size * n)
 
 
 def love(x: Floats, a: Floats, b: Floats) -> Floats:

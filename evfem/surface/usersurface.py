@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from evfem.common.checks import set_frozen
 from evfem.errors import InputError, quoted
 from evfem.protocols import CompleteSurface, Surface
-from evfem.surface.surfaces import Flat
-from evfem.surface.ways import OneWay
+from evfem.surface.surfaces import Friction, GivesWay, Insulator, RigidSurface, Shift
 from evfem.tensor import Array, derivative, difference
 
 #: step of differences in mm
@@ -42,18 +39,18 @@ def completed(surface: Surface) -> CompleteSurface:
         )
         raise InputError("surface", quoted(surface), allowed)
     keys = ("friction", "y", "insulator", "elastic")
-    plain = Flat(**{"friction": 0.0} | {key: getattr(surface, key) for key in keys if hasattr(surface, key)})
-    return OwnSurface(surface, plain, plain.y)
+    return OwnSurface(surface, **{key: getattr(surface, key) for key in keys if hasattr(surface, key)})
 
 
 @dataclass(frozen=True)
-class OwnSurface(OneWay):
-    """A user's surface `own` with derivatives, and with what it does not say itself taken from `plain`."""
+class OwnSurface(RigidSurface):
+    """A user's surface `own` with derivatives, and with what it says itself of the other fields."""
 
     own: Any
-    plain: Flat
-    y: float | None = field(default=None)
-    is_flat = False
+    friction: Friction = 0.0
+    y: Shift = None
+    insulator: Insulator = None
+    elastic: GivesWay = None
 
     @property
     def angle(self) -> float:  # type: ignore[override]
@@ -61,34 +58,9 @@ class OwnSurface(OneWay):
         return float(getattr(self.own, "angle", 0.0))
 
     @property
-    def insulator(self) -> Any:
-        """Layer over the electrode, or None."""
-        return self.plain.insulator
-
-    @property
-    def elastic(self) -> Any:
-        """How the surface gives way, or None."""
-        return self.plain.elastic
-
-    @property
-    def friction(self) -> Any:
-        """The user's number or table."""
-        return self.plain.friction
-
-    @property
     def has_friction(self) -> bool:
         """Whether the friction coefficient may be positive anywhere."""
-        return self.plain.has_friction or hasattr(self.own, "friction_coefficient")
-
-    @property
-    def friction_jumps(self) -> Array:
-        """Jumps of a table of friction; a method of the user's has none."""
-        return self.plain.friction_jumps
-
-    @property
-    def friction_ramps(self) -> Array:
-        """Ramps of a table of friction; a method of the user's has none."""
-        return self.plain.friction_ramps
+        return super().has_friction or hasattr(self.own, "friction_coefficient")
 
     def height(self, x: Array) -> Array:
         """Height (mm) of the unshifted profile at x (mm)."""
@@ -107,15 +79,9 @@ class OwnSurface(OneWay):
     def friction_coefficient(self, x: Array) -> Array:
         """The user's own coefficient, or that of the number or table."""
         own = getattr(self.own, "friction_coefficient", None)
-        return np.asarray(own(x)) if own is not None else self.plain.friction_coefficient(x)
+        return np.asarray(own(x)) if own is not None else super().friction_coefficient(x)
 
     def friction_slope(self, x: Array) -> Array:
         """Derivative of the friction coefficient (1/mm)."""
         own = getattr(self.own, "friction_coefficient", None)
-        return difference(own, np.real(x), LENGTH) if own is not None else self.plain.friction_slope(x)
-
-    def shifted(self, y: float) -> OwnSurface:
-        """The same surface with its height shifted by `y` (mm)."""
-        moved = copy(self)
-        set_frozen(moved, y=y)
-        return moved
+        return difference(own, np.real(x), LENGTH) if own is not None else super().friction_slope(x)

@@ -6,6 +6,7 @@ import pytest
 import evfem as ev
 from evfem.contact.bed import slopes
 from evfem.surface.elastic import transfer
+from evfem.surface.patches import love
 
 #: u_z E*/P, u_x E*/Q, u_z mu/Q at x/H, by quadrature of the inverse transform to 10 digits
 POINT_LOADS = {
@@ -93,6 +94,51 @@ def test_the_slope_of_the_compliance_is_its_derivative():
     np.testing.assert_allclose(slopes(Own(), x, lengths), exact, atol=1e-4 * np.abs(exact).max())
 
 
+def under_cylinder(layers, half_width, radius=10.0, count=200):
+    """Load, depth and pressure in the middle of a rigid cylinder on layers whose compliances add up: strips
+    between the zeros of Chebyshev's polynomials, and the depth at which no pressure is infinite at the edge.
+    """
+    angle = np.linspace(0.0, np.pi, count + 1)
+    ends = -half_width * np.cos(angle)
+    x, lengths = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
+    given = sum(layer.compliance(x, lengths)[:count, :count] for layer in layers)
+    profile = (ends[1:] ** 3 - ends[:-1] ** 3) / (6.0 * radius * lengths)
+    force = np.linalg.solve(given, np.column_stack([np.ones(count), -profile]))
+    middle = 0.5 * (angle[1:] + angle[:-1])
+    edge = np.polynomial.polynomial.polyfit(
+        middle[:8] ** 2, (force / lengths[:, None] * np.sin(middle)[:, None])[:8], 2
+    )[0]
+    depth = -edge[1] / edge[0]
+    whole = force @ [depth, 1.0]
+    return whole.sum(), depth, whole[count // 2] / lengths[count // 2]
+
+
+TISSUE, COATED = ev.ElasticLayer(0.08, 0.48, 2.0), (1.0, 0.3, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("below", "half_width", "expected"),
+    [
+        ((0.2, 0.48, 2.0), 1.0, (0.0071945671, 0.0646704486, 0.0046150785)),
+        ((0.2, 0.48, 2.0), 2.0, (0.0428627875, 0.1928340957, 0.0143154347)),
+        ((0.2, 0.48, 1.0), 1.0, (0.0079301552,)),
+        ((0.2, 0.48, 1.0), 2.0, (0.0497010367,)),
+    ],
+)
+def test_two_layers_of_unlike_thickness_under_a_cylinder(below, half_width, expected):
+    """Load, depth, largest pressure of R = 10; a finger's layer against a surface's, without friction."""
+    found = under_cylinder([TISSUE, ev.ElasticLayer(*below)], half_width)
+    for one, wanted, off in zip(found, expected, (1e-6, 1e-6, 5e-5), strict=False):
+        assert one == pytest.approx(wanted, rel=off)
+
+
+@pytest.mark.slow  # the table of a stack 2500 times as thick as its upper layer
+@pytest.mark.parametrize(("half_width", "load"), [(0.5, 0.0037056526), (1.0, 0.0111773257)])
+def test_a_coated_half_plane_under_a_cylinder(half_width, load):
+    stack = ev.ElasticStack([ev.ElasticLayer(*COATED), ev.ElasticLayer(0.08, 0.48, 500.0)])
+    assert under_cylinder([stack], half_width)[0] == pytest.approx(load, rel=2e-5)
+
+
 def grid(count, distance, seed=3):
     """Places (n, 2) about `distance` apart, and areas of squares that leave gaps or overlap a little."""
     random = np.random.default_rng(seed)
@@ -104,6 +150,8 @@ def grid(count, distance, seed=3):
 
 def test_a_square_on_a_half_space():
     """Its own mean p L (1 - nu^2)/E x .9464020088; a layer 1e4 times as thick is 1.2 L / H less."""
+    middle, corner = (love(np.array([[at, at]]), np.ones(1), np.full(1, 1e-3))[0, 0] for at in (0.0, 0.5))
+    np.testing.assert_allclose([middle / np.pi, corner / np.pi], [1.1221997047, 0.5610998523], rtol=1e-3)
     E, nu = 0.37, 0.3
     own = ev.ElasticLayer(E, nu, 1e3).compliance(np.zeros((1, 2)), [0.01])
     assert own[0, 0] * 0.1 * E / (1.0 - nu**2) == pytest.approx(0.9464020088, rel=2e-4)

@@ -9,7 +9,7 @@ from tools.domes import Dome, dome, dome_scene
 from tools.meshes import both_sides, contact_block, graded, parabola
 
 import evfem as ev
-from evfem.reference import BondedLayer, CattaneoMindlin, HertzLine, plane_modulus
+from evfem.reference import BondedLayer, CattaneoMindlin, HertzLine, plane_modulus, pull_in_strong_troxel
 
 SOFT = ev.ElasticLayer(E=0.2, nu=0.48, thickness=2.0)
 PAD = ev.FingerPad(ridges=False, resolution="coarse")
@@ -274,6 +274,31 @@ def test_a_surface_that_is_strained_too_much_is_told():
     )
     (said,) = (one for one in ev.simulate(scene).warnings if "strained" in one)
     assert re.search(r"strained by about \d+%", said)
+
+
+@pytest.mark.parametrize(("share", "closed"), [(0.999, False), (1.001, True)])
+def test_a_plate_snaps_onto_a_surface_on_springs(share, closed):
+    """Springs of 0.1 N/mm above and 0.3 N/mm below are one of 0.075 N/mm in a row: 730.743 V."""
+
+    class Springs:
+        def compliance(self, x, lengths):
+            own = np.diag(1.0 / (3e-3 * np.asarray(lengths)))
+            return np.block([[own, 0.0 * own], [0.0 * own, own]])
+
+    x, y = np.meshgrid(np.linspace(0.0, 2.0, 3), [0.0, 2.0])
+    cells, sets = np.array([[0, 1, 4, 3], [1, 2, 5, 4]]), {"pad": np.arange(3), "bone": np.arange(3, 6)}
+    mesh = ev.Mesh(
+        np.column_stack([x.ravel(), y.ravel()]), cells, "quad", np.zeros(2, int), {"plate": 0}, sets
+    )
+    plate = {"plate": ev.LinearElastic(E=2e-3, nu=0.0)}  # over 2 mm: 0.1 N/mm for each 100 mm2
+    finger = ev.MeshedFinger(mesh, plate, electrical=ev.Electrical(0.38, 1650.0))
+    layers = ev.Layers.of(ev.Layer(0.38, 1650.0), ev.FILM)
+    volts = pull_in_strong_troxel(0.075, 0.25, 100.0, layers).voltage
+    assert volts == pytest.approx(730.743048331, rel=1e-7)
+    surface, motion = ev.Display(ev.FILM, friction=0.0, elastic=Springs()), [ev.Hover(0.25)]
+    motion.append(ev.VoltageRamp(share * volts, steps=6))
+    result = ev.simulate(ev.Scene(finger, surface, ev.StrongTroxel(), 0.0, motion))
+    assert (result.contact_width[-1] > 0.0) == closed
 
 
 def test_a_clutch_of_two_strips():
