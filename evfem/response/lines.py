@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -75,16 +75,13 @@ def difference(values: Sequence[Any], step: float) -> Any:
     return sum(weight * np.asarray(value) for weight, value in zip(WEIGHTS, values, strict=True)) / step
 
 
-def numbers_of(owner: Any) -> Change:
-    """The fields of a state or of books that are real numbers."""
-    values = {spec.name: getattr(owner, spec.name) for spec in fields(owner)}
-    return {name: v for name, v in values.items() if np.asarray(v).dtype.kind == "f"}
-
-
-def changes(owners: Sequence[Any], step: float) -> Change:
-    """`difference` of every field of states or books."""
-    found = [numbers_of(one) for one in owners]
-    return {name: difference([one[name] for one in found], step) for name in found[0]}
+def changes(owners: Sequence[Any], step: float) -> Any:
+    """`difference` of arrays, or of every field of states or books that has real numbers."""
+    if not is_dataclass(owners[0]):
+        return difference(owners, step)
+    names = [spec.name for spec in fields(owners[0])]
+    real = [name for name in names if np.asarray(getattr(owners[0], name)).dtype.kind == "f"]
+    return {name: difference([getattr(one, name) for one in owners], step) for name in real}
 
 
 def added(first: Change, second: Change) -> Change:
@@ -197,11 +194,6 @@ class Line:
         state = changes([one.run.state for one in beside], step)
         return cls(parameter.name, step, longest, beside, centre, lengths, works, state)
 
-    @property
-    def far(self) -> float:
-        """How far places are apart for what is smooth."""
-        return FAR * self.longest
-
     # -- a part
 
     def follow(
@@ -254,22 +246,19 @@ class Line:
         """Derivative (m,) of the part's equations, and of the reaction (dim,), along those of its states, the
         end's being `change`.
         """
-        way = self._way(part, change)
-        near = self._asked(part, jumps, change, way, Equations.kinked)
-        far = self._asked(part, jumps, change, self.far, Equations.smooth)
-        rows, reaction = (
-            difference([one[i] for one in near], way) + difference([one[i] for one in far], self.far)
-            for i in (0, 1)
-        )
-        return rows, reaction
+        near = self._slopes(part, jumps, change, self._way(part, change), Equations.kinked)
+        far = self._slopes(part, jumps, change, FAR * self.longest, Equations.smooth)
+        return near[0] + far[0], near[1] + far[1]
 
-    def _asked(self, part: Accepted, jumps: Sequence[Steps], change: Change, way: float, ask: Any) -> Any:
-        """What the part's equations answer at the places along its states, `way` apart."""
+    def _slopes(
+        self, part: Accepted, jumps: Sequence[Steps], change: Change, way: float, ask: Any
+    ) -> list[Any]:
+        """Derivatives of arrays or states that the part's equations answer, from places `way` apart."""
         found = []
         for place in PLACES:
             begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
             found.append(ask(begun, moved(part.new, change, place * way)))
-        return found
+        return [changes(each, way) for each in zip(*found, strict=True)]
 
     def _way(self, part: Accepted, change: Change, reach: float = np.inf) -> float:
         """How far places are apart along the states: no node moves further than it may, and all stay within
@@ -290,13 +279,13 @@ class Line:
         """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
         step, way = self.step, self._way(part, change)
         by_parameter = changes([one.ended(part.new) for one in equations], step)
-        near = self._asked(part, jumps, change, way, lambda at, new: (at.ended(new), at.margins(new)))
-        ends, margins = zip(*near, strict=True)
-        along = changes(self._asked(part, jumps, change, self.far, Equations.ended), self.far)
-        along |= {name: value for name, value in changes(ends, way).items() if name in NEARBY}
+        ask: Any = lambda at, new: (at.ended(new), at.margins(new))  # noqa: E731
+        with np.errstate(invalid="ignore"):  # of nodes that are infinitely far from another status
+            near, margins = self._slopes(part, jumps, change, way, ask)
+            along = self._slopes(part, jumps, change, FAR * self.longest, ask)[0]
+            rate = margins + difference([one.margins(part.new) for one in equations], step)
+        along |= {name: value for name, value in near.items() if name in NEARBY}
         state = added(by_parameter, along) | change
-        with np.errstate(invalid="ignore"):
-            rate = difference(margins, way) + difference([one.margins(part.new) for one in equations], step)
         counts = np.isfinite(part.margins) & np.isfinite(rate) & (rate != 0.0)
         reach = np.abs(part.margins[counts] / rate[counts])
         nearest = float(reach.min(initial=np.inf))

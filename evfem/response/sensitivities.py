@@ -39,6 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -108,15 +109,10 @@ class _Differentiated:
 
     def _check(self, line: Line) -> None:
         """Refuse a parameter that changes which unknowns or laws there are."""
-        model = self.run.model
-        for each in (one.run.model for one in line.beside):
-            same = np.array_equal(each.mesh.cells, model.mesh.cells)
-            same = same and (each.closing.core is None) == (model.closing.core is None)
-            if not (same and each.body.size == model.body.size):
-                given = (
-                    "a small change of it changes the cells of the mesh, or whether the attraction has a core"
-                )
-                raise InputError(f"parameters.{line.name}", given, "a parameter that leaves both as they are")
+        models = [self.run.model, *(one.run.model for one in line.beside)]
+        if len({(each.mesh.cells.tobytes(), each.closing.core is None) for each in models}) > 1:
+            given = "a small change of it changes the cells of the mesh, or whether the attraction has a core"
+            raise InputError(f"parameters.{line.name}", given, "a parameter that leaves both as they are")
 
     def _lengths(self, state: State) -> Floats:
         """How far (mm) gaps of the pad nodes (P,) may change for differences: inf where they are closed."""
@@ -210,14 +206,9 @@ class _Differentiated:
             self._factor.factorise(model.body.tangent(new.u))
             solve = Tangent(here, new, self._factor, kept).solve
         except Singular:
-            solve = _unsolved
+            solve = partial(np.full_like, fill_value=np.nan)
         self._known = (new.status.tobytes(), solve)
         return True
-
-
-def _unsolved(right: Floats) -> Floats:
-    """What a singular matrix gives."""
-    return np.full_like(right, np.nan)
 
 
 def _refused(target: Target, new: State) -> str:
