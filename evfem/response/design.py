@@ -8,7 +8,7 @@ Nocedal, C. Zhu, SIAM J. Sci. Comput. 16 (1995) 1190-1208, doi:10.1137/0916069.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
@@ -63,11 +63,10 @@ class _Search:
     progress: bool
     best: Design | None = None
     runs: int = 0
-    scale: float = field(default=0.0)
+    scale: float = 0.0
 
     def __call__(self, z: Floats) -> tuple[float, Floats]:
-        low, high = self.bounds.T
-        scene = self.scene
+        scene, (low, high) = self.scene, self.bounds.T
         values = dict(zip(self.keys, (low + z * (high - low)).tolist(), strict=True))
         for key, value in values.items():
             one = parameter_of(scene, key)

@@ -50,6 +50,9 @@ LOST = "the linear equations of step {} were not solved"
 WHOLE = ("contact_width", "contact_area", "mean_contact_pressure")
 #: derivatives of states and books, by their fields
 Change = dict[str, Any]
+Jumps = Sequence[Steps]
+Lengths = Callable[[State], Floats]
+Solve = Callable[[Floats], Floats]
 
 
 def differentiable(column: str) -> bool:
@@ -126,7 +129,7 @@ class Beside:
             run = Run(scene if parameter is None else parameter.applied(scene, way), None)
         return cls(run, way, run.requests())
 
-    def begin(self, part: Accepted, jumps: Sequence[Steps], old: State) -> Equations:
+    def begin(self, part: Accepted, jumps: Jumps, old: State) -> Equations:
         """The equations of a part from `old`; `jumps` of friction are those of the followed run."""
         assert self.request is not None
         pins, own = part.pins.copy(), self.run.model.equilibrium.interface.jumps.steps
@@ -163,7 +166,7 @@ class Line:
     longest: float
     beside: list[Beside]
     centre: Beside
-    lengths: Callable[[State], Floats]
+    lengths: Lengths
     works: bool
     state: Change = field(default_factory=dict)
     books: Change = field(default_factory=dict)
@@ -175,14 +178,7 @@ class Line:
     reason: str = ""
 
     @classmethod
-    def of(
-        cls,
-        scene: Scene,
-        parameter: Parameter,
-        centre: Beside,
-        lengths: Callable[[State], Floats],
-        works: bool,
-    ) -> Line:
+    def of(cls, scene: Scene, parameter: Parameter, centre: Beside, lengths: Lengths, works: bool) -> Line:
         """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
         step = longest = STEP * parameter.size
         last = Beside.of(scene, parameter, PLACES[-1] * step)
@@ -196,9 +192,7 @@ class Line:
 
     # -- a part
 
-    def follow(
-        self, part: Accepted, solve: Callable[[Floats], Floats], jumps: Sequence[Steps], patient: bool
-    ) -> bool:
+    def follow(self, part: Accepted, solve: Solve, jumps: Jumps, patient: bool) -> bool:
         """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(part, jumps, part.old) for one in self.beside]
         voltage = difference([one.target.voltage.voltage for one in equations], self.step)
@@ -232,9 +226,7 @@ class Line:
             change[name] = change[name] + part.reshape(change[name].shape)
 
     def _share(self, more: Floats, change: Change, state: State) -> float:
-        """The largest change of displacements and of contact forces, as a share of the largest derivative of
-        each, or of the largest value over the parameter.
-        """
+        """The largest change of an unknown, as a share of the largest derivative or value over parameter."""
         shares, size = [], self.centre.run.model.body.size
         for name, part in (("u", slice(0, size)), ("contact_force", slice(size, None))):
             usual = STEP / self.longest * np.abs(getattr(state, name)).max(initial=0.0)
@@ -242,17 +234,13 @@ class Line:
             shares.append(np.abs(more[part]).max(initial=0.0) / largest)
         return float(max(shares))
 
-    def _along(self, part: Accepted, jumps: Sequence[Steps], change: Change) -> tuple[Floats, Floats]:
-        """Derivative (m,) of the part's equations, and of the reaction (dim,), along those of its states, the
-        end's being `change`.
-        """
+    def _along(self, part: Accepted, jumps: Jumps, change: Change) -> tuple[Floats, Floats]:
+        """Derivatives (m,) of the part's equations and (dim,) of the reaction along those of its states."""
         near = self._slopes(part, jumps, change, self._way(part, change), Equations.kinked)
         far = self._slopes(part, jumps, change, FAR * self.longest, Equations.smooth)
         return near[0] + far[0], near[1] + far[1]
 
-    def _slopes(
-        self, part: Accepted, jumps: Sequence[Steps], change: Change, way: float, ask: Any
-    ) -> list[Any]:
+    def _slopes(self, part: Accepted, jumps: Jumps, change: Change, way: float, ask: Any) -> list[Any]:
         """Derivatives of arrays or states that the part's equations answer, from places `way` apart."""
         found = []
         for place in PLACES:
@@ -261,9 +249,7 @@ class Line:
         return [changes(each, way) for each in zip(*found, strict=True)]
 
     def _way(self, part: Accepted, change: Change, reach: float = np.inf) -> float:
-        """How far places are apart along the states: no node moves further than it may, and all stay within
-        `reach` of the parameter.
-        """
+        """How far apart places along the states may be, within `reach` of the parameter."""
         model = self.centre.run.model
         slope = model.equilibrium.interface.surface_at(part.new).slope
         moves = change["u"][model.pad.nodes]
@@ -273,9 +259,7 @@ class Line:
             nearest = min(nearest, ALONG / max(float(np.abs(moves[:, 0]).max()), 1e-300))
         return max(min(self.longest, nearest / max(PLACES)), LEAST * self.longest)
 
-    def _end(
-        self, part: Accepted, equations: list[Equations], jumps: Sequence[Steps], change: Change
-    ) -> None:
+    def _end(self, part: Accepted, equations: list[Equations], jumps: Jumps, change: Change) -> None:
         """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
         step, way = self.step, self._way(part, change)
         by_parameter = changes([one.ended(part.new) for one in equations], step)
@@ -295,7 +279,7 @@ class Line:
             self._book(part, jumps, state, self.way)
         self.state = state
 
-    def _book(self, part: Accepted, jumps: Sequence[Steps], state: Change, way: float) -> None:
+    def _book(self, part: Accepted, jumps: Jumps, state: Change, way: float) -> None:
         """The derivatives of the books after the part that ends with these of the state."""
         (begin, _), (sums, _) = part.books, part.sums
         fixed = [one.booked(part.old, part.new, begin, sums) for one in self.beside]

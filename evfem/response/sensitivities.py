@@ -293,20 +293,15 @@ class Sensitivities:
         """A row for each step, a column `COLUMN by PARAMETER` for each pair: a `pandas.DataFrame`, without
         pandas a record array.
         """
-        pairs = {
-            f"{column} by {key}": self[column, key] for key in self.parameters for column in self.columns
-        }
+        pairs = {f"{name} by {key}": self[name, key] for key in self.parameters for name in self.columns}
         return frame({"step": np.asarray(self.result.step), **pairs})
 
     def __repr__(self) -> str:
         """The parameters by the relative change of normal and tangential force at the end."""
         lines = [f"Sensitivities of {len(self.result.step)} steps, d ln force / d ln parameter at the end:"]
         for key in self.parameters:
-            shares = [
-                f"{name} {self.elasticity[name, key][-1]:.4g}"
-                for name in ("normal_force", "tangential_force")
-                if name in self.columns
-            ]
+            names = [name for name in ("normal_force", "tangential_force") if name in self.columns]
+            shares = [f"{name} {self.elasticity[name, key][-1]:.4g}" for name in names]
             lines.append(f"  {key}: {', '.join(shares)}")
         return "\n".join(lines)
 
@@ -369,10 +364,9 @@ def sensitivities(
     """
     scene = scene_of(scene)
     _check(scene)
-    given = (
-        [parameters] if isinstance(parameters, str) or hasattr(parameters, "applied") else list(parameters)
-    )
-    known = {one.name: one for one in (parameter_of(scene, each) for each in given)}
+    single = isinstance(parameters, str) or hasattr(parameters, "applied")
+    given = [parameter_of(scene, each) for each in ([parameters] if single else parameters)]
+    known = {one.name: one for one in given}
     with blas_limits(), notices.shown(progress):
         wanted = _columns(scene_mesh(scene)[0].dim, columns)
         run = _Differentiated(scene, known, any(map(is_work, wanted)))
@@ -410,9 +404,7 @@ def _gathered(
 ) -> Sensitivities:
     """What was found."""
     reasons = {name: COUNTED for name in columns if not differentiable(name)}
-    for line in run.lines:
-        if reason := line.reason or run.stopped:
-            reasons[line.name] = reason
+    reasons |= {line.name: reason for line in run.lines if (reason := line.reason or run.stopped)}
     values = {
         (name, line.name): np.array([row.get(name, np.nan) for row in line.rows])
         for line in run.lines
