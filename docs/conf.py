@@ -1,10 +1,15 @@
 """How the site is built: `sphinx-build -W docs build/docs`, then open `build/docs/index.html`."""
 
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 from sphinx.ext.napoleon import Config, NumpyDocstring
 
 import evfem
+
+sys.path.insert(0, str(Path(__file__).parent))
+from notebooks import NOTEBOOKS, page
 
 for name in evfem.__all__:
     getattr(evfem, name)  # and so has its parameters in its docstring
@@ -49,5 +54,13 @@ def sections(app, what, name, obj, options, lines):
         lines[:] = NumpyDocstring(lines, Config(), app, what, name, obj, options).lines()
 
 
+def notebook(app, name, source):
+    """Pages in `notebooks` are the notebooks of their names, run."""
+    folder, _, file = name.rpartition("/")
+    if folder == "notebooks" and file != "index":
+        source[0] = page(NOTEBOOKS / f"{file}.py")
+
+
 def setup(app):
     app.connect("autodoc-process-docstring", sections)
+    app.connect("source-read", notebook)

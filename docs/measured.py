@@ -1,12 +1,15 @@
-"""Renews what the pages show of runs of the studies: the tables of the page on performance, two rows
-of README, the page on the paper, the pictures, and the times that the command says beforehand:
+"""Writes what the pages show of runs: every block between `<!-- measured: NAME -->` and `<!-- end -->`,
+the page on the paper, the pictures, and the times that the command says beforehand:
 
-    evfem study all peers --out FOLDER
+    evfem study all peers campaign --out FOLDER
     python docs/measured.py FOLDER
+    python docs/runs.py
 
-What has no file in FOLDER stays as it is. Files of studies with numbers of the paper are kept in
-docs/results, from which the page on the paper is written; pictures are copied to docs/pictures.
-`python docs/measured.py --times FOLDER` takes the times alone, also those of runs with --quick.
+The first two keep the files of the studies in docs/results and their pictures in docs/pictures, the third
+measures the default run and single steps. A page has what these files have: a test compares.
+`docs/results/long.csv` has what the tests do in hours, line by line, with date and commit.
+`python docs/measured.py` alone writes the pages anew, `python docs/measured.py --times FOLDER` takes
+the times of the studies alone, also of those with --quick.
 """
 
 from __future__ import annotations
@@ -16,6 +19,8 @@ import json
 import re
 import shutil
 import sys
+import textwrap
+import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -24,15 +29,18 @@ from evfem.studies import NAMES, paper
 from evfem.studies.common import markdown
 
 DOCS = Path(__file__).parent
-PAGE, README = DOCS / "performance.md", DOCS.parent / "README.md"
+ROOT = DOCS.parent
 RESULTS, PAPER = DOCS / "results", DOCS / "paper.md"
-TIMES = DOCS.parent / "studies" / "seconds.csv"
-#: a table between its marks
+TIMES = ROOT / "studies" / "seconds.csv"
+#: what a run left, as text between its marks
 BLOCK = re.compile(r"(<!-- measured: ([\w-]+) -->\n\n).*?(\n<!-- end -->)", re.S)
+PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
 PACKAGES = {"evfem": "evfem", "fenicsx": "FEniCSx", "felupe": "FElupe", "getfem": "GetFEM"}
 #: cells by name: evfem's element and the others'
 CELLS = {"linear": ("q1", "q1"), "quadratic": ("q2p1", "q2")}
 LEVELS = ("L0", "L1", "L2")
+#: rows of the table of campaigns, which are columns of campaigns.csv
+ENDS = ["scenes", "equilibrium", "explained", "not_converged", "invariants_broken", "error", "timeout"]
 Found = dict[str, Any]
 
 
@@ -148,44 +156,219 @@ def questions(found: Found) -> str:
     return table(["question", "answer"], rows)
 
 
-#: study -> block -> what makes it
-BLOCKS: dict[str, dict[str, Callable[[Found], str]]] = {
-    "peers": {"peers-run": run, "peers-costs": costs, "peers-ratios": ratios, "peers-race": race},
-    "work_precision": {
-        "precision-run": run,
-        "precision-cheapest": cheapest,
-        "precision-questions": questions,
-    },
+def readme(peers: Found, runs: Found) -> str:
+    """README's table and when it was measured."""
+    n, key, race = peers["numbers"], "B.L2.evfem_q2p1", "race.B.best"
+    slide, best = (
+        min(v for p in PACKAGES if p != "evfem" and (v := n.get(f"{name.format(p)}.cpu_s")) is not None)
+        for name in ("B.L2.{}_q2", f"{race}.{{}}")
+    )
+    own = f"error {worst(n, key):.2f} %, {short(n[f'{key}.cpu_s'])} CPU s"
+    to_goal = f"{short(n[f'{race}.evfem.cpu_s'])} CPU s"
+    run = runs["numbers"]
+    rows = [
+        ["a slide on 23,000 nodes", f"{own}; fastest other package {short(slide)} s"],
+        ["time to 0.1 % of the friction force", f"{to_goal}; fastest other package {short(best)} s"],
+        ["Hertz line contact, closed form", "peak pressure 0.05 %, half width 0.6 %"],
+        [
+            f"default run, {run['default.steps']:.0f} steps, one thread",
+            f"{short(run['default.fast.cpu_s'])} CPU s with `[fast]`, "
+            f"{short(run['default.plain.cpu_s'])} without",
+        ],
+    ]
+    return table(["question", "answer"], rows)
+
+
+def default_run(runs: Found) -> str:
+    """What `evfem run` takes."""
+    n = runs["numbers"]
+    return filled(
+        f"`evfem run` ({n['default.nodes']:,.0f} nodes, {n['default.steps']:.0f} steps, "
+        f"{n['default.MB']:.0f} MB of files) takes {short(n['default.fast.cpu_s'])} CPU seconds with "
+        f"`[fast]` and {short(n['default.plain.cpu_s'])} without, imports included, on one thread."
+    )
+
+
+def loop_times(runs: Found) -> str:
+    """What a step of a loop takes."""
+    n, rows = runs["numbers"], []
+    for name, title in LOOPS.items():
+        begin, half, most = (n[f"loop.{name}.{key}"] for key in ("begin_s", "median_s", "ninth_s"))
+        count = n[f"loop.{name}.unknowns"]
+        unknowns = f"{float(f'{count:.2g}'):,.0f}"
+        rows.append([f"`{title}`, {unknowns} unknowns", *map(seconds, (begin, half, most))])
+    return table(["finger", "to begin", "half of the steps below", "nine of ten below"], rows)
+
+
+#: name of a loop in runs.json -> the finger
+LOOPS = {
+    "coarse": 'FingerPad("coarse")',
+    "medium": 'FingerPad("medium")',
+    "fingertip": 'Fingertip("coarse")',
 }
 
 
-def renewed(text: str, found: dict[str, Found]) -> str:
-    """The page with the blocks of the studies that were found."""
-    texts = {name: make(found[s]) for s in found for name, make in BLOCKS[s].items()}
-    return BLOCK.sub(lambda m: m[1] + texts[m[2]] + m[3] if m[2] in texts else m[0], text)
+def seconds(value: float) -> str:
+    """Seconds, or milliseconds below a tenth of one."""
+    return f"{short(value)} s" if value >= 0.1 else f"{short(1e3 * value)} ms"
 
 
-def rows_of_readme(text: str, found: Found) -> str:
-    """README with its two rows and the date of the run of `peers`; as it is where the run lacks them."""
-    n, made = found["numbers"], found["provenance"]
-    key, race = "B.L2.evfem_q2p1", "race.B.best"
-    others = [v for p in PACKAGES if (v := n.get(f"B.L2.{p}_q2.cpu_s")) is not None and p != "evfem"]
-    if not others or not {f"{key}.cpu_s", f"{race}.fastest_over_evfem.cpu_s"} <= n.keys():
-        return text
-    own, peer = n[f"{race}.evfem.cpu_s"], n[f"{race}.fastest_over_evfem.cpu_s"]
-    slide = f"error {worst(n, key):.2f} %, {short(n[f'{key}.cpu_s'])} CPU s"
-    rows = {
-        "a slide on 23,000 nodes": f"{slide}; fastest other package {short(min(others))} s",
-        "time to 0.1 % of the friction force": f"{short(own)} CPU s; fastest other package "
-        f"{short(own * peer)} s",
+def robustness(stability: Found, campaigns: list[Found], long: list[Found], mistakes: Found) -> str:
+    """What was tried to break it, and what it did."""
+    n, last = stability["numbers"], campaigns[-1]
+    rows = [[row["question"], row["answer"], f"`{row['where']}`"] for row in long]
+    cases = f"{n['good']:.0f} of {n['cases']:.0f} end as they should"
+    rows.append(["hard cases", cases, "`evfem study stability`"])
+    ends = f"{last['equilibrium']} equilibria, {last['explained']} explained"
+    rows.append([f"{int(last['scenes']):,} drawn scenes", ends, "`evfem study campaign`"])
+    rows.append(
+        [f"{len(mistakes['mistake'])} mistakes in the physics", "each seen", "`tests/tools/mistakes.py`"]
+    )
+    return table(["question", "answer", "test"], rows)
+
+
+def campaigns(rows: list[Found]) -> str:
+    """Ends of the campaigns by seeds."""
+    lines = [[f"`{end}`" if end != "scenes" else end, *(row[end] or "-" for row in rows)] for end in ENDS]
+    lines.append(["CPU s of a scene, at most", *(row["limit"] for row in rows)])
+    lines.append(["slowest over the median of its size", *(f"{float(row['slowest']):.0f}" for row in rows)])
+    lines.append(["energy left over", *(f"{float(row['remainder']):.1e}" for row in rows)])
+    lines.append(["date", *(row["date"] for row in rows)])
+    return table(["seed", *(row["seed"] for row in rows)], lines)
+
+
+def fringe(found: Found) -> str:
+    """What the columns miss, in sentences."""
+    n, cases = found["numbers"], ("HVHD", "HVLD", "LVLD")
+    ridged, columns, smooth, plain = (
+        n[f"finger.{pad}.pressed.{field}_air_share"]
+        for pad in ("ridged", "smooth")
+        for field in ("full", "local")
+    )
+    over = [n[f"participants.full_over_measured.{case}"] for case in cases]
+    gain = max(abs(n[f"participants.gain_median.{case}"] - 1.0) for case in cases)
+    flat, filling = n["spreading.smooth"], n["spreading.filled.smooth"]
+    rough = [n[f"spreading.{kind}5um"] - 1.0 for kind in ("", "filled.")]
+    return filled(
+        f"Pressed at 0.05 N/mm, the ridged finger has {percent(ridged)} of its attraction beside the "
+        f"contact, {percent(columns)} by columns; the smooth one {percent(smooth)} and {percent(plain)}.",
+        f"Grooved skin that touches a touchscreen with 30 % of its face is pulled {flat:.1f} times as hard "
+        f"as by columns, {filling:.1f} times if its layer fills the ridges, and {percent(min(rough))} to "
+        f"{percent(max(rough))} harder between rough faces 5 um apart.",
+        f"At Table 1's fingers ridges change the medians of (8a) by {percent(gain)} at most, which remain "
+        f"{min(over):.1f} to {max(over):.1f} times the measured ones.",
+    )
+
+
+def fingertip(found: Found) -> str:
+    """The whole pad beside Adams' laws and Table 1, in sentences."""
+    n = found["numbers"]
+    areas = [rf"verdict\.{one}_over_adams" for one in (r"smooth\.gross", r"ridged\.ridge")]
+    laws = [rf"verdict\.ridged\.{law}\.median_over_measured" for law in ("kaczmarek", "strong_troxel")]
+    gross, ridge, kaczmarek, troxel, width = (spread(n, key) for key in (*areas, *laws, r"width_mm\."))
+    gains = {
+        key: n[key] / n["variant.smooth.area_mm2"] - 1.0 for key in n if re.match(r"variant\..+area", key)
     }
-    for question, answer in rows.items():
-        text, count = re.subn(
-            rf"^\| {re.escape(question)} \|.*$", f"| {question} | {answer} |", text, flags=re.M
-        )
-        assert count == 1, question
-    version, date = made["versions"]["evfem"], made["date"][:10]
-    return re.sub(r"with version \S+ on\n\d{4}-\d\d-\d\d", f"with version {version} on\n{date}", text)
+    half = gains.pop("variant.all moduli x 0.5.area_mm2")
+    wanted, other = n["variant.wanted_over_unchanged"] - 1.0, max(gains.values())
+    return filled(
+        f"From 0.05 to 1 N Table 2's pad touches {gross} of Adams' gross area and {ridge} of his ridge area; "
+        f"half of all moduli add {percent(half)} at 0.5 N where {percent(wanted)} are wanted, no other "
+        f"single change more than {percent(other)}.",
+        f"A cross-section has the same force over {width} mm.",
+        f"Hovering ridged pads have {kaczmarek} of the measured medians by Kaczmarek's law and {troxel} by "
+        "Strong and Troxel's.",
+    )
+
+
+def fingerprint(found: Found) -> str:
+    """What prints do to stiffness, in a sentence."""
+    stiff = {key: value for key, value in found["numbers"].items() if key.endswith("stiffness_N_per_mm")}
+    across, along, *_ = (stiff[f"along.{way}.stiffness_N_per_mm"] for way in "xz")
+    softer = {
+        f"{one}.{way}": 100.0 * (1.0 - stiff[f"{one}.{way}.stiffness_N_per_mm"] / own)
+        for way in "xz"
+        for own in [stiff[f"smooth.{way}.stiffness_N_per_mm"]]
+        for one in ("whorl", "loop", "arch")
+    }
+    return filled(
+        f"Parallel ridges are {percent(1.0 - across / along)} softer across than along themselves; curved "
+        f"ones {spread(softer, '')} % softer than the smooth pad."
+    )
+
+
+def percent(share: float) -> str:
+    """A share in per cent, without digits behind the point."""
+    return f"{100.0 * share:.0f} %"
+
+
+def spread(numbers: Found, pattern: str) -> str:
+    """From the smallest to the largest of the numbers whose names begin so."""
+    values = [value for key, value in numbers.items() if re.match(pattern, key)]
+    return f"{short(min(values))} to {short(max(values))}"
+
+
+def filled(*sentences: str) -> str:
+    """Sentences in lines that fit, each beginning a line."""
+    return "\n".join(textwrap.fill(one, 99, break_on_hyphens=False) for one in sentences) + "\n"
+
+
+def when() -> str:
+    """What was run when, at which commit, with which version, for how long."""
+    rows = []
+    for path in RESULTS.glob("*.json"):
+        made = json.loads(path.read_text(encoding="utf-8"))["provenance"]
+        took = made.get("seconds")
+        said = [f"evfem {made['versions']['evfem']}, Python {made['versions']['python']}"]
+        said += [] if took is None else [seconds(max(took, 0.1))]
+        rows.append([f"`{path.stem}`", made["date"][:10], made.get("commit") or "-", ", ".join(said)])
+    for name in ("long.csv", "campaigns.csv"):
+        for row in csv.DictReader((RESULTS / name).read_text(encoding="utf-8").splitlines()):
+            what = row.get("question") or f"campaign {row['seed']}"
+            rows.append([what, row["date"], row["commit"] or "-", ""])
+    rows.sort(key=lambda row: row[0])
+    return table(["what", "date", "commit", "with"], sorted(rows, key=lambda row: row[1], reverse=True))
+
+
+MISTAKES = "../../tests/tools/mistakes.toml"
+#: block -> what makes it, and the files in docs/results that it needs
+BLOCKS: dict[str, tuple[Callable[..., str], list[str]]] = {
+    "readme": (readme, ["peers.json", "runs.json"]),
+    "peers-run": (run, ["peers.json"]),
+    "peers-costs": (costs, ["peers.json"]),
+    "peers-ratios": (ratios, ["peers.json"]),
+    "peers-race": (race, ["peers.json"]),
+    "precision-run": (run, ["work_precision.json"]),
+    "precision-cheapest": (cheapest, ["work_precision.json"]),
+    "precision-questions": (questions, ["work_precision.json"]),
+    "default-run": (default_run, ["runs.json"]),
+    "loop-times": (loop_times, ["runs.json"]),
+    "robustness": (robustness, ["stability.json", "campaigns.csv", "long.csv", MISTAKES]),
+    "campaigns": (campaigns, ["campaigns.csv"]),
+    "fringe": (fringe, ["fringe.json"]),
+    "fingertip": (fingertip, ["fingertip.json"]),
+    "fingerprint": (fingerprint, ["fingerprint.json"]),
+    "when": (when, []),
+}
+READERS: dict[str, Callable[[str], Any]] = {
+    ".json": json.loads,
+    ".csv": lambda text: list(csv.DictReader(text.splitlines())),
+    ".toml": tomllib.loads,
+}
+
+
+def made(name: str, old: str) -> str:
+    """The text of a block; the old one where a file that it needs is not there yet."""
+    make, files = BLOCKS[name]
+    paths = [RESULTS / file for file in files]
+    if not all(path.exists() for path in paths):
+        return old
+    return make(*(READERS[path.suffix](path.read_text(encoding="utf-8")) for path in paths))
+
+
+def renewed(text: str) -> str:
+    """A page with the blocks that the files in docs/results give."""
+    return BLOCK.sub(lambda m: m[1] + made(m[2], m[0][len(m[1]) : -len(m[3])]) + m[3], text)
 
 
 def page_on_the_paper() -> str:
@@ -197,40 +380,61 @@ def times(found: dict[str, Found], text: str) -> str:
     """The csv of the studies' seconds, with those of the runs that were found."""
     took = {row["study"]: row for row in csv.DictReader(text.splitlines())}
     for study, one in found.items():
-        seconds = one["provenance"].get("seconds")
+        spent = one["provenance"].get("seconds")
         row = took.setdefault(study, {"study": study, "whole": "", "quick": ""})
-        if seconds is not None:
-            row["quick" if one["provenance"]["quick"] else "whole"] = f"{float(f'{max(seconds, 0.1):.2g}'):g}"
+        if spent is not None:
+            row["quick" if one["provenance"]["quick"] else "whole"] = f"{float(f'{max(spent, 0.1):.2g}'):g}"
     rows = [",".join(took[name].values()) for name in NAMES if name in took]
     return "\n".join(["study,whole,quick", *rows]) + "\n"
 
 
+def with_campaign(rows: list[Found], found: Found) -> list[Found]:
+    """Campaigns with that of a file, in place of one of the same seed."""
+    n, how = found["numbers"], found["provenance"]
+    drawn = how["parameters"]
+    row = {"seed": f"{drawn['seed']}"} | {end: f"{n[end]:.0f}" for end in ENDS}
+    row |= {"limit": f"{drawn['limit']}", "slowest": f"{n['slowest_over_median']:.3g}"}
+    row |= {"remainder": f"{n['largest_remainder']:.2g}", "date": how["date"][:10]}
+    row |= {"commit": how.get("commit") or ""}
+    return [*(one for one in rows if one["seed"] != row["seed"]), row]
+
+
 def keep(folder: Path, found: dict[str, Found]) -> None:
-    """Copy pictures, and files with numbers of the paper; write the page on the paper."""
+    """Copy pictures, and the files that the pages need."""
+    needed = {file for _, files in BLOCKS.values() for file in files}
     for study, one in found.items():
         shutil.copy(folder / f"{study}.png", DOCS / "pictures" / f"{study}.png")
-        if one["paper"]:
+        if one["paper"] or f"{study}.json" in needed:
             shutil.copy(folder / f"{study}.json", RESULTS / f"{study}.json")
+    if "campaign" in found:
+        path = RESULTS / "campaigns.csv"
+        rows = with_campaign(READERS[".csv"](path.read_text(encoding="utf-8")), found["campaign"])
+        lines = [",".join(rows[0]), *(",".join(row.values()) for row in rows)]
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write() -> None:
+    """Write the pages anew from docs/results."""
     PAPER.write_text(page_on_the_paper(), encoding="utf-8")
+    for page in PAGES:
+        page.write_text(renewed(page.read_text(encoding="utf-8")), encoding="utf-8")
+    missing = sorted({f for _, files in BLOCKS.values() for f in files if not (RESULTS / f).exists()})
+    print(f"not there yet: {', '.join(missing)}" if missing else "every block is that of its files")
 
 
-def main(folder: Path, times_alone: bool = False) -> None:
-    """Renew the pages from the files of a folder."""
-    files = {study: folder / f"{study}.json" for study in NAMES}
+def main(folder: Path | None = None, times_alone: bool = False) -> None:
+    """Keep the files of a folder, and renew the pages."""
+    files = {} if folder is None else {study: folder / f"{study}.json" for study in NAMES}
     found = {study: json.loads(file.read_text()) for study, file in files.items() if file.exists()}
     quick = [study for study, one in found.items() if one["provenance"].get("quick")]
     if quick and not times_alone:
         sys.exit(f"{', '.join(quick)} in {folder}: run with --quick; the pages take whole runs alone")
     TIMES.write_text(times(found, TIMES.read_text(encoding="utf-8")), encoding="utf-8")
-    if not times_alone:
-        blocks = {study: one for study, one in found.items() if study in BLOCKS}
-        PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8"), blocks), encoding="utf-8")
-        if "peers" in found:
-            text = rows_of_readme(README.read_text(encoding="utf-8"), found["peers"])
-            README.write_text(text, encoding="utf-8")
+    if folder is not None and not times_alone:
         keep(folder, found)
-    print(f"renewed from {', '.join(found) or 'nothing'}")
+    write()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[-1]), "--times" in sys.argv)
+    folders = [Path(word) for word in sys.argv[1:] if word != "--times"]
+    main(folders[0] if folders else None, "--times" in sys.argv)

@@ -52,7 +52,6 @@ def _meant(message: str) -> str:
 def _path(
     command: argparse.ArgumentParser, name: str, metavar: str, how: dict[str, str] = FILES, **more: Any
 ) -> None:
-    """An argument that a shell completes."""
     given = command.add_argument(name, metavar=metavar, **{"type": Path, **more})
     given.complete = how  # type: ignore[attr-defined]
 

@@ -1,6 +1,4 @@
-"""Studies: a module per figure of the paper or question, each with `main(quick, out) -> dict`."""
-
-from __future__ import annotations
+"""Studies: a module per figure of the paper or question, each with `main(quick) -> Study`."""
 
 import csv
 import time
@@ -64,10 +62,10 @@ def run(
         )
     from .common import BEGIN
 
-    drawn = {} if sample is None else {"sample": sample}
+    more = {"out": out, "sample": sample or Sample()} if name == "campaign" else {}
     token = BEGIN.set(time.perf_counter())
     try:
-        return module(name).main(quick=quick, out=out, **drawn)  # type: ignore[no-any-return]
+        return module(name).main(quick, **more).finish(out, quick)  # type: ignore[no-any-return]
     finally:
         BEGIN.reset(token)
 

@@ -1,8 +1,8 @@
 """What the studies share: writing a study down, runs side by side, laws and measurements."""
 
-from __future__ import annotations
-
 import json
+import platform
+import subprocess
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -50,7 +50,7 @@ class Study:
     """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw it.
 
     `paper` has what the paper prints, by the keys of `numbers`. `tables` by their titles are lists of
-    lines of Markdown. Both are kept among the assumptions.
+    lines of Markdown. Both are kept among the assumptions. `files` writes what else it leaves in a folder.
     """
 
     name: str
@@ -61,6 +61,7 @@ class Study:
     draw: Callable[[], Any]
     parameters: dict[str, Any] = field(default_factory=dict)
     tables: dict[str, list[str]] = field(default_factory=dict)
+    files: Callable[[Path], None] | None = None
 
     def finish(self, out: Path | None, quick: bool = False) -> dict[str, Any]:
         """The study's dictionary; with `out` also NAME.json, NAME.csv, NAME.png and, where there are
@@ -71,7 +72,7 @@ class Study:
         printed = {key: one.described() for key, one in self.paper.items()}
         said = {"tables": self.tables, "printed": printed}
         made = {"eps_0_F_per_m": ev.eps_0, "quick": quick, "parameters": self.parameters}
-        made |= {"seconds": since_begin()}
+        made |= {"seconds": since_begin(), "commit": commit(), "processor": processor()}
         result = {
             "study": self.name,
             "numbers": {key: float(value) for key, value in self.numbers.items()},
@@ -92,6 +93,8 @@ class Study:
                 say_quick(figure)
             with replacing(folder / f"{self.name}.png") as temporary:
                 figure.savefig(temporary, format="png", dpi=160)
+            if self.files is not None:
+                self.files(folder)
         return result
 
     def _page(self) -> str:
@@ -102,6 +105,24 @@ class Study:
         for title, lines in self.tables.items():
             blocks += [f"## {title}", "\n".join(lines)]
         return "\n\n".join(blocks) + "\n"
+
+
+def commit() -> str | None:
+    """The commit of the checkout that runs, with `-dirty` where files differ; None outside of one."""
+    words = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=8"]
+    try:
+        return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def processor() -> str:
+    """Name of the processor, or its kind where the system does not say more."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.machine()
 
 
 def since_begin() -> float | None:

@@ -63,10 +63,12 @@ def test_each_file_is_known_by_what_is_in_it(place):
 def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "notes.txt").write_text("mine")
     (place / "empty.npz").write_text("")
+    (place / "buzz.ahap").write_text("{}")
     Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
     save_arrays("pad.npz", {"format": np.array("evfem-reduced-1")})  # as FastModel.save of 0.2 did
     cases = {
         "notes.txt": "notes.txt, of another kind; allowed: the folder of a run or a sweep, a result",
+        "buzz.ahap": "heights of other files: `evfem texture import`, haptic patterns: `ev.Sampled",
         "none.npz": "none.npz, which does not exist",
         "empty.npz": "empty.npz, cut off or of another kind",
         "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",

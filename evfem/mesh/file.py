@@ -15,6 +15,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -151,6 +152,8 @@ def _reason(error: BaseException, said: str, path: Path) -> str:
         reason = f"a format that needs {error.name}: pip install 'evfem[meshes]'"
     elif isinstance(error, KeyError):
         reason = f"{error.args[0]}, which meshio does not know or misses"
+    if kind := re.search(r"Element type not available: (\S+)", reason):
+        reason = f"elements {kind[1]}, which meshio does not know: export plane or solid ones alone"
     if PHYSICAL in reason:
         reason = "version 4.1 with elements outside of physical groups: save without them, or as 2.2"
     return " ".join(reason.split())[:200] or "damaged, or of a kind that meshio does not know"
@@ -265,7 +268,7 @@ def _write_msh(mesh: Mesh, path: Path) -> None:
 
 def _all_facets(mesh: Mesh, name: str) -> Ints:
     """The outer edges or faces of a set."""
-    facets = mesh.edges_of(name) if mesh.dim == 2 else mesh.faces_of(name)
+    facets = mesh.sides_of(name)
     lost = np.setdiff1d(mesh.node_sets[name], facets)
     if len(lost):
         facet = "edge" if mesh.dim == 2 else "face"

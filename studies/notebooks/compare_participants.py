@@ -27,7 +27,12 @@ from evfem.electrostatics.forces import EllipsoidalPad, pad_force, pad_force_per
 
 people = data.load("table1")
 print(people.title)
-print("force in", people.units["HVLD"], "at 2000 V and a gap of 0.25 mm:", people["HVLD"])
+print(
+    "force in",
+    people.units["HVLD"],
+    "at 2000 V and a gap of 0.25 mm:",
+    people["HVLD"],
+)
 
 # %% [markdown]
 # ## Closed form
@@ -37,11 +42,19 @@ print("force in", people.units["HVLD"], "at 2000 V and a gap of 0.25 mm:", peopl
 
 # %%
 gap, voltage = 0.25, 2000.0  # mm, V
-skin, film = ev.Layer(thickness=0.38, eps_r=1650.0), ev.Layer(thickness=0.09, eps_r=3.35)
+skin, film = (
+    ev.Layer(thickness=0.38, eps_r=1650.0),
+    ev.Layer(thickness=0.09, eps_r=3.35),
+)
 layers = ev.Layers.of(skin, film)
 laws = {"kaczmarek": ev.Kaczmarek(), "strong_troxel": ev.StrongTroxel()}
-pads = EllipsoidalPad(people["a"], people["b"], people["c"] * np.cos(np.radians(30.0)))
-closed = {name: 1e3 * pad_force(law, pads, gap, voltage, layers) for name, law in laws.items()}  # mN
+pads = EllipsoidalPad(
+    people["a"], people["b"], people["c"] * np.cos(np.radians(30.0))
+)
+closed = {
+    name: 1e3 * pad_force(law, pads, gap, voltage, layers)
+    for name, law in laws.items()
+}  # mN
 
 # %% [markdown]
 # ## Finite elements
@@ -84,10 +97,15 @@ table
 forces = np.reshape(table["electrostatic_force.last"], (len(laws), len(chosen)))
 computed = {}
 for (name, law), per_depth in zip(laws.items(), forces, strict=True):
-    width = pad_force(law, pads, gap, voltage, layers) / pad_force_per_depth(law, pads, gap, voltage, layers)
+    width = pad_force(law, pads, gap, voltage, layers) / pad_force_per_depth(
+        law, pads, gap, voltage, layers
+    )
     computed[name] = 1e3 * per_depth * width[chosen]
     change = computed[name] / closed[name][chosen] - 1.0
-    print(f"{name:<14} finite elements change the closed form by", ", ".join(f"{c:+.1%}" for c in change))
+    print(
+        f"{name:<14} finite elements change the closed form by",
+        ", ".join(f"{c:+.1%}" for c in change),
+    )
 
 # %% [markdown]
 # ## Beside what was measured
@@ -99,10 +117,14 @@ place = np.arange(len(people["participant"]))
 figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
 ax.plot(place, people["HVLD"], "D", color="#B04A85", label="measured")
 for (name, values), shift in zip(closed.items(), (-0.15, 0.15), strict=True):
-    ax.plot(place + shift, values, "_", color=colours[name], markersize=12, markeredgewidth=2,
-            label=f"{labels[name]}, closed form")  # fmt: skip
-    ax.plot(place[chosen] + shift, computed[name], "o", color=colours[name], markersize=5,
-            label=f"{labels[name]}, finite elements")  # fmt: skip
+    style = {"color": colours[name], "markersize": 12, "markeredgewidth": 2}
+    ax.plot(place + shift, values, "_", label=f"{labels[name]}, closed form", **style)
+    style = {
+        "color": colours[name],
+        "markersize": 5,
+        "label": f"{labels[name]}, finite elements",
+    }
+    ax.plot(place[chosen] + shift, computed[name], "o", **style)
 ax.set_xticks(place, people["participant"])
 ax.set(xlabel="participant", ylabel="electrostatic force (mN)", ylim=(0, None))
 figure.legend(loc="outside lower center", ncols=3, fontsize="small")
@@ -116,4 +138,7 @@ plt.show()
 for name, values in [("measured", people["HVLD"]), *closed.items()]:
     spread = np.std(values, ddof=1) / np.mean(values)
     ratio = max(values) / min(values)
-    print(f"{name:<14} median {np.median(values):.2f} mN, spread {spread:.0%}, max / min {ratio:.1f}")
+    print(
+        f"{name:<14} median {np.median(values):.2f} mN, spread {spread:.0%}, "
+        f"max / min {ratio:.1f}"
+    )

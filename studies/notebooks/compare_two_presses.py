@@ -38,11 +38,14 @@ finger = ev.FingerPad(resolution="coarse", ridges=False)
 
 
 def press(seconds, depth=1.5, hold=1.0):
-    """Press within so many seconds and hold; the result has the stress at the base of the epidermis."""
+    """Press within so many seconds and hold, with a probe at the base of the epidermis."""
     scene = ev.Scene(
         finger,
         ev.Flat(friction=0.3),
-        motion=[ev.Press(indentation=depth, speed=depth / seconds, steps=15), ev.Wait(hold, steps=20)],
+        motion=[
+            ev.Press(indentation=depth, speed=depth / seconds, steps=15),
+            ev.Wait(hold, steps=20),
+        ],
         output=ev.Output(probes={"receptor": ev.Probe(x=[0.0], at="epidermis")}),
     )
     return ev.simulate(scene)
@@ -87,11 +90,14 @@ def spikes(time, stress, step=0.05):
 # 3 times in the ramp and 23 times in the hold, first at 51.10 ms and last at 1921.14 ms.
 
 # %%
-constant = spikes(np.array([0.0, 1e-6, 20000.0]), np.array([0.0, 30.0, 30.0]), step=0.5)
+constant = spikes(
+    np.array([0.0, 1e-6, 20000.0]), np.array([0.0, 30.0, 30.0]), step=0.5
+)
 ramp = spikes(np.array([0.0, 100.0, 2100.0]), np.array([0.0, 20.0, 20.0]))
 interval = np.diff(constant)[-1]
 print(
-    f"{interval:.2f} ms; {(ramp <= 100).sum()} and {(ramp > 100).sum()}, {ramp[0]:.2f} to {ramp[-1]:.2f} ms"
+    f"{interval:.2f} ms; {(ramp <= 100).sum()} and {(ramp > 100).sum()}, "
+    f"{ramp[0]:.2f} to {ramp[-1]:.2f} ms"
 )
 
 # %% [markdown]
@@ -106,13 +112,17 @@ def signal(result):
 
 
 fired = {name: spikes(*signal(result)) for name, result in runs.items()}
-figure, (upper, lower) = plt.subplots(2, 1, sharex=True, height_ratios=[2, 1], layout="constrained")
+figure, (upper, lower) = plt.subplots(
+    2, 1, sharex=True, height_ratios=[2, 1], layout="constrained"
+)
 for row, (name, result) in enumerate(runs.items()):
     (line,) = upper.plot(*signal(result), label=name)
     lower.vlines(fired[name], row - 0.35, row + 0.35, color=line.get_color())
 upper.set(ylabel="vertical compression (kPa)")
 upper.legend(title="pressed")
-lower.set(xlabel="time (ms)", yticks=range(len(runs)), yticklabels=runs, ylabel="pressed")
+lower.set(
+    xlabel="time (ms)", yticks=range(len(runs)), yticklabels=runs, ylabel="pressed"
+)
 plt.show()
 plt.close(figure)
 
@@ -123,7 +133,10 @@ plt.close(figure)
 # %%
 for name, result in runs.items():
     time, stress = signal(result)
-    print(f"pressed {name}: {stress[-1]:.1f} kPa in the end, {fired[name].size} spikes", end=", ")
+    print(
+        f"pressed {name}: {stress[-1]:.1f} kPa in the end, {fired[name].size} spikes",
+        end=", ",
+    )
     print(f"shortest interval {np.diff(fired[name]).min():.0f} ms")
 
 # %% [markdown]

@@ -25,7 +25,14 @@ import numpy as np
 import evfem as ev
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Layers
-from evfem.estimate.rendering import apparent_friction, compare, exact, record, replay, voltage_for
+from evfem.estimate.rendering import (
+    apparent_friction,
+    compare,
+    exact,
+    record,
+    replay,
+    voltage_for,
+)
 
 # %% [markdown]
 # ## 1. Slide over the real surface
@@ -35,7 +42,10 @@ from evfem.estimate.rendering import apparent_friction, compare, exact, record, 
 # %%
 finger = ev.FingerPad(resolution="coarse", ridges=False)
 real_surface = ev.Flat(friction=[[0.0, 0.5], [1.0, 0.5], [1.0, 0.6]])
-motion = [ev.Press(force=0.05, steps=2), ev.Slide(distance=4.0, steps=16, hold="force")]
+motion = [
+    ev.Press(force=0.05, steps=2),
+    ev.Slide(distance=4.0, steps=16, hold="force"),
+]
 real = record(ev.Scene(finger, real_surface, motion=motion))
 real.result
 
@@ -45,7 +55,10 @@ real.result
 
 # %%
 felt = apparent_friction(real.result)
-print(f"full slip from x = {real.full_slip:.2f} mm on; friction at the end {felt.friction[-1]:.4f}")
+print(
+    f"full slip from x = {real.full_slip:.2f} mm on; friction at the end "
+    f"{felt.friction[-1]:.4f}"
+)
 
 # %% [markdown]
 # ## 2. A voltage by closed form
@@ -58,7 +71,10 @@ law = ev.Kaczmarek()
 layers = Layers.of(ev.Layer(thickness=0.38, eps_r=1650.0), display.insulator)
 encoding = Encoding(law, layers, AreaLaw(112.0), friction=display.friction)
 closed = voltage_for(felt, encoding)
-print(f"at most {closed.largest:.0f} V, {closed.rms:.0f} V rms; carrier amplitude {closed.carrier:.0f} V")
+print(
+    f"at most {closed.largest:.0f} V, {closed.rms:.0f} V rms; carrier "
+    f"amplitude {closed.carrier:.0f} V"
+)
 
 # %% [markdown]
 # ## 3. Exactly
@@ -74,7 +90,10 @@ comparisons = {
     "exact": compare(real.result, by_model.result),
 }
 for name, found in comparisons.items():
-    print(f"{name:<12} relative error {found.relative_l2:.1e}, largest {found.largest_error:.1e} N/mm")
+    print(
+        f"{name:<12} relative error {found.relative_l2:.1e}, largest "
+        f"{found.largest_error:.1e} N/mm"
+    )
 
 # %% [markdown]
 # ## 4. Look at both
@@ -85,15 +104,25 @@ for name, found in comparisons.items():
 # %%
 slides = real.result.motion == "slide"
 x = real.result.position[slides]
-figure, (top, middle, bottom) = plt.subplots(3, 1, sharex=True, figsize=(7, 6.5), layout="constrained")
-top.plot(x, real.result.applied_tangential_force[slides], color="#555555", linewidth=4, label="real surface")
+figure, (top, middle, bottom) = plt.subplots(
+    3, 1, sharex=True, figsize=(7, 6.5), layout="constrained"
+)
+top.plot(
+    x,
+    real.result.applied_tangential_force[slides],
+    color="#555555",
+    linewidth=4,
+    label="real surface",
+)
 for (name, run), colour, line in zip(
     {"closed form": by_closed_form, "exact": by_model}.items(),
     ("#E69F00", "#0072B2"),
     ("-", "--"),
     strict=True,
 ):
-    top.plot(x, run.result.applied_tangential_force[slides], line, color=colour, label=name)
+    top.plot(
+        x, run.result.applied_tangential_force[slides], line, color=colour, label=name
+    )
     middle.plot(x, 1e6 * comparisons[name].error, line, color=colour)
     bottom.plot(x, run.result.voltage[slides], line, color=colour)
 top.set_ylabel("friction force (N/mm)")

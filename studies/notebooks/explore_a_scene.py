@@ -41,7 +41,10 @@ def slide(load=0.05, voltage=1000.0, friction=0.3, distance=1.0):
         ev.Display(friction=friction),
         law=ev.Kaczmarek(),
         voltage=voltage,
-        motion=[ev.Press(force=load, steps=3), ev.Slide(distance=distance, steps=6, hold="force")],
+        motion=[
+            ev.Press(force=load, steps=3),
+            ev.Slide(distance=distance, steps=6, hold="force"),
+        ],
         output=ev.Output(every=9),  # the fields of the last step only
     )
     return ev.simulate(scene)
@@ -50,7 +53,9 @@ def slide(load=0.05, voltage=1000.0, friction=0.3, distance=1.0):
 def show(load=0.05, voltage=1000.0, friction=0.3, distance=1.0):
     """Forces over the steps above the deformed pad, with the von Mises stress."""
     result = slide(load, voltage, friction, distance)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=[1, 1.35], layout="constrained")
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(11, 4), width_ratios=[1, 1.35], layout="constrained"
+    )
     plotting.forces(result, ax=left)
     plotting.deformed(result, "von_mises", ax=right)
     plt.show()
@@ -76,9 +81,15 @@ else:
     controls = interactive(
         show,
         load=FloatSlider(0.05, min=0.01, max=0.2, step=0.01, continuous_update=False),
-        voltage=FloatSlider(1000.0, min=0.0, max=2000.0, step=100.0, continuous_update=False),
-        friction=FloatSlider(0.3, min=0.05, max=1.0, step=0.05, continuous_update=False),
-        distance=FloatSlider(1.0, min=0.2, max=3.0, step=0.2, continuous_update=False),
+        voltage=FloatSlider(
+            1000.0, min=0.0, max=2000.0, step=100.0, continuous_update=False
+        ),
+        friction=FloatSlider(
+            0.3, min=0.05, max=1.0, step=0.05, continuous_update=False
+        ),
+        distance=FloatSlider(
+            1.0, min=0.2, max=3.0, step=0.2, continuous_update=False
+        ),
     )
 controls
 
@@ -100,6 +111,7 @@ balance = result.normal_force - result.electrostatic_force - result.applied_forc
 added = result.electrostatic_force[-1] / result.applied_force[-1]
 print(f"forces balance to {abs(balance).max():.0e} N/mm")
 print(
-    f"friction coefficient seen from the bone: {result.tangential_force[-1] / result.applied_force[-1]:.4f}"
+    f"friction coefficient seen from the bone: "
+    f"{result.tangential_force[-1] / result.applied_force[-1]:.4f}"
 )
 print(f"the voltage adds {added:.1%} to the load")

@@ -48,18 +48,34 @@ def show():
     """Tractions of the last step, and the friction force of all steps."""
     result = loop.result()
     frame, last = result.frames[-1], result.rows[-1]
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(10, 3.6), layout="constrained"
+    )
     pad = result.mesh.node_sets["pad"]
     x = (result.mesh.points + frame.displacement)[pad, 0] - frame.position
     order = np.argsort(x)
     left.plot(x[order], 1e3 * frame.contact_pressure[pad][order], label="pressure")
-    left.plot(x[order], 1e3 * frame.shear_traction[pad][order], "--", label="shear traction")
-    left.set(xlim=(-5.0, 5.0), ylim=(-6.0, 18.0), xlabel="place below the bone (mm)", ylabel="traction (kPa)")
+    left.plot(
+        x[order], 1e3 * frame.shear_traction[pad][order], "--", label="shear traction"
+    )
+    left.set(
+        xlim=(-5.0, 5.0),
+        ylim=(-6.0, 18.0),
+        xlabel="place below the bone (mm)",
+        ylabel="traction (kPa)",
+    )
     left.set_title(f"{last['voltage']:.0f} V, bone at {last['position']:.2f} mm")
     left.legend(loc="upper right")
     right.plot(result.position, result.tangential_force, ".-")
     right.axhline(FRICTION * LOAD, color="0.6", ls=":")
-    right.text(2.95, FRICTION * LOAD - 4e-4, "friction times load", ha="right", va="top", color="0.4")
+    right.text(
+        2.95,
+        FRICTION * LOAD - 4e-4,
+        "friction times load",
+        ha="right",
+        va="top",
+        color="0.4",
+    )
     right.set(xlim=(0.0, 3.0), ylim=(0.0, 0.025))
     right.set(xlabel="position of the bone (mm)", ylabel="friction force (N/mm)")
     plt.show()
@@ -74,7 +90,10 @@ def show():
 # %%
 for load in (0.5 * LOAD, LOAD):
     row = loop.step(force=load)
-    print(f"{row.applied_force:.3f} N/mm: {row.indentation:.2f} mm deep, {row.contact_width:.2f} mm wide")
+    print(
+        f"{row.applied_force:.3f} N/mm: {row.indentation:.2f} mm deep, "
+        f"{row.contact_width:.2f} mm wide"
+    )
 figures = [show()]
 
 # %% [markdown]
@@ -93,7 +112,10 @@ figures.append(show())
 for position in places[3:]:
     row = loop.step(position=position)
 figures.append(show())
-print(f"friction force {row.tangential_force:.4f} N/mm, {FRICTION} times {row.normal_force:.4f} N/mm")
+print(
+    f"friction force {row.tangential_force:.4f} N/mm, {FRICTION} times "
+    f"{row.normal_force:.4f} N/mm"
+)
 
 # %% [markdown]
 # ## 3. The voltage
@@ -114,7 +136,10 @@ for position in np.linspace(1.625, 3.0, 12):
     row = loop.step(position=position)
 figures.append(show())
 coefficient = row.tangential_force / row.applied_force
-print(f"friction coefficient seen from the bone: {coefficient:.3f}, without a voltage {FRICTION}")
+print(
+    f"friction coefficient seen from the bone: {coefficient:.3f}, without a "
+    f"voltage {FRICTION}"
+)
 
 # %% [markdown]
 # ## Ask for something else
@@ -135,8 +160,12 @@ else:
 
     controls = interactive(
         step,
-        position=FloatSlider(3.0, min=0.0, max=3.0, step=0.05, description="position (mm)"),
-        voltage=FloatSlider(VOLTAGE, min=0.0, max=VOLTAGE, step=100.0, description="voltage (V)"),
+        position=FloatSlider(
+            3.0, min=0.0, max=3.0, step=0.05, description="position (mm)"
+        ),
+        voltage=FloatSlider(
+            VOLTAGE, min=0.0, max=VOLTAGE, step=100.0, description="voltage (V)"
+        ),
     )
 controls
 

@@ -165,10 +165,7 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (
-            lambda: MeasuredCurve("motion", "indentation", [0.1], [1.0]),
-            r'data\.column: given "motion", no column',
-        ),
+        (lambda: MeasuredCurve("motion", "indentation", [0.1], [1.0]), r'data\.column: given "motion", no'),
         (lambda: MeasuredCurve("time", "depth", [0.1], [1.0]), r'data\.over: given "depth", no column'),
         (lambda: MeasuredCurve("time", "position", [0.1], [1.0, 2.0]), "given 2 values; allowed: as many"),
         (lambda: MeasuredCurve("time", "position", [], []), "given 0 values"),
@@ -193,6 +190,14 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
 def test_what_is_no_measurement_is_refused(make, sentence):
     with pytest.raises(InputError, match=sentence):
         make()
+
+
+def test_separators_at_the_ends_of_lines_and_units_after_a_blank(tmp_path):
+    """As profilometers write: a header and lines that end with one comma, or two."""
+    path = tmp_path / "scan.csv"
+    path.write_text("Lateral um,Load mN,\n0.0,-2.0,,\n500.0,4.0,,\n")
+    curve = MeasuredCurve.from_csv(path, columns={"position": 1, "normal_force": 2})
+    assert (curve.at.tolist(), curve.values.tolist()) == ([0.0, 0.5], [-0.002, 0.004])
 
 
 def test_a_file_in_newtons_is_divided_by_its_depth(tmp_path):

@@ -1,5 +1,5 @@
-"""Tables and the page on the paper are written from the studies' files: every block has its maker,
-the numbers are the file's, and the page is not older than studies and files.
+"""What pages say of runs is written from files in docs/results: every block has its maker, the numbers are
+the file's, and no page is older than studies and files.
 """
 
 import csv
@@ -32,44 +32,126 @@ MADE = {"date": "2030-01-02T03:04:05", "versions": {"evfem": "9.9"}}
 PEERS = {"numbers": NUMBERS, "assumptions": {"peers": {"dolfinx": "0.5"}}, "provenance": MADE}
 
 
-def test_every_block_of_the_page_has_a_maker_and_every_maker_its_block():
-    names = [name for _, name, _ in MEASURED["BLOCK"].findall(MEASURED["PAGE"].read_text("utf-8"))]
-    assert sorted(names) == sorted(name for blocks in MEASURED["BLOCKS"].values() for name in blocks)
+def page(name):
+    return (DOCS.parent / name).read_text(encoding="utf-8")
+
+
+def test_every_block_of_the_pages_has_a_maker_and_every_maker_its_block():
+    found = [
+        name
+        for path in MEASURED["PAGES"]
+        for _, name, _ in MEASURED["BLOCK"].findall(path.read_text("utf-8"))
+    ]
+    assert sorted(found) == sorted(MEASURED["BLOCKS"])
+
+
+@pytest.mark.parametrize("path", MEASURED["PAGES"], ids=lambda path: path.name)
+def test_no_page_is_older_than_the_files(path):
+    """`python docs/measured.py` writes it anew."""
+    text = path.read_text(encoding="utf-8")
+    assert MEASURED["renewed"](text) == text
 
 
 def test_the_tables_have_the_numbers_of_the_file():
-    page = MEASURED["renewed"](MEASURED["PAGE"].read_text("utf-8"), {"peers": PEERS})
-    assert "| B, L2 | quadratic | 0.05 %, 0.03 % | 3.2, 250 | 64, 200 | not run | not run |" in page
-    assert "| B, quadratic | - | - | 20 |" in page
-    assert "| A, linear | - | - | 31 |" in page
-    assert "| B, quadratic, with imports | - | - | 15 |" in page
-    assert "| B, friction force after 3 mm | each its best | 0.25 | 5 | - | - | 20 |" in page
-    assert "One run on 2030-01-02, one thread: evfem 9.9, dolfinx 0.5." in page
-    # what has no file stays
-    before = MEASURED["PAGE"].read_text("utf-8")
-    assert page.split("## Which element and mesh")[1] == before.split("## Which element and mesh")[1]
+    costs, ratios, race = (MEASURED[name](PEERS) for name in ("costs", "ratios", "race"))
+    assert "| B, L2 | quadratic | 0.05 %, 0.03 % | 3.2, 250 | 64, 200 | not run | not run |" in costs
+    assert "| B, quadratic | - | - | 20 |" in ratios
+    assert "| A, linear | - | - | 31 |" in ratios
+    assert "| B, quadratic, with imports | - | - | 15 |" in ratios
+    assert "| B, friction force after 3 mm | each its best | 0.25 | 5 | - | - | 20 |" in race
+    assert MEASURED["run"](PEERS) == "One run on 2030-01-02, one thread: evfem 9.9, dolfinx 0.5.\n"
 
 
-def test_the_rows_of_readme_are_those_of_the_file():
-    text = MEASURED["rows_of_readme"](MEASURED["README"].read_text("utf-8"), PEERS)
+RUNS = {
+    "default.steps": 110.0,
+    "default.nodes": 10800.0,
+    "default.MB": 26.4,
+    "default.fast.cpu_s": 4.96,
+    "default.plain.cpu_s": 9.04,
+    **{f"loop.{name}.unknowns": 6312.0 for name in MEASURED["LOOPS"]},
+    **{f"loop.{name}.begin_s": 0.41 for name in MEASURED["LOOPS"]},
+    **{f"loop.{name}.{key}": 0.0113 for name in MEASURED["LOOPS"] for key in ("median_s", "ninth_s")},
+}
+
+
+def test_readme_and_pages_have_the_runs_of_the_command_and_of_loops():
+    runs = {"numbers": RUNS}
+    text = MEASURED["readme"](PEERS, runs)
     assert "| a slide on 23,000 nodes | error 0.05 %, 3.2 CPU s; fastest other package 64 s |" in text
     assert "| time to 0.1 % of the friction force | 0.25 CPU s; fastest other package 5 s |" in text
-    assert "with version 9.9 on\n2030-01-02:" in text
+    assert "| default run, 110 steps, one thread | 5 CPU s with `[fast]`, 9 without |" in text
+    assert "(10,800 nodes, 110 steps, 26 MB of files)" in MEASURED["default_run"](runs)
+    assert '| `FingerPad("coarse")`, 6,300 unknowns | 0.41 s | 11 ms | 11 ms |' in MEASURED["loop_times"](
+        runs
+    )
 
 
-def test_a_run_without_the_slide_leaves_the_readme_as_it_is():
-    fewer = {key: value for key, value in NUMBERS.items() if not key.startswith("race.B")}
-    text = MEASURED["README"].read_text("utf-8")
-    assert MEASURED["rows_of_readme"](text, PEERS | {"numbers": fewer}) == text
+def test_what_breaks_nothing_is_counted_from_its_files():
+    long = [{"question": "9 files", "answer": "read", "where": "test_fuzz"}]
+    last = {"equilibrium": "997", "explained": "3", "scenes": "1000"}
+    case = {"numbers": {"good": 3.0, "cases": 4.0}}
+    text = MEASURED["robustness"](case, [last], long, {"mistake": [1, 2]})
+    assert "| 9 files | read | `test_fuzz` |" in text
+    assert "| hard cases | 3 of 4 end as they should | `evfem study stability` |" in text
+    assert "| 1,000 drawn scenes | 997 equilibria, 3 explained | `evfem study campaign` |" in text
+    assert "| 2 mistakes in the physics |" in text
+
+
+def test_a_campaign_of_the_same_seed_takes_the_place_of_the_older_one():
+    numbers = dict.fromkeys(MEASURED["ENDS"], 7.0) | {
+        "slowest_over_median": 105.4,
+        "largest_remainder": 2.2e-6,
+    }
+    found = {
+        "numbers": numbers,
+        "provenance": MADE | {"parameters": {"seed": 5, "limit": 60}, "commit": "abc"},
+    }
+    rows = MEASURED["with_campaign"]([{"seed": "4"}, {"seed": "5"}], found)
+    assert [row["seed"] for row in rows] == ["4", "5"]
+    assert list(rows[1]) == page("docs/results/campaigns.csv").splitlines()[0].split(",")
+    assert "| `timeout` | 7 |" in MEASURED["campaigns"](rows[1:])
+
+
+def test_sentences_of_the_gallery_have_the_numbers_of_their_files():
+    air = {
+        f"finger.{pad}.pressed.{field}_air_share": 0.381
+        for pad in ("ridged", "smooth")
+        for field in ("full", "local")
+    }
+    cases = ("HVHD", "HVLD", "LVLD")
+    many = {
+        f"participants.{key}.{case}": 1.4 for key in ("full_over_measured", "gain_median") for case in cases
+    }
+    grooves = {f"spreading.{kind}{gap}": 1.62 for kind in ("", "filled.") for gap in ("smooth", "5um")}
+    text = MEASURED["fringe"]({"numbers": air | many | grooves})
+    assert "the ridged finger has 38 % of its attraction beside the contact" in text
+    stiff = {f"{one}.{way}.stiffness_N_per_mm": 2.0 for one in ("along", "smooth") for way in "xz"}
+    stiff |= {f"{one}.{way}.stiffness_N_per_mm": 1.9 for one in ("whorl", "loop", "arch") for way in "xz"}
+    text = MEASURED["fingerprint"]({"numbers": stiff | {"along.x.stiffness_N_per_mm": 1.8}})
+    assert "Parallel ridges are 10 % softer across" in text
+    assert "curved ones 5 to 5 % softer" in text
+    areas = {"verdict.smooth.gross_over_adams.1N": 0.3, "verdict.ridged.ridge_over_adams.1N": 0.5}
+    areas |= {
+        f"verdict.ridged.{law}.median_over_measured.HVHD": 1.0 for law in ("kaczmarek", "strong_troxel")
+    }
+    change = {"variant.smooth.area_mm2": 10.0, "variant.all moduli x 0.5.area_mm2": 13.9}
+    change |= {
+        "variant.free rim.area_mm2": 11.2,
+        "variant.wanted_over_unchanged": 1.61,
+        "width_mm.smooth.1N": 4.5,
+    }
+    text = MEASURED["fingertip"]({"numbers": areas | change})
+    assert "half of all moduli add 39 % at 0.5 N" in text
+    assert "more than 12 %" in " ".join(text.split())
 
 
 def test_quick_runs_do_not_get_to_the_pages(tmp_path):
     quick = PEERS | {"provenance": MADE | {"quick": True}}
     (tmp_path / "peers.json").write_text(json.dumps(quick))
-    before = MEASURED["PAGE"].read_text("utf-8")
+    before = page("docs/performance.md")
     with pytest.raises(SystemExit, match="--quick"):
         MEASURED["main"](tmp_path)
-    assert MEASURED["PAGE"].read_text("utf-8") == before
+    assert page("docs/performance.md") == before
 
 
 @pytest.mark.parametrize("value", [None, 0.123, 9.96, 12.4, 345.0])

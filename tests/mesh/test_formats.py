@@ -38,6 +38,14 @@ def test_what_meshio_cannot_read_is_refused_in_a_sentence(tmp_path, capsys, name
     assert capsys.readouterr().out == ""
 
 
+def test_an_element_that_meshio_does_not_know_is_named(tmp_path):
+    (tmp_path / "ring.inp").write_text(INP.replace("CPS4", "CAX4"))
+    with pytest.raises(
+        InputError, match=r"ring\.inp \(elements CAX4, which meshio does not know: export plane"
+    ):
+        read(tmp_path / "ring.inp")
+
+
 LAW = ev.NeoHookean(E=0.1, nu=0.4)
 POINTS = [[x, y, 0.0] for y in (0.0, 4.0) for x in (0.0, 4.0, 8.0)]
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])

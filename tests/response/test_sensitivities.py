@@ -289,10 +289,7 @@ CASES = {
     ),
     "rate": (lambda: block(friction_law=ev.RateFriction(speed=1.0, ratio=0.7)), "surface.friction_law.ratio"),
     "ageing": (lambda: block(friction_law=ev.AgeingFriction(0.5, 0.3)), "surface.friction_law.time"),
-    "sines": (
-        lambda: block(surface=ev.Sinusoid(terms=[[0.05, 0.5, 0.3]], **LAYERED)),
-        "surface.terms.0.0",
-    ),
+    "sines": (lambda: block(surface=ev.Sinusoid(terms=[[0.05, 0.5, 0.3]], **LAYERED)), "surface.terms.0.0"),
     "normal": (lambda: block(direction="normal"), "electrostatics.voltage"),
     "inertia": (lambda: block(solver=replace(block().solver, dynamics="inertial")), TISSUE + "E"),
     "jump of friction": (

@@ -1,6 +1,4 @@
-"""Sweeps run: the numbers of single runs, failures in the table, kills, resuming, processes and
-Dask.
-"""
+"""Sweeps run: the numbers of single runs, failures in the table, kills, resuming, processes and Dask."""
 
 import csv
 import json
@@ -430,3 +428,8 @@ def test_the_command_says_what_became_of_the_points(plan, tmp_path, monkeypatch,
     assert cli.main(["sweep", str(plan), "--workers", "1", "--resume"]) == 0
     assert capsys.readouterr().out == "4 points: 4 done; table in many-out/sweep.csv\n"
     assert cli.main(["sweep", "missing.toml"]) == 2
+
+
+def test_a_scene_alone_is_no_sweep():
+    with pytest.raises(InputError, match=r"^sweep: given a Scene; allowed: Sweep\(scene, grid="):
+        ev.sweep(ev.default_scene(), {"surface.friction": [0.1, 0.2]})
