@@ -5,7 +5,8 @@ of the contact slips, and 3 mm, where all of it does. Derivatives of normal and 
 attraction are those of `ev.sensitivities`; a width of contact counts nodes, and is differenced between runs
 with a parameter 10 % smaller and larger. Expected: the indentation given, the soft layers decide the normal
 force; friction decides the tangential one in full slip alone, stiffness in partial slip; the voltage counts
-twice, and the insulator, which Kaczmarek's law sees alone, more than the skin.
+twice in the attraction, the thicknesses of insulator and stratum corneum nearly once, and the permittivity of
+skin not at all.
 
 Figs 5 and 11 again, with bands of one standard deviation to first order (`ev.uncertainty`): the force of the
 hovering finger, and the attraction (9b) over the load, with and without ridges. The share of the air layer
@@ -62,7 +63,8 @@ ASSUMPTIONS = {
     "depth": "0.7 mm in three steps, then held: the normal force is what the finger answers",
     "law": "Kaczmarek's, 1000 V; display and friction of Table 2",
     "elasticity": "d ln column / d ln parameter; of nu too, whose distance to 1/2 changes by more",
-    "width": "central difference over 10 %, of a number that counts nodes: good to 0.02 or so",
+    "width": "central difference over 10 % of a parameter, of nu of its distance to 1/2: a node at the edge "
+    "of the contact changes it by 0.3, by nu of the hypodermis by 7, as in full slip",
     "spreads": "standard deviations: moduli of all soft layers 20 % (assumed); stratum corneum, insulator, "
     "permittivity, voltage and gap those of the uniform spreads of the study uncertainty; independent",
     "width out of the plane": "9 mm for Fig. 5, the middle of the paper's 8 to 10",

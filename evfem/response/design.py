@@ -8,7 +8,7 @@ Nocedal, C. Zhu, SIAM J. Sci. Comput. 16 (1995) 1190-1208, doi:10.1137/0916069.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
@@ -63,11 +63,10 @@ class _Search:
     progress: bool
     best: Design | None = None
     runs: int = 0
-    scale: float = field(default=0.0)
+    scale: float = 0.0
 
     def __call__(self, z: Floats) -> tuple[float, Floats]:
-        low, high = self.bounds.T
-        scene = self.scene
+        scene, (low, high) = self.scene, self.bounds.T
         values = dict(zip(self.keys, (low + z * (high - low)).tolist(), strict=True))
         for key, value in values.items():
             one = parameter_of(scene, key)
@@ -157,22 +156,15 @@ def design(
 def _bounds(scene: Scene, keys: tuple[str, ...], given: Any) -> Floats:
     """Bounds (P, 2) of the keys, the start within."""
     pairs: list[Any] = [given.get(key) for key in keys] if isinstance(given, Mapping) else list(given)
-    rows = []
     if len(pairs) != len(keys):
         raise InputError("bounds", f"{len(pairs)} for {len(keys)} parameters", "a pair (low, high) for each")
     for key, pair in zip(keys, pairs, strict=True):
         value = parameter_of(scene, key).value
         numbers = isinstance(pair, Sequence) and len(pair) == 2 and not isinstance(pair, str)
-        if (
-            not numbers
-            or not float(pair[0]) < float(pair[1])
-            or not float(pair[0]) <= value <= float(pair[1])
-        ):
-            raise InputError(
-                f"bounds.{key}", quoted(pair), f"(low, high) around {value:g}, that of the scene"
-            )
-        rows.append([float(pair[0]), float(pair[1])])
-    return np.array(rows)
+        if not numbers or pair[0] == pair[1] or not float(pair[0]) <= value <= float(pair[1]):
+            allowed = f"(low, high) around {value:g}, that of the scene"
+            raise InputError(f"bounds.{key}", quoted(pair), allowed)
+    return np.array(pairs, dtype=float)
 
 
 def _objective(scene: Scene, given: Any) -> Callable[[Result], float]:

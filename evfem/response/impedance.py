@@ -34,7 +34,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import choice
 from evfem.common.pools import blas_limits
 from evfem.common.storage import write_text
-from evfem.common.tables import csv_text
+from evfem.common.tables import csv_text, numbers
 from evfem.contact.condensed import COMPONENTS
 from evfem.contact.signorini import FORWARD, STICK, sizes
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
@@ -80,11 +80,10 @@ class Impedance:
 
     def __repr__(self) -> str:
         """Axis, and stiffness at the first and the last frequency."""
-        ends = dict.fromkeys((0, len(self.frequency) - 1))
         told = [
             f"{abs(self.stiffness[i]):.4g} {self.unit} at {np.degrees(np.angle(self.stiffness[i])):.3g} "
             f"degrees at {self.frequency[i]:g} Hz"
-            for i in ends
+            for i in dict.fromkeys((0, len(self.frequency) - 1))
         ]
         return f"Impedance, {self.axis}: " + ", ".join(told)
 
@@ -140,11 +139,8 @@ def impedance(
 
 def _checked(frequencies: Any) -> Floats:
     allowed = "one or several frequencies in Hz, larger than 0"
-    try:
-        found = np.atleast_1d(np.array(frequencies, dtype=float))
-    except (TypeError, ValueError):
-        raise InputError("frequencies", quoted(frequencies), allowed) from None
-    if found.ndim > 1 or not found.size or not (np.isfinite(found) & (found > 0.0)).all():
+    found = numbers("frequencies", [frequencies] if np.isscalar(frequencies) else frequencies, allowed)
+    if not found.size or found.min() <= 0.0:
         raise InputError("frequencies", quoted(frequencies), allowed)
     return found
 
@@ -308,34 +304,27 @@ class Contact:
         return felt
 
     def _attraction(self) -> Any:
-        import scipy.sparse as sparse
-
         attraction: Any = self.model.attraction
-        state = self.state
+        state, u = self.state, self.unknowns.ravel()
         if attraction is None or not attraction.acts(state.voltage):
-            return sparse.csr_matrix((self.size, self.size))
+            return self._matrix(np.zeros(0), u[:0], u[:0])
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         if attraction.has_fringes:
-            found = attraction.fringe_stiffness(place, state.voltage, pressing)
+            found = attraction.fringe_stiffness(place, state.voltage, pressing).tocoo()
         else:
-            found = attraction.stiffness(place, state.voltage, state.touching, pressing)
-        return self._on_pad(found.tocoo())
+            found = attraction.stiffness(place, state.voltage, state.touching, pressing).tocoo()
+        return self._matrix(found.data, u[found.row], u[found.col])
 
-    def _on_pad(self, matrix: Any) -> Any:
-        """A matrix on the pad's unknowns (P dim, P dim) on the reduced ones."""
+    def _matrix(self, values: Floats, rows: Ints, columns: Ints) -> Any:
+        """Values at these places of a matrix on the reduced unknowns."""
         import scipy.sparse as sparse
 
-        rows, columns = (self.unknowns.ravel()[index] for index in (matrix.row, matrix.col))
-        return sparse.csr_matrix((matrix.data, (rows, columns)), (self.size, self.size))
+        return sparse.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), (self.size, self.size))
 
     def _blocks(self, blocks: Floats) -> Any:
         """Blocks (k, dim, dim) of the touching nodes, in x, y[, z], on the reduced unknowns."""
-        import scipy.sparse as sparse
-
         u = self.unknowns[self.nodes]
-        rows = np.repeat(u, self.dim, axis=1).ravel()
-        columns = np.tile(u, (1, self.dim)).ravel()
-        return sparse.csr_matrix((blocks.ravel(), (rows, columns)), (self.size, self.size))
+        return self._matrix(blocks, np.repeat(u, self.dim, axis=1), np.tile(u, (1, self.dim)))
 
     @property
     def _shear(self) -> Floats:
@@ -356,19 +345,14 @@ class Contact:
 
     def _turning(self) -> Any:
         """Contact forces that turn with the profile, and friction that changes with place and length."""
-        import scipy.sparse as sparse
-
         turned = self.known.surface.turned(self.known.force)[:, COMPONENTS[: self.dim]]
         blocks = np.zeros_like(self.axes)
         blocks[:, :, ::2] = -turned - self._shear[:, :, None] * self.by_place[:, None]
         of, moved, value = self.pad.tributary_gradient(self.interface.positions(self.state.u))
         among = np.zeros((self.state.status.size, self.dim))
         among[self.nodes] = self.by_length[:, None] * self._shear
-        rows = (self.dim * of[:, None] + np.arange(self.dim)).ravel()
-        values = (-among[of] * value[:, None]).ravel()
-        entries = (values, (rows, np.repeat(moved, self.dim)))
-        size = self.unknowns.size
-        return self._blocks(blocks) + self._on_pad(sparse.coo_matrix(entries, (size, size)))
+        columns = np.repeat(self.unknowns.ravel()[moved], self.dim)
+        return self._blocks(blocks) + self._matrix(-among[of] * value[:, None], self.unknowns[of], columns)
 
     def _dashpots(self) -> Any:
         """Friction that depends on the speed, and in space on the direction of a slip."""
@@ -376,11 +360,9 @@ class Contact:
         along = e[:, :, None] * e[:, None]
         blocks = self.by_speed[:, None, None] * along
         if self.dim == 3:
-            tangents = self.axes[:, 1:]
-            across = np.einsum("kai,kaj->kij", tangents, tangents) - along
-            blocks += (
-                np.where(moves, self.bound / np.where(moves, self.speed, 1.0), 0.0)[:, None, None] * across
-            )
+            across = np.einsum("kai,kaj->kij", self.axes[:, 1:], self.axes[:, 1:]) - along
+            turning = np.where(moves, self.bound / np.where(moves, self.speed, 1.0), 0.0)
+            blocks += turning[:, None, None] * across
         return self._blocks(blocks)
 
     def _motions(self) -> tuple[Any, Any]:

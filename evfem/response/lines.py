@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,9 @@ LOST = "the linear equations of step {} were not solved"
 WHOLE = ("contact_width", "contact_area", "mean_contact_pressure")
 #: derivatives of states and books, by their fields
 Change = dict[str, Any]
+Jumps = Sequence[Steps]
+Lengths = Callable[[State], Floats]
+Solve = Callable[[Floats], Floats]
 
 
 def differentiable(column: str) -> bool:
@@ -75,16 +78,13 @@ def difference(values: Sequence[Any], step: float) -> Any:
     return sum(weight * np.asarray(value) for weight, value in zip(WEIGHTS, values, strict=True)) / step
 
 
-def numbers_of(owner: Any) -> Change:
-    """The fields of a state or of books that are real numbers."""
-    values = {spec.name: getattr(owner, spec.name) for spec in fields(owner)}
-    return {name: v for name, v in values.items() if np.asarray(v).dtype.kind == "f"}
-
-
-def changes(owners: Sequence[Any], step: float) -> Change:
-    """`difference` of every field of states or books."""
-    found = [numbers_of(one) for one in owners]
-    return {name: difference([one[name] for one in found], step) for name in found[0]}
+def changes(owners: Sequence[Any], step: float) -> Any:
+    """`difference` of arrays, or of every field of states or books that has real numbers."""
+    if not is_dataclass(owners[0]):
+        return difference(owners, step)
+    names = [spec.name for spec in fields(owners[0])]
+    real = [name for name in names if np.asarray(getattr(owners[0], name)).dtype.kind == "f"]
+    return {name: difference([getattr(one, name) for one in owners], step) for name in real}
 
 
 def added(first: Change, second: Change) -> Change:
@@ -129,7 +129,7 @@ class Beside:
             run = Run(scene if parameter is None else parameter.applied(scene, way), None)
         return cls(run, way, run.requests())
 
-    def begin(self, part: Accepted, jumps: Sequence[Steps], old: State) -> Equations:
+    def begin(self, part: Accepted, jumps: Jumps, old: State) -> Equations:
         """The equations of a part from `old`; `jumps` of friction are those of the followed run."""
         assert self.request is not None
         pins, own = part.pins.copy(), self.run.model.equilibrium.interface.jumps.steps
@@ -166,7 +166,7 @@ class Line:
     longest: float
     beside: list[Beside]
     centre: Beside
-    lengths: Callable[[State], Floats]
+    lengths: Lengths
     works: bool
     state: Change = field(default_factory=dict)
     books: Change = field(default_factory=dict)
@@ -178,14 +178,7 @@ class Line:
     reason: str = ""
 
     @classmethod
-    def of(
-        cls,
-        scene: Scene,
-        parameter: Parameter,
-        centre: Beside,
-        lengths: Callable[[State], Floats],
-        works: bool,
-    ) -> Line:
+    def of(cls, scene: Scene, parameter: Parameter, centre: Beside, lengths: Lengths, works: bool) -> Line:
         """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
         step = longest = STEP * parameter.size
         last = Beside.of(scene, parameter, PLACES[-1] * step)
@@ -197,16 +190,9 @@ class Line:
         state = changes([one.run.state for one in beside], step)
         return cls(parameter.name, step, longest, beside, centre, lengths, works, state)
 
-    @property
-    def far(self) -> float:
-        """How far places are apart for what is smooth."""
-        return FAR * self.longest
-
     # -- a part
 
-    def follow(
-        self, part: Accepted, solve: Callable[[Floats], Floats], jumps: Sequence[Steps], patient: bool
-    ) -> bool:
+    def follow(self, part: Accepted, solve: Solve, jumps: Jumps, patient: bool) -> bool:
         """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(part, jumps, part.old) for one in self.beside]
         voltage = difference([one.target.voltage.voltage for one in equations], self.step)
@@ -240,9 +226,7 @@ class Line:
             change[name] = change[name] + part.reshape(change[name].shape)
 
     def _share(self, more: Floats, change: Change, state: State) -> float:
-        """The largest change of displacements and of contact forces, as a share of the largest derivative of
-        each, or of the largest value over the parameter.
-        """
+        """The largest change of an unknown, as a share of the largest derivative or value over parameter."""
         shares, size = [], self.centre.run.model.body.size
         for name, part in (("u", slice(0, size)), ("contact_force", slice(size, None))):
             usual = STEP / self.longest * np.abs(getattr(state, name)).max(initial=0.0)
@@ -250,31 +234,22 @@ class Line:
             shares.append(np.abs(more[part]).max(initial=0.0) / largest)
         return float(max(shares))
 
-    def _along(self, part: Accepted, jumps: Sequence[Steps], change: Change) -> tuple[Floats, Floats]:
-        """Derivative (m,) of the part's equations, and of the reaction (dim,), along those of its states, the
-        end's being `change`.
-        """
-        way = self._way(part, change)
-        near = self._asked(part, jumps, change, way, Equations.kinked)
-        far = self._asked(part, jumps, change, self.far, Equations.smooth)
-        rows, reaction = (
-            difference([one[i] for one in near], way) + difference([one[i] for one in far], self.far)
-            for i in (0, 1)
-        )
-        return rows, reaction
+    def _along(self, part: Accepted, jumps: Jumps, change: Change) -> tuple[Floats, Floats]:
+        """Derivatives (m,) of the part's equations and (dim,) of the reaction along those of its states."""
+        near = self._slopes(part, jumps, change, self._way(part, change), Equations.kinked)
+        far = self._slopes(part, jumps, change, FAR * self.longest, Equations.smooth)
+        return near[0] + far[0], near[1] + far[1]
 
-    def _asked(self, part: Accepted, jumps: Sequence[Steps], change: Change, way: float, ask: Any) -> Any:
-        """What the part's equations answer at the places along its states, `way` apart."""
+    def _slopes(self, part: Accepted, jumps: Jumps, change: Change, way: float, ask: Any) -> list[Any]:
+        """Derivatives of arrays or states that the part's equations answer, from places `way` apart."""
         found = []
         for place in PLACES:
             begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
             found.append(ask(begun, moved(part.new, change, place * way)))
-        return found
+        return [changes(each, way) for each in zip(*found, strict=True)]
 
     def _way(self, part: Accepted, change: Change, reach: float = np.inf) -> float:
-        """How far places are apart along the states: no node moves further than it may, and all stay within
-        `reach` of the parameter.
-        """
+        """How far apart places along the states may be, within `reach` of the parameter."""
         model = self.centre.run.model
         slope = model.equilibrium.interface.surface_at(part.new).slope
         moves = change["u"][model.pad.nodes]
@@ -284,19 +259,17 @@ class Line:
             nearest = min(nearest, ALONG / max(float(np.abs(moves[:, 0]).max()), 1e-300))
         return max(min(self.longest, nearest / max(PLACES)), LEAST * self.longest)
 
-    def _end(
-        self, part: Accepted, equations: list[Equations], jumps: Sequence[Steps], change: Change
-    ) -> None:
+    def _end(self, part: Accepted, equations: list[Equations], jumps: Jumps, change: Change) -> None:
         """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
         step, way = self.step, self._way(part, change)
         by_parameter = changes([one.ended(part.new) for one in equations], step)
-        near = self._asked(part, jumps, change, way, lambda at, new: (at.ended(new), at.margins(new)))
-        ends, margins = zip(*near, strict=True)
-        along = changes(self._asked(part, jumps, change, self.far, Equations.ended), self.far)
-        along |= {name: value for name, value in changes(ends, way).items() if name in NEARBY}
+        ask: Any = lambda at, new: (at.ended(new), at.margins(new))  # noqa: E731
+        with np.errstate(invalid="ignore"):  # of nodes that are infinitely far from another status
+            near, margins = self._slopes(part, jumps, change, way, ask)
+            along = self._slopes(part, jumps, change, FAR * self.longest, ask)[0]
+            rate = margins + difference([one.margins(part.new) for one in equations], step)
+        along |= {name: value for name, value in near.items() if name in NEARBY}
         state = added(by_parameter, along) | change
-        with np.errstate(invalid="ignore"):
-            rate = difference(margins, way) + difference([one.margins(part.new) for one in equations], step)
         counts = np.isfinite(part.margins) & np.isfinite(rate) & (rate != 0.0)
         reach = np.abs(part.margins[counts] / rate[counts])
         nearest = float(reach.min(initial=np.inf))
@@ -306,7 +279,7 @@ class Line:
             self._book(part, jumps, state, self.way)
         self.state = state
 
-    def _book(self, part: Accepted, jumps: Sequence[Steps], state: Change, way: float) -> None:
+    def _book(self, part: Accepted, jumps: Jumps, state: Change, way: float) -> None:
         """The derivatives of the books after the part that ends with these of the state."""
         (begin, _), (sums, _) = part.books, part.sums
         fixed = [one.booked(part.old, part.new, begin, sums) for one in self.beside]

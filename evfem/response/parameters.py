@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -46,20 +46,17 @@ class ShapeChange:
     finger's mesh or, without those in the middle of edges, for its corners; these then follow linearly.
 
     >>> ShapeChange("taller", np.zeros((4, 2)))
-    ShapeChange('taller')
+    ShapeChange(name='taller')
     """
 
     name: str
-    velocity: Floats
+    velocity: Floats = field(repr=False)
 
     def __post_init__(self) -> None:
         velocity = np.asarray(self.velocity, dtype=float)
         if velocity.ndim != 2 or not np.isfinite(velocity).all():
             raise InputError("velocity", f"an array of shape {velocity.shape}", "finite numbers (nodes, dim)")
         object.__setattr__(self, "velocity", velocity)
-
-    def __repr__(self) -> str:
-        return f"ShapeChange({self.name!r})"
 
     #: value in the scene
     value = 0.0

@@ -76,9 +76,7 @@ class Equations:
         return replace(state, charges=attraction.charged(resting, state.voltage, pressing).charges)
 
     def smooth(self, state: State) -> tuple[Floats, Floats]:
-        """The part of R (m,) that is smooth over long ways: tissue, bone, and on flat surfaces gaps and
-        sticking; and its reaction (dim,).
-        """
+        """The part of R (m,) that is smooth over long ways, and its reaction (dim,)."""
         body = self.model.body
         forces = body.reduce(body.forces(state.u))
         contact = np.where(self._near(state), 0.0, self.contact(state)[0])
@@ -87,9 +85,7 @@ class Equations:
         return np.concatenate([forces[: -state.bone.size], bone, contact.ravel()]), reaction
 
     def kinked(self, state: State) -> tuple[Floats, Floats]:
-        """The rest of R (m,): attraction, contact forces, friction, and what follows a profile; and its
-        reaction (dim,), of pad nodes on the bone.
-        """
+        """The rest of R (m,): attraction, friction, what follows a profile; and its reaction (dim,)."""
         body, nodal = self.model.body, np.zeros_like(state.u)
         attraction = self._attracted(state).attraction
         nodal[self.model.pad.nodes] -= attraction + self.interface.contact_forces(state)

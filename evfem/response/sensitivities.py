@@ -39,6 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -108,15 +109,10 @@ class _Differentiated:
 
     def _check(self, line: Line) -> None:
         """Refuse a parameter that changes which unknowns or laws there are."""
-        model = self.run.model
-        for each in (one.run.model for one in line.beside):
-            same = np.array_equal(each.mesh.cells, model.mesh.cells)
-            same = same and (each.closing.core is None) == (model.closing.core is None)
-            if not (same and each.body.size == model.body.size):
-                given = (
-                    "a small change of it changes the cells of the mesh, or whether the attraction has a core"
-                )
-                raise InputError(f"parameters.{line.name}", given, "a parameter that leaves both as they are")
+        models = [self.run.model, *(one.run.model for one in line.beside)]
+        if len({(each.mesh.cells.tobytes(), each.closing.core is None) for each in models}) > 1:
+            given = "a small change of it changes the cells of the mesh, or whether the attraction has a core"
+            raise InputError(f"parameters.{line.name}", given, "a parameter that leaves both as they are")
 
     def _lengths(self, state: State) -> Floats:
         """How far (mm) gaps of the pad nodes (P,) may change for differences: inf where they are closed."""
@@ -210,14 +206,9 @@ class _Differentiated:
             self._factor.factorise(model.body.tangent(new.u))
             solve = Tangent(here, new, self._factor, kept).solve
         except Singular:
-            solve = _unsolved
+            solve = partial(np.full_like, fill_value=np.nan)
         self._known = (new.status.tobytes(), solve)
         return True
-
-
-def _unsolved(right: Floats) -> Floats:
-    """What a singular matrix gives."""
-    return np.full_like(right, np.nan)
 
 
 def _refused(target: Target, new: State) -> str:
@@ -302,20 +293,15 @@ class Sensitivities:
         """A row for each step, a column `COLUMN by PARAMETER` for each pair: a `pandas.DataFrame`, without
         pandas a record array.
         """
-        pairs = {
-            f"{column} by {key}": self[column, key] for key in self.parameters for column in self.columns
-        }
+        pairs = {f"{name} by {key}": self[name, key] for key in self.parameters for name in self.columns}
         return frame({"step": np.asarray(self.result.step), **pairs})
 
     def __repr__(self) -> str:
         """The parameters by the relative change of normal and tangential force at the end."""
         lines = [f"Sensitivities of {len(self.result.step)} steps, d ln force / d ln parameter at the end:"]
         for key in self.parameters:
-            shares = [
-                f"{name} {self.elasticity[name, key][-1]:.4g}"
-                for name in ("normal_force", "tangential_force")
-                if name in self.columns
-            ]
+            names = [name for name in ("normal_force", "tangential_force") if name in self.columns]
+            shares = [f"{name} {self.elasticity[name, key][-1]:.4g}" for name in names]
             lines.append(f"  {key}: {', '.join(shares)}")
         return "\n".join(lines)
 
@@ -378,10 +364,9 @@ def sensitivities(
     """
     scene = scene_of(scene)
     _check(scene)
-    given = (
-        [parameters] if isinstance(parameters, str) or hasattr(parameters, "applied") else list(parameters)
-    )
-    known = {one.name: one for one in (parameter_of(scene, each) for each in given)}
+    single = isinstance(parameters, str) or hasattr(parameters, "applied")
+    given = [parameter_of(scene, each) for each in ([parameters] if single else parameters)]
+    known = {one.name: one for one in given}
     with blas_limits(), notices.shown(progress):
         wanted = _columns(scene_mesh(scene)[0].dim, columns)
         run = _Differentiated(scene, known, any(map(is_work, wanted)))
@@ -419,9 +404,7 @@ def _gathered(
 ) -> Sensitivities:
     """What was found."""
     reasons = {name: COUNTED for name in columns if not differentiable(name)}
-    for line in run.lines:
-        if reason := line.reason or run.stopped:
-            reasons[line.name] = reason
+    reasons |= {line.name: reason for line in run.lines if (reason := line.reason or run.stopped)}
     values = {
         (name, line.name): np.array([row.get(name, np.nan) for row in line.rows])
         for line in run.lines

@@ -12,7 +12,8 @@ of the exact directional derivative of R, and K only decides how fast it is foun
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,16 +41,12 @@ class Tangent:
     state: State
     factor: Condensation
     kept: Ints
-    dense: Any = field(init=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def _dense(self) -> Any:
         import scipy.linalg
 
-        object.__setattr__(self, "dense", scipy.linalg.lu_factor(self._condensed(), check_finite=False))
-
-    @property
-    def _size(self) -> int:
-        return self.equations.model.body.size
+        return scipy.linalg.lu_factor(self._condensed(), check_finite=False)
 
     @property
     def _closed(self) -> Ints:
@@ -58,7 +55,7 @@ class Tangent:
 
     def _condensed(self) -> Floats:
         """The dense matrix of kept displacements, bone and contact forces of touching nodes."""
-        kept, closed, size = self.kept, self._closed, self._size
+        kept, closed, size = self.kept, self._closed, self.equations.model.body.size
         place = np.full(size + self.state.contact_force.size, -1)
         place[kept], place[size + closed] = np.arange(kept.size), kept.size + np.arange(closed.size)
         count = kept.size + closed.size
@@ -85,7 +82,7 @@ class Tangent:
         """w (m,) with K w = `right` (m,)."""
         import scipy.linalg
 
-        size, dim = self._size, self.state.bone.size
+        size, dim = self.equations.model.body.size, self.state.bone.size
         forces = right[:size].copy()
         forces[-dim:] = 0.0
         saved, condensed = self.factor.forward(forces)
@@ -94,7 +91,7 @@ class Tangent:
             row = self.kept.size - dim + axis
             lacking = right[size - dim + axis]
             dense[row] = lacking - condensed[row] if self.equations.pulled(axis) else lacking
-        found = scipy.linalg.lu_solve(self.dense, dense, check_finite=False)
+        found = scipy.linalg.lu_solve(self._dense, dense, check_finite=False)
         pressing = right[size:].copy()  # of open nodes, as they are
         pressing[self._closed] = found[self.kept.size :]
         return np.concatenate([self.factor.backward(saved, found[: self.kept.size]), pressing])

@@ -56,11 +56,8 @@ class Uncertainty:
         """The contribution of every parameter to a column at a step, counted from 0, and what it is."""
         if column not in self.sd:
             raise unknown("column", str(column), tuple(self.sd))
-        keys = self.found.parameters
-        unit = self.result.units[column]
-        return {
-            key: float(self.contribution[column, key][step]) for key in keys
-        }, f"{column} for one sd ({unit})"
+        found = {key: float(self.contribution[column, key][step]) for key in self.found.parameters}
+        return found, f"{column} for one sd ({self.result.units[column]})"
 
     def __repr__(self) -> str:
         """The check, and the standard deviations of the forces at the end."""

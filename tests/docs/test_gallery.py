@@ -38,6 +38,8 @@ def test_an_example_is_short_and_complete_and_writes_its_picture(name):
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             known.add(node.id)
+        elif isinstance(node, ast.FunctionDef):
+            known |= {node.name, *(each.arg for each in node.args.args)}
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             known |= {alias.asname or alias.name for alias in node.names}
     used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
