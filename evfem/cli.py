@@ -147,22 +147,8 @@ def _kind(path: Path) -> str:
 
 
 def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
-    """Runs a command of `evfem.arguments.parser`."""
-    return {
-        None: _help,
-        "run": _run,
-        "init": _init,
-        "plan": _plan,
-        "check": _check,
-        "sensitivities": _sensitivities,
-        "study": _study,
-        "sweep": _sweep,
-        "mesh": _mesh,
-        "signal": _signal,
-        "texture": _texture,
-        "studio": _studio,
-        "schema": _schema,
-    }[name]
+    """The function below that runs a command of `evfem.arguments.parser`."""
+    return globals()[f"_{name or 'help'}"]
 
 
 def _help(given: argparse.Namespace) -> int:
