@@ -8,6 +8,7 @@ from pathlib import Path
 
 import evfem
 from evfem.common.checks import Key, keys_of
+from evfem.response.file import SensitivityTable
 from evfem.scene import schema as scenes
 from evfem.scene.schema import Entry, Section
 from evfem.simulation.history import MEANINGS
@@ -19,7 +20,7 @@ DOCS = Path(__file__).parent
 WIDTH = 99
 ROOM = 66  # columns of a row for what a name is
 HEAD = """\
-# Keys of scenes and sweeps
+# Keys of scenes, sweeps and sensitivities
 
 <!-- written by docs/tables.py -->
 
@@ -35,7 +36,12 @@ TABLE = re.compile(r"(?<=^## Columns of the history\n\n)(.*?\n\n)\|.*?\n\n", re.
 def page() -> str:
     """The page of keys."""
     parts = [HEAD]
-    for title, found in (("Scene", scenes.sections()), ("Sweep", sweeps.sections())):
+    asked = [scenes.section("", SensitivityTable)]
+    for title, found in (
+        ("Scene", scenes.sections()),
+        ("Sweep", sweeps.sections()),
+        ("Sensitivities", asked),
+    ):
         parts.append(f"## {title}\n")
         seen: set[tuple[str, str]] = set()
         for section in found:

@@ -52,7 +52,6 @@ def _meant(message: str) -> str:
 def _path(
     command: argparse.ArgumentParser, name: str, metavar: str, how: dict[str, str] = FILES, **more: Any
 ) -> None:
-    """An argument that a shell completes."""
     given = command.add_argument(name, metavar=metavar, **{"type": Path, **more})
     given.complete = how  # type: ignore[attr-defined]
 
@@ -72,6 +71,7 @@ def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
         ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument),
         ("check", "run a scene by several ways and compare where they end", _scene_argument),
         ("sensitivities", "derivatives of forces, works and energies by keys of a scene", _response_options),
+        ("impedance", "stiffness of the finger at the end of a scene over the frequency", _impedance_options),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
         ("sweep", "run many scenes side by side and write one table of all", _sweep_options),
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
@@ -99,9 +99,18 @@ def _run_options(run: argparse.ArgumentParser) -> None:
 
 
 def _response_options(command: argparse.ArgumentParser) -> None:
-    _path(command, "scene", "SCENE.toml", help="the scene")
+    _path(command, "scene", "FILE.toml", help="a scene; without --by a file that names scene and keys")
     said = "dotted keys of the scene, as surface.friction"
-    command.add_argument("--by", nargs="+", metavar="KEY", required=True, help=said)
+    command.add_argument("--by", nargs="+", metavar="KEY", help=said)
+    _results(command)
+
+
+def _impedance_options(command: argparse.ArgumentParser) -> None:
+    _path(command, "scene", "SCENE.toml", help="the scene")
+    said = "frequencies in Hz"
+    command.add_argument("--frequencies", nargs="+", type=float, metavar="HZ", required=True, help=said)
+    said = "how the bone moves; default: normal"
+    command.add_argument("--axis", choices=("normal", "tangential"), default="normal", help=said)
     _results(command)
 
 

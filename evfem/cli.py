@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _status(given: argparse.Namespace) -> int:
     """Run the command; its exit status, with the message of what went wrong."""
     try:
-        return _command(given.command)(given)
+        return _command(given.command)(given) or DONE
     except InputError as error:
         return _refuse(error, _file(given))
     except NotConverged as error:
@@ -93,7 +93,6 @@ def _of(file: Path | None, message: object) -> str:
 
 
 def _warner(file: Path | None) -> Callable[..., None]:
-    """Shows a warning in one line, without its place in the code."""
     return lambda message, *place, **more: notices.tell(f"warning: {_of(file, message)}")
 
 
@@ -146,26 +145,35 @@ def _kind(path: Path) -> str:
     return ""
 
 
-def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
-    """The function below that runs a command of `evfem.arguments.parser`."""
-    return globals()[f"_{name or 'help'}"]
+def _command(name: str | None) -> Callable[[argparse.Namespace], int | None]:
+    """Runs a command of `evfem.arguments.parser`; None is done."""
+    return {
+        None: lambda given: parser().print_help(),
+        "run": _run,
+        "init": _init,
+        "plan": _plan,
+        "check": _check,
+        "sensitivities": _sensitivities,
+        "impedance": _impedance,
+        "study": _study,
+        "sweep": _sweep,
+        "mesh": _mesh,
+        "signal": _signal,
+        "texture": _texture,
+        "studio": _studio,
+        "schema": _schema,
+    }[name]
 
 
-def _help(given: argparse.Namespace) -> int:
-    parser().print_help()
-    return DONE
-
-
-def _init(given: argparse.Namespace) -> int:
+def _init(given: argparse.Namespace) -> None:
     from evfem.templates import write
 
     path = given.file or Path(f"{given.template}.toml")
     written = write(given.template, path)
     print(f"{', '.join(map(str, written))} written; evfem run {path} runs it", flush=True)
-    return DONE
 
 
-def _schema(given: argparse.Namespace) -> int:
+def _schema(given: argparse.Namespace) -> None:
     from evfem.scene import schema as scenes
     from evfem.sweeps import file as sweeps
 
@@ -173,12 +181,11 @@ def _schema(given: argparse.Namespace) -> int:
     text = json.dumps(found, indent=2)
     if given.out is None:
         print(text, flush=True)
-        return DONE
+        return
     from evfem.common.storage import write_text
 
     write_text(given.out, text + "\n")
     print(given.out, flush=True)
-    return DONE
 
 
 def _run(given: argparse.Namespace) -> int:
@@ -272,7 +279,7 @@ class _Milestones:
         notices.milestone("step", int(str(row["step"])), self.total)
 
 
-def _plan(given: argparse.Namespace) -> int:
+def _plan(given: argparse.Namespace) -> None:
     from evfem.export import FieldFiles
     from evfem.planning.plan import plan_on, scene_mesh
 
@@ -282,7 +289,6 @@ def _plan(given: argparse.Namespace) -> int:
         needed = plan_on(scene, mesh, element)
     files = FieldFiles.of(scene, mesh)
     print(f"{needed}\n\nFiles of a run\n  {files}", flush=True)
-    return DONE
 
 
 def _check(given: argparse.Namespace) -> int:
@@ -293,20 +299,29 @@ def _check(given: argparse.Namespace) -> int:
     return DONE if found.agrees else DIFFERENT
 
 
-def _sensitivities(given: argparse.Namespace) -> int:
+def _sensitivities(given: argparse.Namespace) -> None:
+    from evfem.response.file import load
     from evfem.response.sensitivities import sensitivities
     from evfem.runfolder import write_sensitivities
 
-    scene = _scene(given.scene)
-    folder = given.out or Path(f"{scene.name}-out")
-    found = sensitivities(scene, given.by, progress=True)
+    scene, by, columns = (_scene(given.scene), given.by, None) if given.by else load(given.scene)
+    folder = given.out or Path(f"{given.scene.stem}-out")
+    found = sensitivities(scene, by, columns, progress=True)
     for key in (key for key in found.parameters if key in found.reasons):
         notices.tell(f"{key}: {found.reasons[key]}")
     print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
-    return DONE
 
 
-def _study(given: argparse.Namespace) -> int:
+def _impedance(given: argparse.Namespace) -> None:
+    from evfem.response.impedance import impedance
+    from evfem.runfolder import write_impedance
+
+    found = impedance(_scene(given.scene), given.frequencies, given.axis)
+    folder = given.out or Path(f"{given.scene.stem}-out")
+    print(f"{found}\ntable in {write_impedance(found, folder)}", flush=True)
+
+
+def _study(given: argparse.Namespace) -> None:
     known = studies()
     names: list[str] = []
     for name in given.names:
@@ -323,11 +338,9 @@ def _study(given: argparse.Namespace) -> int:
         print(given.out / f"{name}.json", flush=True)
     if "all" in given.names:
         print(*known.report(given.out), sep="\n")
-    return DONE
 
 
 def _sample(given: argparse.Namespace) -> Any:
-    """Scenes that are drawn; None if not given."""
     said = {name: getattr(given, name) for name in ("scenes", "seed", "workers", "limit")}
     said = {name: value for name, value in said.items() if value is not None}
     return studies().Sample(**said) if said else None
@@ -369,7 +382,7 @@ def _sweep(given: argparse.Namespace) -> int:
     return NOT_CONVERGED if wrong else DONE
 
 
-def _mesh(given: argparse.Namespace) -> int:
+def _mesh(given: argparse.Namespace) -> None:
     scene = _scene(given.scene)
     from evfem.mesh.file import write
     from evfem.planning.plan import scene_mesh
@@ -382,10 +395,9 @@ def _mesh(given: argparse.Namespace) -> int:
         f"{len(mesh.points)} nodes, {len(mesh.cells)} cells ({mesh.kind}); {regions}; in {given.out}",
         flush=True,
     )
-    return DONE
 
 
-def _signal(given: argparse.Namespace) -> int:
+def _signal(given: argparse.Namespace) -> None:
     from evfem.common.views import plus
     from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
 
@@ -399,21 +411,18 @@ def _signal(given: argparse.Namespace) -> int:
     start, stop = profile.position[0], profile.position[-1]
     largest = max(abs(profile.voltage))
     print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {given.out}", flush=True)
-    return DONE
 
 
-def _texture(given: argparse.Namespace) -> int:
+def _texture(given: argparse.Namespace) -> None:
     from evfem.estimate.commands import run
 
     run(given)
-    return DONE
 
 
-def _studio(given: argparse.Namespace) -> int:
+def _studio(given: argparse.Namespace) -> None:
     from evfem.studio.server import serve
 
     serve(given.port, not given.no_browser)
-    return DONE
 
 
 if __name__ == "__main__":

@@ -56,10 +56,6 @@ def quoted(value: object) -> object:
     return readable(value) if isinstance(value, str) else value
 
 
-def _words(given: object) -> str:
-    return _line(given) if isinstance(given, str) else readable(given)
-
-
 def _line(text: str) -> str:
     """A text on one line, cut to a readable length."""
     start = text[: LONGEST_TEXT + 1]
@@ -91,7 +87,8 @@ class InputError(EvfemError, ValueError):
             if close and close[0] != given[1:-1] and len(close[0]) > 2:
                 allowed = f"{close[0]}? ({allowed})"
         self.key, self.given, self.allowed = key, given, allowed
-        text = "missing" if given is ABSENT else f"given {_words(given)}"
+        said = _line(given) if isinstance(given, str) else readable(given)
+        text = "missing" if given is ABSENT else f"given {said}"
         super().__init__(f"{_line(key)}: {text}; allowed: {allowed}")
 
     @property

@@ -211,12 +211,9 @@ def skin_of(mesh: Mesh) -> tuple[Mesh, Ints, Ints]:
     """
     if mesh.dim != 3:
         raise InputError("skin", f"the mesh of a cross-section ({mesh.kind})", "a finger in three dimensions")
-    _, of_cell = mesh.faces
-    behind = np.nonzero(np.bincount(of_cell.ravel())[of_cell] == 1)[0]
-    outer = mesh.outer_faces
-    on_pad = np.isin(outer, mesh.node_sets["pad"]).all(axis=1)
-    nodes, cells = np.unique(outer[on_pad], return_inverse=True)
-    behind = behind[on_pad]
+    behind = np.nonzero(mesh.in_set("pad"))[0]
+    outer = mesh.sides_of("pad")
+    nodes, cells = np.unique(outer, return_inverse=True)
     kind = "quad" if mesh.order == 1 else "quad9"
     faces = cells.reshape(-1, outer.shape[1])
     return Mesh(mesh.points[nodes], faces, kind, mesh.region[behind], mesh.region_names), nodes, behind
@@ -288,7 +285,7 @@ class ParaViewSeries:
         if self.path.suffix != ".pvd":
             raise InputError("path", str(path), "a file name that ends in .pvd")
         self._mesh: Mesh | None = None
-        self._rows = [row for row in earlier if self.frame_path(int(row["step"])).exists()]
+        self.rows = [row for row in earlier if self.frame_path(int(row["step"])).exists()]
 
     def frame_path(self, step: int) -> Path:
         """File of the fields of a step."""
@@ -312,13 +309,13 @@ class ParaViewSeries:
             fields = {name: getattr(frame, name)[nodes] for name in ("displacement", *POINT_FIELDS)}
             frame = replace(frame, **fields, **{name: getattr(frame, name)[behind] for name in CELL_FIELDS})
         write_frame(mesh, frame, path, single=self.single, compressed=self.compressed)
-        self._rows = [old for old in self._rows if old["step"] < row["step"]] + [row]
+        self.rows = [old for old in self.rows if old["step"] < row["step"]] + [row]
 
     def write_index(self) -> None:
         """Write the .pvd file in one step; every file it names is complete."""
         root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
         collection = ElementTree.SubElement(root, "Collection")
-        for row, value in zip(self._rows, instants(self._rows), strict=True):
+        for row, value in zip(self.rows, instants(self.rows), strict=True):
             name = self.frame_path(int(row["step"])).name
             ElementTree.SubElement(collection, "DataSet", timestep=repr(value), part="0", file=name)
         ElementTree.indent(root)

@@ -26,30 +26,22 @@ from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
+from evfem.response.impedance import Impedance
 from evfem.response.sensitivities import Sensitivities
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import ANOTHER, Checkpoint
 from evfem.simulation.checkpoint import PROBES as AT_PROBES
 from evfem.simulation.doubtful import doubtful
-from evfem.simulation.history import (
-    columns_of,
-    csv_header,
-    csv_line,
-    read_rows,
-)
+from evfem.simulation.history import columns_of, csv_header, csv_line, read_rows
 from evfem.simulation.result import Frame, Result, Row, Saved, provenance
 
+#: what a picture of derivatives shows if it can, the first first
+FORCES = ("tangential_force", "normal_force", "electrostatic_force")
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000
 MANIFEST = ".evfem-files"
-HISTORY, PROBES, SUMMARY, FIELDS, PICTURE, STATE = (
-    "history.csv",
-    "probes.csv",
-    "summary.json",
-    "fields.pvd",
-    "forces.png",
-    "checkpoint.npz",
-)
+HISTORY, PROBES, SUMMARY = "history.csv", "probes.csv", "summary.json"
+FIELDS, PICTURE, STATE = "fields.pvd", "forces.png", "checkpoint.npz"
 #: of a finger in three dimensions: its skin alone, beside the fields of the solid
 SKIN = "skin.pvd"
 OURS = re.compile(
@@ -196,8 +188,10 @@ class RunFolder:
         return summary
 
     def _draw(self, result: Result) -> None:
+        from evfem.plotting.curves import forces
+
         with self._manifest.writing(self.path / PICTURE):
-            _picture(result if result.depth is None else result.total, self.path / PICTURE)
+            _save(forces(result if result.depth is None else result.total).figure, self.path / PICTURE)
 
     def completed(self) -> str:
         """Write what is missing in a finished run's folder, as far as its checkpoint has it; says what."""
@@ -330,6 +324,7 @@ def result_in(path: Path) -> Result:
     allowed = "a folder that `evfem run` left, at its end"
     from evfem.planning.plan import scene_mesh
     from evfem.scene.file import loads
+    from evfem.scene.probes import read_csv
 
     if not (path / SUMMARY).is_file() or not (path / HISTORY).is_file():
         raise InputError("path", f"{path}, without {SUMMARY} or {HISTORY}", allowed)
@@ -338,24 +333,13 @@ def result_in(path: Path) -> Result:
             origin = json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"]
             rows = read_rows((path / HISTORY).read_text(encoding="utf-8"))
             found = (path / PROBES).read_text(encoding="utf-8") if (path / PROBES).is_file() else ""
-        scene = loads(origin["parameters"])
+        scene, series = loads(origin["parameters"]), ParaViewSeries(path / FIELDS, rows)
         mesh, _ = scene_mesh(scene)
-        frames = [frame_in(file, row, mesh) for row in rows if (file := _fields_of(path, row)).is_file()]
-        return Result.from_rows(rows, frames, mesh, origin, _probes_in(found, scene, mesh, len(rows)))
+        frames = [frame_in(series.frame_path(row["step"]), row, mesh) for row in series.rows]
+        probes = read_csv(found, scene.output.probes, mesh.dim, len(rows)) if found else {}
+        return Result.from_rows(rows, frames, mesh, origin, probes)
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise InputError("path", f"{path}, damaged: {error}", allowed) from error
-
-
-def _probes_in(text: str, scene: Scene, mesh: Mesh, steps: int) -> dict[str, Any]:
-    if not text:
-        return {}
-    from evfem.scene.probes import read_csv
-
-    return read_csv(text, scene.output.probes, mesh.dim, steps)
-
-
-def _fields_of(path: Path, row: Row) -> Path:
-    return ParaViewSeries(path / FIELDS).frame_path(row["step"])
 
 
 def _without_fields(path: Path) -> str:
@@ -376,18 +360,14 @@ def _without_a_row(history: Path) -> bool:
 def _refuse_others(path: Path) -> None:
     """InputError where a file has a name that a run writes, and evfem did not write it."""
     manifest = Manifest(path / MANIFEST, OURS).path  # what a kill left open in it is decided
-    refuse_others(manifest, _present(path), "evfem")
+    with disk(f"use {path}"):
+        here = sorted(p.name for p in path.iterdir() if OURS.fullmatch(p.name)) if path.exists() else []
+    refuse_others(manifest, here, "evfem")
 
 
 def _remove_left(path: Path) -> None:
     for left in [p for p in path.iterdir() if LEFT.fullmatch(p.name)]:
         left.unlink()
-
-
-def _present(path: Path) -> list[str]:
-    """Names in the folder that a run writes."""
-    with disk(f"use {path}"):
-        return sorted(p.name for p in path.iterdir() if OURS.fullmatch(p.name)) if path.exists() else []
 
 
 def write_sensitivities(found: Sensitivities, folder: Path) -> Path:
@@ -397,20 +377,24 @@ def write_sensitivities(found: Sensitivities, folder: Path) -> Path:
     with disk(f"write to {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
     found.to_csv(table := folder / "sensitivities.csv")
-    for column in ("tangential_force", "normal_force", "electrostatic_force"):
-        if np.isfinite(list(found.effects(column)[0].values())).any():
+    for column in (*FORCES, *found.columns):
+        if column in found.columns and np.isfinite(list(found.effects(column)[0].values())).any():
             _save(tornado(found, column).figure, folder / "sensitivities.png")
             break
     return table
 
 
-def _picture(result: Result, path: Path) -> None:
-    from evfem.plotting.curves import forces
+def write_impedance(found: Impedance, folder: Path) -> Path:
+    """Write `impedance.csv` and its picture into a folder; returns the table's path."""
+    from evfem.plotting.response import impedance
 
-    _save(forces(result).figure, path)
+    with disk(f"write to {folder}"):
+        folder.mkdir(parents=True, exist_ok=True)
+    found.to_csv(table := folder / "impedance.csv")
+    _save(impedance(found).figure, folder / "impedance.png")
+    return table
 
 
 def _save(figure: Any, path: Path) -> None:
-    """Write a figure whole or not at all."""
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png", dpi=150)

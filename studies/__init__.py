@@ -1,6 +1,4 @@
-"""Studies: a module per figure of the paper or question, each with `main(quick, out) -> dict`."""
-
-from __future__ import annotations
+"""Studies: a module per figure of the paper or question, each with `main(quick) -> Study`."""
 
 import csv
 import time
@@ -15,7 +13,7 @@ from evfem.errors import InputError, quoted
 #: every study, in the order in which "all" runs them; it leaves out `APART`
 NAMED = """
 section321 laws fringe fingertip fingerprint fig03 fig05 fig06 fig07 fig08 fig09 fig10 fig11 fig12 fig13
-participants uncertainty frequency hypotheses friction_spectrum stick_slip relaxation impedance
+participants uncertainty frequency hypotheses friction_spectrum stick_slip relaxation impedance sensitivities
 soft_display moisture stability work_precision peers campaign
 """
 NAMES = tuple(NAMED.split())
@@ -64,10 +62,10 @@ def run(
         )
     from .common import BEGIN
 
-    drawn = {} if sample is None else {"sample": sample}
+    more = {"out": out, "sample": sample or Sample()} if name == "campaign" else {}
     token = BEGIN.set(time.perf_counter())
     try:
-        return module(name).main(quick=quick, out=out, **drawn)  # type: ignore[no-any-return]
+        return module(name).main(quick, **more).finish(out, quick)  # type: ignore[no-any-return]
     finally:
         BEGIN.reset(token)
 

@@ -6,8 +6,6 @@ pi: bone contour (3.0, 2.5), interface between tissue and skin (7.96, 6.015), ou
 interface and from there to the outer contour.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from evfem.common.arrays import Ints
@@ -21,17 +19,16 @@ LEVELS = {0: (60, 10, 2), 1: (120, 20, 4), 2: (336, 56, 12), 3: (480, 80, 16)}
 
 
 def benchmark_mesh(level: int, order: int = 1, *, same_nodes: bool = False) -> Mesh:
-    """Mesh L0 ... L3: regions `tissue`, `skin`; sets `pad` (outer contour), `bone` (with both cut
-    edges).
+    """Mesh L0 ... L3: regions `tissue`, `skin`; sets `pad` (outer contour), `bone` (with both cut edges).
 
-    `order` 2: quadratic cells with straight edges on the outline of the linear mesh (as many
-    cells); with `same_nodes` instead each block of 2 x 2 linear cells becomes one cell through the
-    same nodes.
+    `order` 2: quadratic cells with straight edges on the outline of the linear mesh (as many cells); with
+    `same_nodes` instead each block of 2 x 2 linear cells becomes one cell through the same nodes.
 
     >>> [len(benchmark_mesh(level).points) for level in LEVELS]
     [793, 3025, 23253, 46657]
     >>> benchmark_mesh(0, 2).kind, len(benchmark_mesh(0, 2, same_nodes=True).cells)
     ('quad9', 180)
+
     """
     if level not in LEVELS:
         raise InputError("level", quoted(level), "0, 1, 2 or 3")

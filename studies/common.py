@@ -1,7 +1,5 @@
 """What the studies share: writing a study down, runs side by side, laws and measurements."""
 
-from __future__ import annotations
-
 import json
 import platform
 import subprocess
@@ -52,7 +50,7 @@ class Study:
     """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw it.
 
     `paper` has what the paper prints, by the keys of `numbers`. `tables` by their titles are lists of
-    lines of Markdown. Both are kept among the assumptions.
+    lines of Markdown. Both are kept among the assumptions. `files` writes what else it leaves in a folder.
     """
 
     name: str
@@ -63,6 +61,7 @@ class Study:
     draw: Callable[[], Any]
     parameters: dict[str, Any] = field(default_factory=dict)
     tables: dict[str, list[str]] = field(default_factory=dict)
+    files: Callable[[Path], None] | None = None
 
     def finish(self, out: Path | None, quick: bool = False) -> dict[str, Any]:
         """The study's dictionary; with `out` also NAME.json, NAME.csv, NAME.png and, where there are
@@ -94,6 +93,8 @@ class Study:
                 say_quick(figure)
             with replacing(folder / f"{self.name}.png") as temporary:
                 figure.savefig(temporary, format="png", dpi=160)
+            if self.files is not None:
+                self.files(folder)
         return result
 
     def _page(self) -> str:

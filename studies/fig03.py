@@ -1,16 +1,11 @@
 """Fig. 3: mesh of the finger's cross-section, nodes and elements layer by layer.
 
-Expected (the paper): 23,139 nodes and 21,150 elements; its layers' nodes add up to the same
-23,139, so that nodes between two layers count for both. The paper gives counts and a picture, no
-positions: the mesh here (`resolution="paper"`) has as many rows of elements in each layer as its
-counts allow.
+Expected (the paper): 23,139 nodes and 21,150 elements; its layers' nodes add up to the same 23,139, so that
+nodes between two layers count for both. The paper gives counts and a picture, no positions: the mesh here
+(`resolution="paper"`) has as many rows of elements in each layer as its counts allow.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -54,7 +49,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Count the nodes and elements of the layers; draw the mesh."""
     mesh = ev.FingerPad(resolution="coarse" if quick else "paper").mesh(1)
     cells = {name: mesh.cells[mesh.region == number] for name, number in mesh.region_names.items()}
@@ -67,7 +62,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         Series(what, names, [numbers[f"{what}.{name}"] for name in names], f"{what} over layer")
         for what in ("elements", "nodes")
     ]
-    return Study("fig03", numbers, PAPER, ASSUMPTIONS, series, partial(_draw, mesh)).finish(out, quick)
+    return Study("fig03", numbers, PAPER, ASSUMPTIONS, series, partial(_draw, mesh))
 
 
 def _draw(mesh: Mesh) -> Figure:

@@ -1,19 +1,14 @@
-"""Fig. 5: electrostatic force on a hovering finger, measured, by both closed forms, and by finite
-elements.
+"""Fig. 5: electrostatic force on a hovering finger, measured, by both closed forms, and by finite elements.
 
-Cases HVHD (2000 V, 0.50 mm), HVLD (2000 V, 0.25 mm), LVLD (1414 V, 0.25 mm). Measured: Table 1,
-with means 1.81, 2.95, 1.31 mN, medians 1.85, 2.73, 1.37 mN, standard deviations 0.547, 1.07, 0.558
-mN. Closed forms: (8a), (8b) with (24) for each participant's own ellipsoid, full axes a_i, b_i,
-c_i cos 30 degrees, over the rectangle. Finite elements: Table 2's cross-section, deformable, in
-plane strain, times 8 and 10 mm of width out of the plane. Expected: Kaczmarek's law within about
-10 % of the medians, Strong-Troxel's 1.4 to 1.9 times above; a smooth rigid outline gives 0.1976,
-0.4036, 0.2017 mN/mm, and letting it deform adds 0.4 to 1.6 %.
+Cases HVHD (2000 V, 0.50 mm), HVLD (2000 V, 0.25 mm), LVLD (1414 V, 0.25 mm). Measured: Table 1, with means
+1.81, 2.95, 1.31 mN, medians 1.85, 2.73, 1.37 mN, standard deviations 0.547, 1.07, 0.558 mN. Closed forms:
+(8a), (8b) with (24) for each participant's own ellipsoid, full axes a_i, b_i, c_i cos 30 degrees, over the
+rectangle. Finite elements: Table 2's cross-section, deformable, in plane strain, times 8 and 10 mm of width
+out of the plane. Expected: Kaczmarek's law within about 10 % of the medians, Strong-Troxel's 1.4 to 1.9 times
+above; a smooth rigid outline gives 0.1976, 0.4036, 0.2017 mN/mm, and letting it deform adds 0.4 to 1.6 %.
 """
 
-from __future__ import annotations
-
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,7 +53,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Statistics of the measurements, forces of both laws and by finite elements, verdict."""
     forces = participant_forces()
     elements = {
@@ -75,7 +70,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     numbers |= comparison(forces)
     return Study(
         "fig05", numbers, PAPER, ASSUMPTIONS, _series(forces, elements), lambda: _draw(forces, elements)
-    ).finish(out, quick)
+    )
 
 
 @cache

@@ -1,16 +1,11 @@
-"""Fig. 6: friction with and without voltage, and the contact area that each law needs to explain
-it.
+"""Fig. 6: friction with and without voltage, and the contact area that each law needs to explain it.
 
-Meyer et al.: 140 V, mu = 0.3, attraction 0.25 +- 0.01 N. The paper fits A = k F_n^m: k = 125.359
-with Kaczmarek's law (16a), 0.446 with Strong-Troxel's (16b), m = 0.489, for d_sc = 0.1 mm and d_i
-= 0.001 mm. Expected: the two k differ by the ratio of contact pressures, about 281; 0.25 N is
-reached at F_n = 0.69 N.
+Meyer et al.: 140 V, mu = 0.3, attraction 0.25 +- 0.01 N. The paper fits A = k F_n^m: k = 125.359 with
+Kaczmarek's law (16a), 0.446 with Strong-Troxel's (16b), m = 0.489, for d_sc = 0.1 mm and d_i = 0.001 mm.
+Expected: the two k differ by the ratio of contact pressures, about 281; 0.25 N is reached at F_n = 0.69 N.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,7 +32,7 @@ ASSUMPTIONS = {
 ADAMS = {"gross": ("Adams, gross", "--"), "ridge": ("Adams, ridges", ":")}
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Friction by (16a) and (16b), the areas behind it, and Adams' area laws."""
     meyer = data.load("meyer")
     areas = {name: area_law(name) for name in data.load("area_laws")["law"]}
@@ -67,7 +62,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series += [Series(f"area {name}", force, area(force), "mm2 over N") for name, area in areas.items()]
     parameters = {"U_V": voltage, "mu": friction, "d_sc_mm": 0.1, "d_i_mm": 0.001}
     picture = partial(_draw, force, friction, tangential, areas)
-    return Study("fig06", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
+    return Study("fig06", numbers, PAPER, ASSUMPTIONS, series, picture, parameters)
 
 
 def _force_for(display: Encoding, attraction: float, voltage: float) -> float:

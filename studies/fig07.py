@@ -5,10 +5,7 @@ to 10. The paper reads 0.05-0.35 N off (5) and 10-600 N off (3), against 0.05-0.
 recomputed (5) spans 0.036-0.360 N and (3) 6.0-602 N.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,7 +37,7 @@ ASSUMPTIONS = {
 LINES = (1.0, 3.0, 10.0)  # eps_i of the drawn curves
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Evaluate both laws on the plotted rectangle of permittivities."""
     meyer = data.load("meyer")
     points = 11 if quick else 41
@@ -57,7 +54,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series = [Series(f"{law} eps_i={e:g}", eps_sc, y, "N over eps_sc") for (law, e), y in lines.items()]
     given = {key: meyer.value(key) for key in ("A", "d_sc", "d_i", "U")}
     picture = partial(_draw, eps_sc, eps_i, force, lines, (low, high))
-    return Study("fig07", numbers, PAPER, ASSUMPTIONS, series, picture, given).finish(out, quick)
+    return Study("fig07", numbers, PAPER, ASSUMPTIONS, series, picture, given)
 
 
 def _force(law: str, eps_sc: Any, eps_i: Any, meyer: data.Table) -> Any:

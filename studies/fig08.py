@@ -1,15 +1,11 @@
 """Fig. 8: attraction of touching skin over the voltage, for stratum corneum 0.1 to 0.5 mm thick.
 
-Meyer et al.: 100 mm2, d_i = 0.001 mm. The caption takes all other parameters from Table 2, but its
-d_i = 0.09 mm would give about 1 mN; with the 0.001 mm of the display measured, (5) gives 0.24 to
-0.029 N at 140 V and so spans the measured 0.05-0.35 N, while (3) is far above. Expected: those two
-numbers.
+Meyer et al.: 100 mm2, d_i = 0.001 mm. The caption takes all other parameters from Table 2, but its d_i = 0.09
+mm would give about 1 mN; with the 0.001 mm of the display measured, (5) gives 0.24 to 0.029 N at 140 V and so
+spans the measured 0.05-0.35 N, while (3) is far above. Expected: those two numbers.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -49,7 +45,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Evaluate both laws over voltage and thickness."""
     meyer, table = data.load("meyer"), data.load("table2")
     voltage = np.linspace(20.0, 200.0, 10 if quick else 91)
@@ -75,7 +71,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     parameters = {"A_mm2": meyer.value("A"), "d_i_mm": meyer.value("d_i")}
     parameters |= {name: table.value(name) for name in ("eps_sc", "eps_i")}
     picture = partial(_draw, voltage, curves, (low, high))
-    return Study("fig08", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
+    return Study("fig08", numbers, PAPER, ASSUMPTIONS, series, picture, parameters)
 
 
 def _draw(voltage: Any, curves: dict[Any, Any], band: tuple[float, float]) -> Figure:

@@ -1,14 +1,10 @@
 """Fig. 9: a hovering finger taken for a flat plate, for areas from 10 to 50 mm2.
 
-Table 2, equations (6) and (7), against the boxes of Table 1. Expected: the right growth with the
-voltage, the wrong one with the distance (a plate's force falls too fast), and areas of only 10 to
-20 mm2 to meet the measured forces. (Recomputed for the medians: 12 to 29 mm2 by (6), 31 to 53 mm2
-by (7).)
+Table 2, equations (6) and (7), against the boxes of Table 1. Expected: the right growth with the voltage, the
+wrong one with the distance (a plate's force falls too fast), and areas of only 10 to 20 mm2 to meet the
+measured forces. (Recomputed for the medians: 12 to 29 mm2 by (6), 31 to 53 mm2 by (7).)
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 from evfem.electrostatics.forces import plate_force
@@ -40,7 +36,7 @@ def _force(law: str, area: float, gap: Any, voltage: Any) -> Any:
     return plate_force(LAWS[law], area, gap, voltage, table2_layers())
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Forces of the five areas in the three cases, and over voltage and distance."""
     numbers = hover.case_numbers(_force, AREAS)
     verdict = hover.verdict(numbers, "A_10mm2")
@@ -53,4 +49,4 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     names = {key: f"{area:g} mm²" for key, area in AREAS.items()}
     return Study(
         "fig09", numbers | verdict, PAPER, ASSUMPTIONS, series, lambda: hover.draw(series, AREAS, names, 9.0)
-    ).finish(out, quick)
+    )

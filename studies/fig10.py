@@ -6,10 +6,7 @@ rectangle. Expected at 0.38 mm for HVLD / LVLD / HVHD (the paper, and recomputed
 (8a) hardly changes with the thickness.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,7 +62,7 @@ def _force(law: str, thickness: float, gap: Any, voltage: Any) -> Any:
     return pad_force(LAWS[law], PAD, gap, voltage, table2_layers(thickness))
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Forces of the three thicknesses in the three cases, and over voltage and distance."""
     numbers = hover.case_numbers(_force, THICKNESS)
     verdict = hover.verdict(numbers, "dsc_0.38mm")
@@ -88,4 +85,4 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series = hover.curves(_force, THICKNESS, quick)
     names = {key: f"$d^{{sc}}$ = {d} mm" for key, d in THICKNESS.items()}
     picture = partial(hover.draw, series, THICKNESS, names, 9.0)
-    return Study("fig10", numbers | verdict, PAPER, ASSUMPTIONS, series, picture).finish(out, quick)
+    return Study("fig10", numbers | verdict, PAPER, ASSUMPTIONS, series, picture)

@@ -1,20 +1,15 @@
-"""Fig. 11: what the air layer around the contact adds to the attraction, with and without
-fingerprint ridges.
+"""Fig. 11: what the air layer around the contact adds to the attraction, with and without fingerprint ridges.
 
-Press to ten loads of 0.01 to 0.1 N/mm, then 1000 V with the load held. (9b) counts every node at
-its gap, (10) only what touches; their relative difference is fitted by (11), alpha F_n^-beta, F_n
-in N/mm. The crest of the ridges is calibrated on Adams' ratio of ridge to gross contact area (Fig.
-6b), not on this figure. Expected (the paper, its caption's order corrected): 0.17 and 0.49 with
-ridges, 0.03 and 0.65 without.
+Press to ten loads of 0.01 to 0.1 N/mm, then 1000 V with the load held. (9b) counts every node at its gap,
+(10) only what touches; their relative difference is fitted by (11), alpha F_n^-beta, F_n in N/mm. The crest
+of the ridges is calibrated on Adams' ratio of ridge to gross contact area (Fig. 6b), not on this figure.
+Expected (the paper, its caption's order corrected): 0.17 and 0.49 with ridges, 0.03 and 0.65 without.
 """
-
-from __future__ import annotations
 
 import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,11 +60,7 @@ PAPER |= {
 }
 PAPER |= {
     f"{pad}.friction_added_by_air_at_0.05_percent": Printed(
-        "10 to 20",
-        f"friction by air at 0.05 N/mm, {pad.replace('_', ' ')}",
-        "%",
-        "section 3.2.5",
-        FRICTION,
+        "10 to 20", f"friction by air at 0.05 N/mm, {pad.replace('_', ' ')}", "%", "section 3.2.5", FRICTION
     )
     for pad in PADS
 }
@@ -210,7 +201,7 @@ def adams_ratio(loads: Sequence[float]) -> Floats:
     return np.asarray(area_law("ridge")(force)) / np.asarray(area_law("gross")(force))
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """The forces over the load, alpha and beta; in full also calibration, mesh and sensitivities."""
     loads = QUICK_LOADS if quick else LOADS
     base = replace(BASE, pad=Pad(resolution="coarse")) if quick else BASE
@@ -230,7 +221,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     parameters |= {"ridge_exponent": base.pad.exponent, "wall_seconds": seconds}
     return Study(
         "fig11", numbers, PAPER, ASSUMPTIONS, _series(shown), lambda: fig11_panels.draw(shown), parameters
-    ).finish(out, quick)
+    )
 
 
 def _run(

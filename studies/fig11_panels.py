@@ -1,7 +1,5 @@
 """How Fig. 11 is drawn: the paper's panels; in the full study calibration, mesh and sensitivities too."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

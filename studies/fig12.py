@@ -1,18 +1,13 @@
 """Fig. 12: a friction step and a sinusoidal texture, rendered on a display by (20a) and exactly.
 
-[a] friction rises from 0.5 to 0.6 at x = 5 mm; [b] the texture (25) with friction 0.1, on a
-display with the smallest apparent friction that the texture has. Pads with ridges (as in the
-paper) and without. Expected (the paper): [a] 1776.73 V, r = 0.9995; [b] smallest apparent friction
-0.072, r = 0.988, in one instant 1911.12 V. Exact encoding: relative L2 error of the friction force
-below 1e-6.
+[a] friction rises from 0.5 to 0.6 at x = 5 mm; [b] the texture (25) with friction 0.1, on a display with the
+smallest apparent friction that the texture has. Pads with ridges (as in the paper) and without. Expected (the
+paper): [a] 1776.73 V, r = 0.9995; [b] smallest apparent friction 0.072, r = 0.988, in one instant 1911.12 V.
+Exact encoding: relative L2 error of the friction force below 1e-6.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -64,7 +59,7 @@ PAPER = {
 INSIGHTS = {
     "out of reach": "steps where the display's force is not as wished within 1e-6: while part of the contact "
     "sticks, where the voltage hardly acts on it, and at the smallest friction, where the wish is below the "
-    "display's own",
+    "display's own"
 }
 #: prefix of the keys -> what is simulated; the first pad is the paper's
 PADS = {"": True, "without_ridges.": False}
@@ -160,7 +155,7 @@ def _cases(quick: bool) -> dict[str, Case]:
     return cases | {"transition": replace(thick, encodings=(*thick.encodings, "thick"))}
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Both references on both pads, open loop and exact; the figure."""
     cases = _cases(quick)
     outcomes = dict(zip(cases, side_by_side(render, list(cases.values()), 1 if quick else 2), strict=True))
@@ -169,10 +164,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         name = key.split(".")[-1]
         numbers |= _main_numbers(key.removesuffix(name), name, outcome)
     costs, picture = {key: one.costs for key, one in outcomes.items()}, lambda: draw(outcomes, numbers)
-    study = Study(
+    return Study(
         "fig12", numbers, PAPER, ASSUMPTIONS | INSIGHTS, _series(outcomes), picture, {"costs": costs}
     )
-    return study.finish(out, quick)
 
 
 def _series(outcomes: Mapping[str, Outcome]) -> list[Series]:

@@ -1,13 +1,9 @@
-"""Fig. 13: the pad on the texture and on the display that renders it, at the instant of the
-largest voltage.
+"""Fig. 13: the pad on the texture and on the display that renders it, at the instant of the largest voltage.
 
-The slide of Fig. 12 [b]: von Mises stress of the deformed pad with ridges on the sinusoid (25)
-and, at the same position, on the display under (20a). Expected (the paper): 1911.12 V in the
-instant shown. Beside the figure the fields of both go to ParaView: fig13_reference.pvd and
-fig13_display.pvd.
+The slide of Fig. 12 [b]: von Mises stress of the deformed pad with ridges on the sinusoid (25) and, at the
+same position, on the display under (20a). Expected (the paper): 1911.12 V in the instant shown. Beside the
+figure the fields of both go to ParaView: fig13_reference.pvd and fig13_display.pvd.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +18,7 @@ from evfem.export import paraview
 from evfem.plotting import side_by_side
 
 from . import rendered
-from .common import Series, Study, make_folder
+from .common import Series, Study
 from .plots import Figure
 from .printed import Printed
 
@@ -93,16 +89,17 @@ def instants(case: rendered.Case) -> dict[str, Instant]:
     return {"reference": _instant(reference, step), "display": _instant(display, step)}
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Both pads in the instant of the largest voltage, their stresses, the figure, the fields."""
     found = instants(rendered.QUICK_TEXTURE if quick else rendered.TEXTURE)
     numbers = _numbers(found)
-    study = Study("fig13", numbers, PAPER, rendered.ASSUMPTIONS, _series(found), lambda: draw(found, numbers))
-    result = study.finish(out, quick)
-    if out is not None:
+
+    def files(folder: Path) -> None:
         for name, instant in found.items():
-            paraview(instant.result, make_folder(out) / f"fig13_{name}.pvd")
-    return result
+            paraview(instant.result, folder / f"fig13_{name}.pvd")
+
+    parts = PAPER, rendered.ASSUMPTIONS, _series(found), lambda: draw(found, numbers)
+    return Study("fig13", numbers, *parts, files=files)
 
 
 def _numbers(found: dict[str, Instant]) -> dict[str, float]:

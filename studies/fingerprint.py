@@ -1,22 +1,18 @@
-"""Fingerprints under a fingertip: what whorl, loop and arch do to stiffness, onset of sliding and
-attraction, and how much that depends on the direction of the slide.
+"""Fingerprints under a fingertip: what whorl, loop and arch do to stiffness, onset of sliding and attraction,
+and how much that depends on the direction of the slide.
 
-Table 2's pad with the ridges of each pattern, with parallel ones along the finger and with none, is
-pressed over the paper's display under 1000 V and slid under the held load across (x) and along the
-finger (z). Expected: parallel ridges give way more easily across than along themselves, curved ones
-have both directions under the contact and differ little more than the smooth pad, which is longer
-than wide; once everything slips, friction is the coefficient times the pressing force for every
-pattern and direction, so patterns differ in how sliding begins and in the attraction of their
-contact, and not in the end.
+Table 2's pad with the ridges of each pattern, with parallel ones along the finger and with none, is pressed
+over the paper's display under 1000 V and slid under the held load across (x) and along the finger (z).
+Expected: parallel ridges give way more easily across than along themselves, curved ones have both directions
+under the contact and differ little more than the smooth pad, which is longer than wide; once everything
+slips, friction is the coefficient times the pressing force for every pattern and direction, so patterns
+differ in how sliding begins and in the attraction of their contact, and not in the end.
 
-The pitch is 0.75 mm, half as much again as a finger's, so that a curved pattern has 20k nodes; what
-pitch, mesh and steps change stands in the numbers, of parallel ridges.
+The pitch is 0.75 mm, half as much again as a finger's, so that a curved pattern has 20k nodes; what pitch,
+mesh and steps change stands in the numbers, of parallel ridges.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -80,7 +76,7 @@ def pad(pattern: str, pitch: float = PITCH, resolution: str = "coarse") -> ev.Fi
     return ev.Fingertip(ridges=pattern, ridge_width=pitch, resolution=resolution)
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Stiffness, onset and attraction of every pattern in both directions, in numbers and a figure."""
     patterns = ["along"] if quick else list(PATTERNS)
     slides = SLIDES[:3] if quick else SLIDES
@@ -95,9 +91,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         if one in PATTERNS
     ]
     parameters = {"pitch_mm": PITCH, "load_N": LOAD, "voltage_V": VOLTAGE, "slides_mm": slides}
-    return Study(
-        "fingerprint", numbers, {}, ASSUMPTIONS, series, lambda: _draw(found, patterns), parameters
-    ).finish(out, quick)
+    return Study("fingerprint", numbers, {}, ASSUMPTIONS, series, lambda: _draw(found, patterns), parameters)
 
 
 def pattern_numbers(found: dict[tuple[str, str], Slid], patterns: list[str]) -> dict[str, float]:

@@ -1,29 +1,24 @@
-"""The whole finger pad in newtons: depth and contact areas over the load beside Adams' power laws,
-what could explain their difference, hovering pads of eleven participants, and where plane strain
-stands.
+"""The whole finger pad in newtons: depth and contact areas over the load beside Adams' power laws, what could
+explain their difference, hovering pads of eleven participants, and where plane strain stands.
 
-Press. Table 2's pad, smooth and with ridges along the finger, is pressed without friction; areas
-are read off the footprint. Found: the pad touches 0.3 to 0.6 of Adams' gross area and, from 0.1 to
-0.5 N, 0.5 to 0.65 of his ridge area; ridge over gross area is 0.5 to 0.6, where his rises from 0.36
-to 0.59. It takes twelve cells across a ridge to see that: six leave the next node beside the crest,
-or the one after it, and with them 0.46 at every load. Single changes of the pad at 0.5 N say what
-the difference takes: its axes, its moduli, how it is held, friction, the ridges' crests. None does
-it alone; half the moduli go farthest.
+Press. Table 2's pad, smooth and with ridges along the finger, is pressed without friction; areas are read off
+the footprint. Found: the pad touches 0.3 to 0.6 of Adams' gross area and, from 0.1 to 0.5 N, 0.5 to 0.65 of
+his ridge area; ridge over gross area is 0.5 to 0.6, where his rises from 0.36 to 0.59. It takes twelve cells
+across a ridge to see that: six leave the next node beside the crest, or the one after it, and with them 0.46
+at every load. Single changes of the pad at 0.5 N say what the difference takes: its axes, its moduli, how it
+is held, friction, the ridges' crests. None does it alone; half the moduli go farthest.
 
-Hover. Rigid pads of Table 1's sizes, both laws, three cases. Expected: the smooth ones a few per
-cent below (24), which is not an ellipsoid; ridges take another 2 to 3 % away; neither brings
-Strong and Troxel's law near the measured forces.
+Hover. Rigid pads of Table 1's sizes, both laws, three cases. Expected: the smooth ones a few per cent below
+(24), which is not an ellipsoid; ridges take another 2 to 3 % away; neither brings Strong and Troxel's law
+near the measured forces.
 
-Plane strain. The width over which a cross-section has the force of the whole pad at the same
-depth. Expected: it grows with the load from 5 to 8 mm, so that no single width joins the two.
+Plane strain. The width over which a cross-section has the force of the whole pad at the same depth. Expected:
+it grows with the load from 5 to 8 mm, so that no single width joins the two.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -175,7 +170,7 @@ def force_on(finger: Any, mesh: Any, skin: Skin, law: Any, voltage: float, gap: 
     return float(-1e3 * forces[:, 1].sum())
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Depth, areas, variants, hovering forces, widths and errors, in numbers and a figure."""
     loads = QUICK_LOADS if quick else LOADS
     pads = {"smooth": tip("coarse" if quick else "medium")} | ({} if quick else {"ridged": ridged()})
@@ -200,7 +195,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series += [by_participant(" ".join(key), values) for key, values in forces.items()]
     parameters = {"loads_N": loads, "variants_at_N": LOAD, "resolution": pads["smooth"].resolution}
     picture = partial(draw, series, changed, forces)
-    return Study("fingertip", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
+    return Study("fingertip", numbers, {}, ASSUMPTIONS, series, picture, parameters)
 
 
 def press_numbers(table: dict[str, dict[str, list[float]]], loads: Sequence[float]) -> dict[str, float]:

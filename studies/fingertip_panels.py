@@ -1,7 +1,5 @@
 """The figure of `fingertip`: depth, areas, variants, widths and hovering forces."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,20 +1,16 @@
 """Attraction over the frequency of the voltage, and what published experiments say beside it.
 
-Plates with the insulator of a touchscreen, a gap of 1 um and 0.30 mm of stratum corneum under 100 V
-peak: mean pressure over the frequency for four skins and for three conductivities of the gap, a
-square wave beside a sine of the same amplitude, and the step of a direct voltage. Statements of
-experiments stand in the numbers as `published.WHO.WHAT`, what the model gives under the same name
-with `model.`; both are kept where they disagree. The conductivity of the gap is a parameter that
-nobody has measured.
+Plates with the insulator of a touchscreen, a gap of 1 um and 0.30 mm of stratum corneum under 100 V peak:
+mean pressure over the frequency for four skins and for three conductivities of the gap, a square wave beside
+a sine of the same amplitude, and the step of a direct voltage. Statements of experiments stand in the numbers
+as `published.WHO.WHAT`, what the model gives under the same name with `model.`; both are kept where they
+disagree. The conductivity of the gap is a parameter that nobody has measured.
 
-Expected: the gap discharges below a corner of tens to hundreds of hertz, the skin is a conductor
-below kilohertz and alone gives no corner below; a square wave fluctuates more than a sine below
-about 190 Hz and less above it; a step rises before it decays.
+Expected: the gap discharges below a corner of tens to hundreds of hertz, the skin is a conductor below
+kilohertz and alone gives no corner below; a square wave fluctuates more than a sine below about 190 Hz and
+less above it; a step rises before it decays.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,7 +54,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """The curves, the statements and their numbers, and a figure of six panels."""
     frequency = np.geomspace(1.0, 1e5, 41 if quick else 241)
     curves = {f"skin {name}": _mean(frequency, name, LEAK) for name in SKINS}
@@ -72,7 +68,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series.append(Series("step", time, step, "Pa over s"))
     series += [Series(f"clutch {name}", VOLTS, y, "kPa over V") for name, y in CLUTCH.items()]
     given, picture = {"gap_mm": GAP, "peak_V": PEAK}, lambda: _draw(frequency, curves, swings, (time, step))
-    return Study("frequency", numbers, {}, ASSUMPTIONS, series, picture, given).finish(out, quick)
+    return Study("frequency", numbers, {}, ASSUMPTIONS, series, picture, given)
 
 
 def _mean(frequency: Any, skin: str, leak: float) -> Any:

@@ -13,11 +13,6 @@ Expected: at 20 mm/s over ridges of 0.5 mm a line at 40 Hz, at 40 mm/s at 80 Hz,
 neighbours; none without ridges.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 import evfem as ev
@@ -60,7 +55,7 @@ def amplitudes(values: Floats) -> Floats:
     return np.asarray(2.0 * np.abs(np.fft.rfft(values))[1:-1] / values.size)
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Spectra with and without ridges, the line over its neighbours, and the gain of every wave."""
     steps, speeds = (QUICK_STEPS, SPEEDS[:1]) if quick else (STEPS, SPEEDS)
     heights = amplitudes(surface().height(PERIOD * np.arange(steps) / steps))
@@ -84,9 +79,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             series.append(Series(f"gain.{key}", frequency[there], gain, "1/mm"))
         numbers[f"verdict.line_Hz.{speed:g}_mm_s"] = speed / PITCH
     parameters = {"steps": steps, "speeds": speeds}
-    return Study(
-        "friction_spectrum", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters
-    ).finish(out, quick)
+    return Study("friction_spectrum", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters)
 
 
 def _strongest(frequency: Floats, found: Floats, line: int) -> float:

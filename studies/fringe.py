@@ -1,37 +1,33 @@
 """What the column law misses: fringes below ridges, spreading inside the skin, whole fingers.
 
-Ridges. The force of one ridge, t^7 as the finger's and a sinusoid of the same pitch, over the
-paper's film and over a touchscreen, column by column and by the full field, for gaps from 1 mm to
-contact. Expected: 4 to 12 % too small over the film for the finger's ridges, most in contact; over
-the touchscreen, whose field stays in narrow gaps, nothing in contact. The bands are the bounds of
-the energy, which cost no solution.
+Ridges. The force of one ridge, t^7 as the finger's and a sinusoid of the same pitch, over the paper's film
+and over a touchscreen, column by column and by the full field, for gaps from 1 mm to contact. Expected: 4 to
+12 % too small over the film for the finger's ridges, most in contact; over the touchscreen, whose field stays
+in narrow gaps, nothing in contact. The bands are the bounds of the energy, which cost no solution.
 
-Skin. On a touchscreen half of the voltage falls across the stratum corneum, 0.38 mm thick, wider
-than a ridge: the field spreads in it from the contact on. Grooves of 0.1 mm, 30 % of the surface in
-contact, smooth and with gaps of 1 and 5 um between rough faces; the layer follows the grooves, or
-fills the ridges and ends flat. Expected: far more than the columns' pull where the faces are
-smooth, a few per cent where they are rough.
+Skin. On a touchscreen half of the voltage falls across the stratum corneum, 0.38 mm thick, wider than a
+ridge: the field spreads in it from the contact on. Grooves of 0.1 mm, 30 % of the surface in contact, smooth
+and with gaps of 1 and 5 um between rough faces; the layer follows the grooves, or fills the ridges and ends
+flat. Expected: far more than the columns' pull where the faces are smooth, a few per cent where they are
+rough.
 
-Fingers. The hovering finger of Table 1 and the pressed one of Fig. 11, with and without ridges.
-Expected: the ridged finger gains more than the smooth one, so the share of its ridges rises, and so
-does the share of the attraction that acts through the air beside the contact.
+Fingers. The hovering finger of Table 1 and the pressed one of Fig. 11, with and without ridges. Expected: the
+ridged finger gains more than the smooth one, so the share of its ridges rises, and so does the share of the
+attraction that acts through the air beside the contact.
 
-Participants. The closed force (8a) of the eleven hovering fingers, times what the full field below
-their rigid, ridged cross-section has over the column law below the smooth one, beside the measured
-forces. Expected: next to nothing at 0.25 and 0.5 mm, where ridges weaken the pull and their
-fringes give part of it back, so the factor of two between (8a) and the measurement remains.
+Participants. The closed force (8a) of the eleven hovering fingers, times what the full field below their
+rigid, ridged cross-section has over the column law below the smooth one, beside the measured forces.
+Expected: next to nothing at 0.25 and 0.5 mm, where ridges weaken the pull and their fringes give part of it
+back, so the factor of two between (8a) and the measurement remains.
 
-Electrodes. A smooth rigid finger hovers over the edge of an electrode, and over stripes of either
-sign with gaps of a tenth of their pitch. Expected: half of the pull at the edge, and a force back
-to the electrode; over stripes as much for a grounded as for a floating finger, less for finer ones.
+Electrodes. A smooth rigid finger hovers over the edge of an electrode, and over stripes of either sign with
+gaps of a tenth of their pitch. Expected: half of the pull at the edge, and a force back to the electrode;
+over stripes as much for a grounded as for a floating finger, less for finer ones.
 """
-
-from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -124,7 +120,7 @@ def _scene(finger: ev.FingerPad, voltage: float, motion: Any) -> ev.Scene:
     return ev.Scene(finger, display, ev.StrongTroxel(), voltage, [motion], direction="normal", field="full")
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Errors of the column law in numbers and a figure."""
     gaps = GAPS[2::3] if quick else GAPS
     numbers, series = {}, []
@@ -142,9 +138,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     on_electrodes, over_edge = electrode_numbers(quick)
     numbers, series = numbers | on_electrodes, series + over_edge
     parameters = {"pitch_mm": PITCH, "height_mm": HEIGHT, "load_N_per_mm": LOAD}
-    return Study(
-        "fringe", numbers, {}, ASSUMPTIONS, series, lambda: _draw(series, numbers), parameters
-    ).finish(out, quick)
+    return Study("fringe", numbers, {}, ASSUMPTIONS, series, lambda: _draw(series, numbers), parameters)
 
 
 def finger_numbers(quick: bool) -> dict[str, float]:
@@ -202,7 +196,7 @@ def full_over_columns(participant: str, gap: float) -> float:
         finger = replace(ev.FingerPad.participant(participant, resolution="coarse"), ridges=ridges)
         model, position = rigid_pad(finger, gap)
         attraction = model.attraction
-        forces = attraction.forces if ridges else attraction.column_forces
+        forces = attraction.forces if ridges else attraction.column_law.forces
         pull[ridges] = forces(position, 1.0, None)[:, 1].sum()
     return float(pull[True] / pull[False])
 

@@ -1,7 +1,5 @@
 """Shared by Figs 9 and 10: attraction of a hovering finger over voltage and distance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

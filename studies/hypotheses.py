@@ -15,11 +15,6 @@ hold in all three cases. Nothing is claimed: other causes (losses, fringe fields
 the pads' sizes) were not asked.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from evfem import data
@@ -50,7 +45,7 @@ ASSUMPTIONS = {
 }  # fmt: skip
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Required sizes by case and participant, their medians and spreads, and a figure."""
     needed = {name: np.array(values) for name, values in _needed().items()}
     numbers = _numbers(needed)
@@ -59,8 +54,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         for what, values in needed.items()
         for i, case in enumerate(CASES)
     ]
-    study = Study("hypotheses", numbers, {}, ASSUMPTIONS, series, lambda: _draw(needed))
-    return study.finish(out, quick)
+    return Study("hypotheses", numbers, {}, ASSUMPTIONS, series, lambda: _draw(needed))
 
 
 def _needed() -> dict[str, list[Floats]]:

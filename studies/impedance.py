@@ -10,9 +10,6 @@ The spectrum of the branches alone is beside it: with all layers alike and small
 but for its mass. Here the nail and the bulk do not relax.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -59,7 +56,7 @@ def slope(finger: ev.FingerPad, depth: float) -> float:
     return float((ends[1] - ends[0]) / (2.0 * LITTLE))
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Stiffness by depth and axis, the frequency where its real part vanishes, and the slope of a press."""
     finger, depths = pad(quick), DEPTHS[1:2] if quick else DEPTHS
     frequency = np.geomspace(0.1, 300.0, 15 if quick else 30)
@@ -74,17 +71,13 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             series.append(Series(f"real.{key}", frequency, 1e3 * real, "mN/mm2"))
             series.append(Series(f"imaginary.{key}", frequency, 1e3 * found.stiffness.imag, "mN/mm2"))
     slow = float(ev.impedance(pressed(finger, depths[-1]), 1e-6).stiffness[0].real)
-    numbers |= {
-        "slow.mN_per_mm2": 1e3 * slow,
-        "slope_of_a_press.mN_per_mm2": 1e3 * slope(finger, depths[-1]),
-    }
+    numbers |= {"slow.mN_per_mm2": 1e3 * slow, "slope_of_a_press.mN_per_mm2": 1e3 * slope(finger, depths[-1])}
     series += [
         Series("branches.real", frequency, alone.real, "1"),
         Series("branches.imaginary", frequency, alone.imag, "1"),
     ]
     parameters = {"depths_mm": depths, "frequencies": len(frequency)}
-    made = Study("impedance", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, depths), parameters)
-    return made.finish(out, quick)
+    return Study("impedance", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, depths), parameters)
 
 
 def vanishing(frequency: Floats, real: Floats) -> float:

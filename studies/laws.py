@@ -1,22 +1,17 @@
-"""Which law, and why: electrostatics says Strong-Troxel, the measured forces of this paper say
-Kaczmarek.
+"""Which law, and why: electrostatics says Strong-Troxel, the measured forces of this paper say Kaczmarek.
 
-Fact 1, theory. The skin's permittivity is so high that its surface is as good as a conductor. For
-a conducting cylinder (radius 8.34 mm, half of Table 2's width) over an electrode under a
-dielectric slab (0.09 mm, 3.35) the field can be computed to 2e-6 or better (line charges with
-their images in the slab). Expected: Strong-Troxel's law, integrated over the curved pad, is its
-parallel-plate limit and within a few per cent; Kaczmarek's is about half as large. Without a slab
-the closed form gives 0.906597 mN/mm at 0.25 mm and 2000 V.
+Fact 1, theory. The skin's permittivity is so high that its surface is as good as a conductor. For a
+conducting cylinder (radius 8.34 mm, half of Table 2's width) over an electrode under a dielectric slab (0.09
+mm, 3.35) the field can be computed to 2e-6 or better (line charges with their images in the slab). Expected:
+Strong-Troxel's law, integrated over the curved pad, is its parallel-plate limit and within a few per cent;
+Kaczmarek's is about half as large. Without a slab the closed form gives 0.906597 mN/mm at 0.25 mm and 2000 V.
 
-Fact 2, measurement. Over the eleven participants of Table 1 Kaczmarek's law is within about 10 %
-of the medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, the two differ most:
-24.1 kPa against 1.39 kPa at 2000 V.
+Fact 2, measurement. Over the eleven participants of Table 1 Kaczmarek's law is within about 10 % of the
+medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, the two differ most: 24.1 kPa against
+1.39 kPa at 2000 V.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,7 +35,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Both facts in numbers, and a figure that shows them side by side."""
     gaps = np.geomspace(0.02, 1.0, 9 if quick else 33)
     exact = np.array([cylinder_over_slab(gap) for gap in gaps])
@@ -63,7 +58,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     ]
     parameters = {"U_V": VOLTAGE, "gap_mm": GAP, "radius_mm": RADIUS}
     picture = partial(_draw, gaps, exact, by_law, forces)
-    return Study("laws", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
+    return Study("laws", numbers, {}, ASSUMPTIONS, series, picture, parameters)
 
 
 def _cylinder_numbers(pads: EllipsoidalPad) -> dict[str, float]:
@@ -82,15 +77,14 @@ def _cylinder_numbers(pads: EllipsoidalPad) -> dict[str, float]:
 def cylinder_over_slab(
     gap: float, slab: Layer | None = None, radius: float = RADIUS, voltage: float = VOLTAGE
 ) -> float:
-    """Attraction in N/mm of a conducting cylinder `gap` mm above a dielectric `slab` on an
-    electrode.
+    """Attraction in N/mm of a conducting cylinder `gap` mm above a dielectric `slab` on an electrode.
 
     Line charges inside the cylinder, on a circle around the focus of the nearly equivalent bipolar
-    coordinates, with their images: a charge at height h over a slab of thickness d and
-    permittivity e on a grounded plane has the images b, and -(1 - b^2) b^(n-1) at depth h + 2 n d,
-    n = 1, 2, ..., b = (1 - e)/(1 + e) (W. R. Smythe, Static and Dynamic Electricity, 1968, chapter
-    4, by matching D and potential at the slab). Their strengths follow from the potential on the
-    cylinder; the force is that of all images on all charges.
+    coordinates, with their images: a charge at height h over a slab of thickness d and permittivity e on a
+    grounded plane has the images b, and -(1 - b^2) b^(n-1) at depth h + 2 n d, n = 1, 2, ..., b = (1 - e)/(1
+    + e) (W. R. Smythe, Static and Dynamic Electricity, 1968, chapter 4, by matching D and potential at the
+    slab). Their strengths follow from the potential on the cylinder; the force is that of all images on all
+    charges.
     """
     slab = slab or paper_display(0.0).insulator
     plane = slab.thickness / slab.eps_r  # electrode this far below the surface, without a slab

@@ -1,7 +1,5 @@
 """Shared by Fig. 5 and `laws`: each participant's computed force beside his or her measured one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

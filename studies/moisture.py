@@ -10,9 +10,6 @@ on or off, so that the share of the voltage falls: thresholds rise with moisture
 moist skin is softer, that water conducts, and that a film flows and dries.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import evfem as ev
@@ -47,7 +44,7 @@ def slid(film: float, frequency: float | None) -> ev.Result:
     return ev.simulate(ev.Scene(finger, display, ev.StrongTroxel(), voltage, motion, **more))
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Friction, adhesion and attraction over the film, and what the voltage adds to friction."""
     films, frequencies = (FILMS[::2], FREQUENCIES[1:2]) if quick else (FILMS, FREQUENCIES)
     numbers, series = {}, []
@@ -74,8 +71,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         )
         series.append(Series(f"{key}.gain", films, gain, "%"))
     parameters = {"films_um": films, "frequencies_Hz": frequencies, "load_N_per_mm": LOAD}
-    study = Study("moisture", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters)
-    return study.finish(out, quick)
+    return Study("moisture", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters)
 
 
 def draw(series: list[Series]) -> Figure:

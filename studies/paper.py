@@ -2,8 +2,6 @@
 the files that the studies leave.
 """
 
-from __future__ import annotations
-
 import json
 import textwrap
 from collections.abc import Iterable, Mapping

@@ -1,20 +1,16 @@
 """Eleven participants, two laws, three hover cases by finite elements, as one sweep.
 
-Each participant has a finger of his or her own (`FingerPad.participant`): width and height a_i,
-b_i of Table 1, bone, nail and the layers below the stratum corneum scaled with it from Table 2's
-finger; stratum corneum, ridges and moduli are Table 2's. The bone is held, the tissue deforms. A
-plane model gives N/mm: the force in mN is that times the width out of the plane over which a
-rigid, smooth ellipsoid of the participant's axes (8a), (8b), (24) has the same force as its
-cross-section alone. So what differs from the closed forms of Fig. 5 is what deformation and ridges
-do. Expected: together they take away 2 to 6 %, about the same for everybody (ridges more,
-deformation gives some back), so that the closed forms' differences from the measured forces, up to
-a factor of three for fingers of the same size, are not theirs to explain.
+Each participant has a finger of his or her own (`FingerPad.participant`): width and height a_i, b_i of Table
+1, bone, nail and the layers below the stratum corneum scaled with it from Table 2's finger; stratum corneum,
+ridges and moduli are Table 2's. The bone is held, the tissue deforms. A plane model gives N/mm: the force in
+mN is that times the width out of the plane over which a rigid, smooth ellipsoid of the participant's axes
+(8a), (8b), (24) has the same force as its cross-section alone. So what differs from the closed forms of Fig.
+5 is what deformation and ridges do. Expected: together they take away 2 to 6 %, about the same for everybody
+(ridges more, deformation gives some back), so that the closed forms' differences from the measured forces, up
+to a factor of three for fingers of the same size, are not theirs to explain.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,7 +32,7 @@ ASSUMPTIONS = {
 DASH = {"marker": "_", "markersize": 11, "markeredgewidth": 1.6}
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Forces by finite elements, beside the closed forms and those measured."""
     names = participants()["participant"][: 3 if quick else None]
     # few points: starting processes costs more than they save
@@ -58,7 +54,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series = [by_participant(name, values) for name, values in every.items()]
     parameters = {"sweep": table.provenance["scene"], "grid": table.provenance["grid"]}
     picture = partial(_draw, names, forces, closed)
-    return Study("participants", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
+    return Study("participants", numbers, {}, ASSUMPTIONS, series, picture, parameters)
 
 
 def plan(names: list[str]) -> ev.Sweep:

@@ -1,7 +1,5 @@
 """How the studies draw: colours of the laws, panels with letters, boxes of measurements, axes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 

@@ -1,7 +1,5 @@
 """A pad pressed to a series of loads, with and without voltage: runs, and what its outline tells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -41,9 +39,8 @@ class Pad:
 
 @dataclass(frozen=True)
 class Case:
-    """One run through the loads (N/mm). Without friction the order of load and voltage does not
-    matter, and the voltage is there from the start; with friction it comes on under each load,
-    unless `voltage_first`.
+    """One run through the loads (N/mm). Without friction the order of load and voltage does not matter, and
+    the voltage is there from the start; with friction it comes on under each load, unless `voltage_first`.
     """
 
     pad: Pad

@@ -1,7 +1,5 @@
 """What the paper prints beside what a study finds: rows of text, and whether their digits agree."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass

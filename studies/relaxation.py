@@ -13,9 +13,6 @@ published as such.
   contact lies ahead of it, as in closed form.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -71,7 +68,7 @@ def strokes(finger: ev.FingerPad, speed: float, steps: int) -> tuple[Any, Any, f
     return x, force, float(work.sum() / work[:steps].sum())
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Peaks over the force at rest, creep, shares lost in strokes, the cylinder beside its closed form."""
     finger, steps = pad(quick), 10 if quick else 20
     speeds = (20.0,) if quick else tuple(HALF_PLANE)
@@ -97,8 +94,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         near = np.abs(found.place) < 6.0
         series.append(Series(f"rolling.{speed:g}_mm_s", found.place[near], 1e3 * found.pressure[near], "kPa"))
     parameters = {"steps": steps, "cell_mm": cell, "step_mm": step, "depth_mm": DEPTH}
-    made = Study("relaxation", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters)
-    return made.finish(out, quick)
+    return Study("relaxation", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters)
 
 
 def beside(found: Rolling, speed: float) -> dict[str, float]:

@@ -1,11 +1,7 @@
-"""Scenes and runs of the rendering studies: a friction step and a texture, felt and rendered on a
-display.
+"""Scenes and runs of the rendering studies: a friction step and a texture, felt and rendered on a display.
 
-What the paper leaves open is chosen here once: the load, the length of the slide, speed and
-viscosity.
+What the paper leaves open is chosen here once: the load, the length of the slide, speed and viscosity.
 """
-
-from __future__ import annotations
 
 import time
 import warnings
@@ -77,9 +73,8 @@ class Rendered:
 class Outcome:
     """A case: the reference over its slide, what the display needs and does, and the costs.
 
-    `position`, `load` and `force` (n,) of the slide's steps; `lowest_friction` is the smallest
-    apparent friction from `full_slip` (mm) on, `friction` that of the display, `signal` the closed
-    form's voltage.
+    `position`, `load` and `force` (n,) of the slide's steps; `lowest_friction` is the smallest apparent
+    friction from `full_slip` (mm) on, `friction` that of the display, `signal` the closed form's voltage.
     """
 
     case: Case
@@ -127,9 +122,8 @@ def reference_of(case: Case) -> rendering.Recording:
 def display_friction(case: Case, felt: rendering.ApparentFriction, full_slip: float) -> tuple[float, float]:
     """Smallest apparent friction of the reference after full slip, and friction of the display.
 
-    On the step the display has the coefficient before it; on texture the smallest apparent
-    friction, or a fifth of the texture's own coefficient if that is larger (a negative one cannot
-    be had).
+    On the step the display has the coefficient before it; on texture the smallest apparent friction, or a
+    fifth of the texture's own coefficient if that is larger (a negative one cannot be had).
     """
     lowest = felt.minimum(after=full_slip)
     if case.friction is None:

@@ -9,8 +9,6 @@ half width, centre and coefficient of resistance of these numbers. The block is 
 bonded above: it is to show direction and size, to within what its size leaves.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,16 +1,12 @@
 """Section 3.2.1: thickness of the stratum corneum from two perception thresholds.
 
-Strong and Troxel: one finger feels 73 V through 0.5 mil and 110 V through 1.0 mil of an insulator
-with eps_r = 4.5 alike. Equal tangential forces give the thickness of the stratum corneum (eps_r =
-2000) by Strong-Troxel's law, equation (21), or by Kaczmarek's, (23). Expected (the paper, and
-recomputed): 2.74 (2.746) um of d_sc / eps_sc, hence 5.48 (5.49) mm, and 76.2 (76.17) um; about 300
-um is generally accepted.
+Strong and Troxel: one finger feels 73 V through 0.5 mil and 110 V through 1.0 mil of an insulator with eps_r
+= 4.5 alike. Equal tangential forces give the thickness of the stratum corneum (eps_r = 2000) by
+Strong-Troxel's law, equation (21), or by Kaczmarek's, (23). Expected (the paper, and recomputed): 2.74
+(2.746) um of d_sc / eps_sc, hence 5.48 (5.49) mm, and 76.2 (76.17) um; about 300 um is generally accepted.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,7 +41,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Solve (21) and (23); draw how unequal the two forces are for any other thickness."""
     table = data.load("thresholds")
     voltages = table.value("U_2"), table.value("U_3")
@@ -72,7 +68,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     parameters = {"voltages_V": voltages, "insulators_mm": [film.thickness for film in films]}
     parameters |= {"eps_i": table.value("eps_i"), "eps_sc": eps_sc}
     picture = partial(_draw, thickness, ratio, found)
-    return Study("section321", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
+    return Study("section321", numbers, PAPER, ASSUMPTIONS, series, picture, parameters)
 
 
 def _printed_factor(lower: float, higher: float) -> float:

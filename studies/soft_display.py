@@ -8,9 +8,6 @@ attraction grows; a thin layer of an incompressible gel yields less than its mod
 aside. Friction hardly changes, as it is the coefficient times load and attraction.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import evfem as ev
@@ -46,7 +43,7 @@ def measured(result: ev.Result) -> dict[str, float]:
     return {name: float(result[name][-1 if name == "tangential_force" else 2]) for name in MEASURES}
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """The measures over the modulus, one curve for each thickness."""
     moduli, thicknesses = (MODULI[1:2], THICKNESSES[1:2]) if quick else (MODULI, THICKNESSES)
     rigid = measured(pressed(None))
@@ -60,8 +57,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             unit = label.split("(")[1].rstrip(")")
             series.append(Series(f"{name}.h_{thickness:g}mm", moduli, [one[name] for one in found], unit))
     parameters = {"moduli_MPa": moduli, "thicknesses_mm": thicknesses, "load_N_per_mm": LOAD}
-    study = Study("soft_display", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, rigid), parameters)
-    return study.finish(out, quick)
+    return Study("soft_display", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, rigid), parameters)
 
 
 def draw(series: list[Series], rigid: dict[str, float]) -> Figure:
@@ -75,5 +71,6 @@ def draw(series: list[Series], rigid: dict[str, float]) -> Figure:
             ax.plot(one.x, one.y, "o-", color=colour, lw=1.2, ms=4, label=f"{thickness} mm thick")
         ax.axhline(rigid[name], color="black", ls="--", lw=0.8, label="rigid")
         ax.set(xlabel="modulus of the surface (MPa)", ylabel=label, xscale="log")
+        ax.margins(y=0.1)
     axes[0].legend(fontsize=7)
     return figure

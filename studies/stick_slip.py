@@ -1,19 +1,15 @@
 """Stick-slip: a mass on a spring, drawn over a surface whose friction falls with the speed.
 
-A slab that hardly deforms is pressed with 0.04 N/mm, carries a mass of 1e-6 t behind a spring of
-0.02 N/mm (both per mm of depth, `evfem.newton.hand`) and is drawn at 1, 2 and 4 mm/s. Friction is
-Stribeck's: 0.4 at rest, 0.2 of fast sliding, with the transition at 0.5 mm/s.
+A slab that hardly deforms is pressed with 0.04 N/mm, carries a mass of 1e-6 t behind a spring of 0.02 N/mm
+(both per mm of depth, `evfem.newton.hand`) and is drawn at 1, 2 and 4 mm/s. Friction is Stribeck's: 0.4 at
+rest, 0.2 of fast sliding, with the transition at 0.5 mm/s.
 
-Expected: it sticks until the spring carries 0.4 times the load, slips, and sticks again. The
-reference is the equation of motion m x'' = k (V t - x) - N mu(x'), integrated with events to ten
-digits; where friction falls at once the period has a closed form, given beside it. Backward Euler
-takes from the swing of a slip what falls with the step: the period comes out shorter, by less than
-1 % with 600 steps in a slip.
+Expected: it sticks until the spring carries 0.4 times the load, slips, and sticks again. The reference is the
+equation of motion m x'' = k (V t - x) - N mu(x'), integrated with events to ten digits; where friction falls
+at once the period has a closed form, given beside it. Backward Euler takes from the swing of a slip what
+falls with the step: the period comes out shorter, by less than 1 % with 600 steps in a slip.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -101,7 +97,7 @@ def drawn(speed: float, steps: int) -> tuple[ev.Result, float]:
     return result, float(second - first)
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Periods over the speed and over the step, and the forces of two slips."""
     speeds, counts = (SPEEDS[:1], QUICK_STEPS) if quick else (SPEEDS, STEPS)
     numbers, series = {}, []
@@ -127,9 +123,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series.append(Series("error", counts, errors, "%"))
     numbers["verdict.rate"] = float(np.log(errors[-2] / errors[-1]) / np.log(counts[-1] / counts[-2]))
     parameters = {"steps": counts, "speeds": speeds}
-    return Study(
-        "stick_slip", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, speeds), parameters
-    ).finish(out, quick)
+    return Study("stick_slip", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, speeds), parameters)
 
 
 def remainder(result: ev.Result) -> float:

@@ -1,19 +1,15 @@
 """How sure are Fig. 5's closed forms? 500 samples of what was measured or assumed.
 
-The closed forms are (8a), (8b) with (24), the rigid smooth ellipsoid of each participant by
-quadrature. They are adequate because the fingers hover: nothing touches. What deformation and
-ridges change is a few per cent, which `participants` computes.
+The closed forms are (8a), (8b) with (24), the rigid smooth ellipsoid of each participant by quadrature. They
+are adequate because the fingers hover: nothing touches. What deformation and ridges change is a few per cent,
+which `participants` computes.
 
-Each sample has one value of every input for all participants (an instrument that is off is off for
-all); the answer is the median over the eleven, as Fig. 5 has it. Latin hypercube, fixed seed.
-Expected: the air gap matters most, then the stratum corneum (Kaczmarek alone) and the inclination;
-the permittivity of skin does not matter; Kaczmarek's law lies within the measured medians'
-intervals, Strong-Troxel's above them.
+Each sample has one value of every input for all participants (an instrument that is off is off for all); the
+answer is the median over the eleven, as Fig. 5 has it. Latin hypercube, fixed seed. Expected: the air gap
+matters most, then the stratum corneum (Kaczmarek alone) and the inclination; the permittivity of skin does
+not matter; Kaczmarek's law lies within the measured medians' intervals, Strong-Troxel's above them.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,7 +44,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Distribution of the median force by both laws in each case, and what it depends on."""
     samples = ev.Samples(INPUTS, 60 if quick else COUNT, SEED)
     drawn = samples.draw()
@@ -65,9 +61,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     ]
     parameters = {"count": samples.count, "seed": SEED, "method": samples.method}
     parameters["inputs"] = {name: repr(one) for name, one in INPUTS.items()}
-    return Study(
-        "uncertainty", numbers, {}, ASSUMPTIONS, series, lambda: _draw(medians, ranks), parameters
-    ).finish(out, quick)
+    return Study("uncertainty", numbers, {}, ASSUMPTIONS, series, lambda: _draw(medians, ranks), parameters)
 
 
 def forces(drawn: dict[str, Floats], law: str, case: str) -> Floats:

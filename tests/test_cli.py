@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -444,9 +445,7 @@ def test_a_folder_that_cannot_be_made_is_exit_status_4(place):
 
 
 def interrupted(place, number):
-    """Start the long scene, send a signal after some steps; returns exit status and standard
-    error.
-    """
+    """Start the long scene, send a signal after some steps; returns exit status and standard error."""
     (place / "square.toml").write_text(MANY_STEPS)
     words, environment = process_of("run", "square.toml")
     with subprocess.Popen(words, cwd=place, env=environment, stderr=subprocess.PIPE, text=True) as process:
@@ -561,8 +560,8 @@ def test_scenes_of_a_campaign_are_chosen_by_options_that_others_refuse(monkeypat
 
     from evfem import studies
 
-    ran = []
-    monkeypatch.setattr(study, "main", lambda quick, out, sample: ran.append(sample) or {"assumptions": {}})
+    ran, found = [], SimpleNamespace(finish=lambda out, quick: {"assumptions": {}})
+    monkeypatch.setattr(study, "main", lambda quick, out, sample: ran.append(sample) or found)
     assert cli.main(["study", "campaign", "--scenes", "7", "--seed", "3", "--out", str(tmp_path)]) == 0
     assert ran == [studies.Sample(scenes=7, seed=3)]
     for words in (["laws", "--seed", "3"], ["campaign", "--scenes", "0"], ["campaign", "--seed", "-1"]):

@@ -1,6 +1,4 @@
-"""The paper's tables: complete, with units and source, and the statistics the paper prints of
-them.
-"""
+"""The paper's tables: complete, with units and source, and the statistics the paper prints of them."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,4 @@
-"""Hostile input: damaged files of every format, and files made to take all memory or time, get a
-sentence.
-"""
+"""Hostile input: damaged files of every format, and files made to take all memory or time, get a sentence."""
 
 import io
 import tracemalloc
@@ -95,10 +93,7 @@ def little_memory(megabytes):
         (SCENE + "steps = 1000000000\n", r"motion\[0\].steps"),
         (SCENE + "steps = 0x" + "f" * 100_000 + "\n", r"motion\[0\].steps"),
         (SCENE.replace("0.05", "9" * 4000), r"motion\[0\].force"),
-        (
-            SCENE + "steps = 600000\n" + SCENE[SCENE.index("[[m") :] + "steps = 600000\n",
-            "1200000 steps in all",
-        ),
+        (SCENE + "steps = 600000\n" + SCENE[SCENE.index("[[m") :] + "steps = 600000\n", "1200000 steps in"),
         (SCENE.replace("force", "f" * 10**6), "an unknown key"),
         (SCENE.replace("'press'", "'" + "p" * 10**6 + "'"), r"motion\[0\].kind"),
         (SCENE.replace("'press'", '"two\\nlines"'), r'given "two\\nlines"'),

@@ -1,6 +1,4 @@
-"""Nothing is lost: runs that are killed, disks that are full, checkpoints damaged or of other
-scenes.
-"""
+"""Nothing is lost: runs that are killed, disks that are full, checkpoints damaged or of other scenes."""
 
 import errno
 import json
@@ -153,10 +151,7 @@ DAMAGES = {
         lambda p: save_arrays(p, {"format": np.array("evfem-checkpoint-1"), "version": np.array("0.0.1")}),
         f"another format, {NOT_OURS}",
     ),
-    "another version": (
-        lambda p: replaced(p, version=np.array("0.0.1")),
-        NOT_OURS,
-    ),
+    "another version": (lambda p: replaced(p, version=np.array("0.0.1")), NOT_OURS),
     "another scene": (lambda p: replaced(p, scene=np.array("0" * 64)), "another scene"),
     "no state": (lambda p: replaced(p, state__u=np.zeros(0)), "no usable u"),
     "text": (lambda p: replaced(p, state__time=np.array("now")), "no usable time"),
@@ -231,9 +226,7 @@ def test_what_a_killed_run_was_writing_is_removed_by_the_next_and_nothing_else(p
 
 
 class Full:
-    """Lets `room` writes of files pass, then the disk is full: half of what was to be written is
-    on it.
-    """
+    """Lets `room` writes of files pass, then the disk is full: half of what was to be written is on it."""
 
     def __init__(self, room, monkeypatch):
         self.room = room

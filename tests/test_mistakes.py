@@ -1,6 +1,4 @@
-"""The table of mistakes fits the package: what each one changes is there once, and the tests that see
-it.
-"""
+"""The table of mistakes fits the package: what each one changes is there once, and the tests that see it."""
 
 import ast
 from functools import cache

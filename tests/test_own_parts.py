@@ -1,6 +1,4 @@
-"""Parts of one's own, each from scratch in under fifteen lines; mypy checks them against the
-protocols.
-"""
+"""Parts of one's own, each from scratch in under fifteen lines; mypy checks them against the protocols."""
 
 import inspect
 from collections.abc import Callable, Mapping

@@ -1,6 +1,4 @@
-"""Closed forms against printed numbers, limits and themselves (loads as integrals, forces as
-slopes).
-"""
+"""Closed forms against printed numbers, limits and themselves (loads as integrals, forces as slopes)."""
 
 import math
 import re

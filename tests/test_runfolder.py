@@ -18,7 +18,7 @@ from evfem.common import notices
 from evfem.errors import InputError, StorageError
 from evfem.export import FieldFiles
 from evfem.finger.fingerpad import FingerPad
-from evfem.runfolder import RunFolder, saved
+from evfem.runfolder import RunFolder
 from evfem.scene.scene import Output, default_scene
 from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.result import Result
@@ -87,27 +87,6 @@ def test_an_interruption_in_the_very_first_step_loses_nothing(tmp_path, monkeypa
     assert folder.begun
     folder.close(None)
     assert steps_on_disk(tmp_path) == ([1],) * 4
-
-
-def test_a_new_run_removes_what_evfem_wrote_and_nothing_else(tmp_path):
-    take(started(tmp_path), 1, 2, 3)
-    (tmp_path / "fields_0004.vtu.bak").write_text("mine")
-    (tmp_path / "notes.md").write_text("mine")
-    take(started(tmp_path), 1)
-    assert steps_on_disk(tmp_path) == ([1],) * 4
-    assert {"fields_0004.vtu.bak", "notes.md"} <= {p.name for p in tmp_path.iterdir()}
-
-
-@pytest.mark.parametrize("name", ["forces.png", "fields.pvd", "fields_00004.vtu", "summary.json"])
-@pytest.mark.parametrize("go_on", [False, True])
-def test_a_file_that_this_folder_never_got_from_evfem_stops_the_run(tmp_path, name, go_on):
-    """Its name is one of ours, but it was never written: no earlier run may pass it off as its own."""
-    take(started(tmp_path, fields=False, plots=False), 1, 2)
-    assert listed(tmp_path) == ["history.csv", "checkpoint.npz"]
-    (tmp_path / name).write_text("mine")
-    with pytest.raises(InputError, match=rf"{name} was not written by evfem"):
-        started(tmp_path, resume=saved(tmp_path, SCENE) if go_on else None)
-    assert (tmp_path / name).read_text() == "mine"
 
 
 def test_a_file_that_comes_into_the_place_of_one_while_the_run_is_at_work_is_left_alone(tmp_path):
@@ -179,25 +158,6 @@ def test_a_list_from_anywhere_names_no_file_of_others(tmp_path):
         file.write("notes.md\n../notes.md\n\0\n")
     take(started(tmp_path), 1)
     assert (tmp_path / "notes.md").read_text() == "mine"
-
-
-def test_the_result_decides_the_summary_and_the_picture(tmp_path):
-    folder = started(tmp_path, fields=False)
-    take(folder, 1, 2)
-    rows = [fake_row(1), fake_row(2)]
-    given = Result.from_rows(rows, [], MESH, {"scene": {"name": "n", "total_steps": 2}, "solver": {"a": 1}})
-    assert folder.close(given)["complete"] is True
-    assert (tmp_path / "forces.png").stat().st_size > 10_000
-    assert not list(tmp_path.glob("*.vtu")) + list(tmp_path.glob("*.pvd"))
-    assert json.loads((tmp_path / "summary.json").read_text())["provenance"]["solver"] == {"a": 1}
-
-
-def test_a_path_that_is_no_folder_is_a_storage_error(tmp_path):
-    (tmp_path / "file").write_text("x")
-    with pytest.raises(StorageError, match="file"):
-        started(tmp_path / "file")
-    with pytest.raises(StorageError, match="below"):
-        take(started(tmp_path / "file" / "below"), 1)
 
 
 def test_a_run_that_ends_between_two_written_steps_leaves_the_fields_of_its_last(tmp_path, monkeypatch):

@@ -1,6 +1,4 @@
-"""The command in a terminal of 80 columns: a real pseudo-terminal, whose text is read as it
-arrives.
-"""
+"""The command in a terminal of 80 columns: a real pseudo-terminal, whose text is read as it arrives."""
 
 import io
 import os

@@ -1,6 +1,4 @@
-"""Types reach the user: the stub is the package's list of names, and mypy refuses what the package
-would.
-"""
+"""Types reach the user: the stub is the package's list of names, and mypy refuses what the package would."""
 
 import ast
 import os
@@ -39,9 +37,7 @@ WRONG = {
 
 
 def stub_names():
-    """Public name -> full name in the stub; a name with an underscore is an import, not a
-    re-export.
-    """
+    """Public name -> full name in the stub; a name with an underscore is an import, not a re-export."""
     private, listed = {}, {}
     for node in ast.parse(STUB.read_text()).body:
         if isinstance(node, ast.ImportFrom):

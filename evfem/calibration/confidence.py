@@ -40,11 +40,8 @@ class Confidence:
 
 
 def confidence(jacobian: Floats, residuals: Floats, names: Sequence[str]) -> Confidence:
-    """Standard errors (P,), correlation (P, P), singular values (P,) of the scaled Jacobian, and a
-    sentence for each unknown or combination that the data do not determine.
-
-    An unknown that is not determined has an infinite standard error.
-
+    """Standard errors (P,), inf of what is not determined, correlation (P, P), singular values (P,) of the
+    scaled Jacobian, and a sentence for each unknown or combination that the data do not determine.
     >>> J = np.array([[1.0, 2.0], [2.0, 4.0], [0.5, 1.0]])
     >>> confidence(J, np.ones(3), ["a", "b"]).warnings
     ('the data do not tell a and b apart: only a combination of them is determined',)
@@ -65,38 +62,18 @@ def confidence(jacobian: Floats, residuals: Floats, names: Sequence[str]) -> Con
     errors[~seen | (lost > NAMED)] = np.inf
     spread = np.sqrt(np.diag(covariance))
     correlation = np.clip(covariance / np.outer(spread, spread), -1.0, 1.0)
-    told = [*_unseen(names, seen), *_confounded(names, seen, right[~known])]
-    told += _correlated(names, correlation, np.isfinite(errors))
-    return Confidence(errors, correlation, _padded(singular, unknowns), tuple(told))
-
-
-def _padded(values: Floats, count: int) -> Floats:
-    return np.concatenate([values, np.zeros(count - len(values))])
-
-
-def _unseen(names: Sequence[str], seen: Floats) -> list[str]:
-    return [f"{name} changes nothing that was measured" for name, s in zip(names, seen, strict=True) if not s]
-
-
-def _confounded(names: Sequence[str], seen: Floats, directions: Floats) -> list[str]:
-    """A sentence for each combination of unknowns, a row of `directions`, that is not determined."""
-    told = []
-    inside = [name for name, one in zip(names, seen, strict=True) if one]
-    for row in directions:
-        parts = [name for name, part in zip(inside, row, strict=True) if abs(part) > NAMED]
+    told = [f"{name} changes nothing that was measured" for name in np.array(names)[~seen]]
+    for row in right[~known]:
+        parts = np.array(names)[seen][np.abs(row) > NAMED]
         told.append(
             f"the data do not tell {', '.join(parts[:-1])} and {parts[-1]} apart: "
             "only a combination of them is determined"
         )
-    return told
-
-
-def _correlated(names: Sequence[str], correlation: Floats, determined: Floats) -> list[str]:
-    told = []
-    for i, j in combinations(np.flatnonzero(determined).tolist(), 2):
-        if abs(correlation[i, j]) > CORRELATED:
-            told.append(
-                f"{names[i]} and {names[j]} are correlated by {correlation[i, j]:.3f}: "
-                "the data determine a combination of them much better than each"
-            )
-    return told
+    told += [
+        f"{names[i]} and {names[j]} are correlated by {correlation[i, j]:.3f}: "
+        "the data determine a combination of them much better than each"
+        for i, j in combinations(np.flatnonzero(np.isfinite(errors)).tolist(), 2)
+        if abs(correlation[i, j]) > CORRELATED
+    ]
+    padded = np.concatenate([singular, np.zeros(unknowns - len(singular))])
+    return Confidence(errors, correlation, padded, tuple(told))

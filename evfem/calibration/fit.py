@@ -16,7 +16,7 @@ shorter; one beside an accepted point is tried on the other side.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from evfem.calibration.confidence import confidence
 from evfem.calibration.measured import Measured, MeasuredCurve, MeasuredValues, Question
 from evfem.calibration.parameters import Given, Parameters, number_at
 from evfem.calibration.result import FitResult
-from evfem.calibration.runs import Runs, derivative_of, grouped
+from evfem.calibration.runs import Runs, derivative_of
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.digest import digest
@@ -41,7 +41,7 @@ from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
 from evfem.simulation.provenance import origin
 from evfem.sweeps.file import scene_tables
-from evfem.sweeps.folder import SweepFolder
+from evfem.sweeps.folder import Answer, SweepFolder
 
 #: step of a difference, in unknowns; relative changes of an unknown, and of the sum of squares, that end
 #: the fit; most steps of it
@@ -112,7 +112,10 @@ def fit(
         if out is not None:
             folder = SweepFolder(Path(out))
             stack.enter_context(alone_in(folder.path))
-            _open(folder, problem.digest)
+            try:
+                folder.open((), problem.digest)
+            except InputError as error:
+                raise InputError("out", error.given, "another folder, or that of the same fit") from error
             folder.write_provenance({"digest": problem.digest, **problem.provenance})
         runs = Runs(pool, problem.paths, folder)
         result = _solve(problem, runs, progress)
@@ -121,16 +124,10 @@ def fit(
     return result
 
 
-def _open(folder: SweepFolder, plan: str) -> None:
-    """Make the folder, or go on in that of the same fit."""
-    try:
-        folder.open((), plan)
-    except InputError as error:
-        raise InputError("out", error.given, "another folder, or that of the same fit") from error
-
-
 class _Problem:
-    """A fit before anything is run: its scene as tables, its data, its unknowns."""
+    """A fit before anything is run: its scene as tables, its data, its unknowns; its `runs`, the keys and the
+    questions of each, and where each measured value is answered (`places`: number of the run, name).
+    """
 
     def __init__(self, scene: Scene | str | Path, data: Any, parameters: Any) -> None:
         if isinstance(scene, Scene):
@@ -143,12 +140,18 @@ class _Problem:
         self.tables = {"version": VERSION, **self.tables, "output": {"every": 10**6}}
         self.data: list[Measured] = [data] if isinstance(data, Measured) else list(data)
         self.parameters = Parameters.of(parameters)
+        runs: dict[str, tuple[Mapping[str, Any], list[Question]]] = {}
+        asked = []
         for one in self.data:
             if not isinstance(one, (MeasuredCurve, MeasuredValues)):
                 raise InputError("data", quoted(one), "MeasuredCurve, MeasuredValues, or a list of them")
             one.check(len(self.tables.get("motion", ())))
-        self.questions = [(run.keys, run.question) for one in self.data for run in one.runs()]
-        self.runs = grouped(self.questions)
+            for keys, question in one.runs():
+                key = digest(dict(keys))
+                runs.setdefault(key, (keys, []))[1].append(question)
+                asked += [(key, name) for name in question.names]
+        self.runs = [(keys, tuple(questions)) for keys, questions in runs.values()]
+        self.places = [(list(runs).index(key), name) for key, name in asked]
         self.measured = np.concatenate([[], *(np.asarray(one.values) for one in self.data)])
         self.scale = np.concatenate([[], *(_scale(one) for one in self.data)])
         if len(self.measured) <= len(self.parameters.free):
@@ -157,42 +160,32 @@ class _Problem:
         self._check_scenes()
 
     def _check_scenes(self) -> None:
-        """Whether the scene can be read with every parameter at its start and at its bounds."""
-        start = {key: float(one.value(0.0)) for key, one in self.parameters.free.items()}
-        for keys, _ in self.runs:
-            loads(self.text(keys, start), self.paths)
+        """Whether the scene can be read at start and bounds; `exact` are keys that have derivatives."""
+        start = self.parameters.values(np.zeros(len(self.parameters.free)))
+        scenes = [loads(self.text(keys, start), self.paths) for keys, _ in self.runs]
+        self.exact = []
         for key, one in self.parameters.free.items():
             for end in (one.low, one.high):
                 try:
                     loads(self.text(self.runs[0][0], {**start, key: end}), self.paths)
                 except InputError as error:
-                    raise InputError(
-                        f"parameters.{key}", f"the bound {end:g}: {error}", "other bounds"
-                    ) from error
+                    given = f"the bound {end:g}: {error}"
+                    raise InputError(f"parameters.{key}", given, "other bounds") from error
+            with suppress(InputError):
+                parameter_of(scenes[0], key)
+                self.exact.append(key)
 
     def text(self, keys: Mapping[str, Any], values: Mapping[str, float]) -> str:
         """The scene of one run as a text."""
         return tomli_w.dumps(self.parameters.applied(self.tables, keys, values))
 
     @property
-    def exact(self) -> list[str]:
-        """The parameters that have derivatives."""
-        start = {key: float(one.value(0.0)) for key, one in self.parameters.free.items()}
-        scene, found = loads(self.text(self.runs[0][0], start), self.paths), []
-        for key in self.parameters.names:
-            with suppress(InputError):
-                parameter_of(scene, key)
-                found.append(key)
-        return found
-
-    @property
     def digest(self) -> str:
         """Fingerprint of everything that the fit's steps follow from."""
-        return digest((self.tables, self.parameters, self.questions, self.measured, self.scale))
+        return digest((self.tables, self.parameters, self.runs, self.places, self.measured, self.scale))
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the fit, in plain values ready for JSON."""
         return {
             "fit": self.name,
             **origin(),
@@ -203,7 +196,6 @@ class _Problem:
 
 
 def _scale(one: Measured) -> Floats:
-    """Scale of the residuals of a measurement."""
     if one.sd is not None:
         return np.asarray(one.sd)
     size = float(np.sqrt(np.mean(np.square(one.values))))
@@ -218,110 +210,86 @@ class _Residuals:
         self.failed = ""
         self.exact = problem.exact
 
-    def predicted(self, points: Sequence[Floats], by: tuple[str, ...] = ()) -> list[Floats]:
-        """What the runs, differentiated `by` these keys, say for each measured value at each point; NaN where
-        a scene is not solved.
-        """
+    def _answers(self, points: Sequence[Floats], by: Sequence[str]) -> list[list[Answer]]:
+        """The answers of all runs at each point, differentiated `by` these keys."""
         problem = self.problem
         values = [problem.parameters.values(z) for z in points]
-        texts = [[problem.text(keys, one) for keys, _ in problem.runs] for one in values]
-        wanted = [
-            (text, questions) for row in texts for text, (_, questions) in zip(row, problem.runs, strict=True)
-        ]
-        answers = iter(self.runs.ask(wanted, by))
-        return [self._gathered([next(answers) for _ in row]) for row in texts]
+        wanted = [(problem.text(keys, one), asked) for one in values for keys, asked in problem.runs]
+        answers, count = self.runs.ask(wanted, tuple(by)), len(problem.runs)
+        return [answers[i : i + count] for i in range(0, len(answers), count)]
 
-    def _gathered(self, answers: list[Any]) -> Floats:
-        """The answers of one point's runs, in the order of the measured values."""
-        found: list[float | None] = []
-        numbers: dict[tuple[str, Question], dict[str, float | None]] = {}
-        for (keys, questions), answer in zip(self.problem.runs, answers, strict=True):
-            if answer.status != "done":
-                self.failed = answer.message
-            numbers |= {(digest(dict(keys)), q): answer.outputs for q in questions}
-        for keys, question in self.problem.questions:
-            outputs = numbers[digest(dict(keys)), question]
-            found += [outputs.get(name) for name in question.names]
-        return np.array([math.nan if value is None else value for value in found])
+    def predicted(self, points: Sequence[Floats], by: Sequence[str] = ()) -> list[Floats]:
+        """What the runs, differentiated `by` keys, say for each value at each point; NaN where unsolved."""
+        found = self._answers(points, by)
+        for one in (one for answers in found for one in answers if one.status != "done"):
+            self.failed = one.message
+        return [
+            _numbers(answers[i].outputs.get(name) for i, name in self.problem.places) for answers in found
+        ]
 
     def __call__(self, z: Floats) -> Floats:
         """(run - measured) / scale, (N,)."""
-        (predicted,) = self.predicted([z], tuple(self.exact))
-        residuals = (predicted - self.problem.measured) / self.problem.scale
+        residuals = self._residuals(*self.predicted([z], self.exact))
         if self.progress:
             told = ", ".join(f"{k} {v:.5g}" for k, v in self.problem.parameters.values(z).items())
             size = math.sqrt(float(np.mean(residuals**2)))
             notices.tell(f"fit: {told}: rms residual {size:.4g}, {self.runs.computed} runs so far")
         return residuals
 
+    def _residuals(self, predicted: Floats) -> Floats:
+        return (predicted - self.problem.measured) / self.problem.scale
+
     def jacobian(self, z: Floats) -> Floats:
         """Derivatives of the residuals by the unknowns, (N, P)."""
-        names, found = self.problem.parameters.names, self._derivatives(z)
+        found = self._derivatives(z)
         self.exact = [name for name in self.exact if np.isfinite(found[name]).all()]
-        rest = [i for i, name in enumerate(names) if name not in self.exact]
-        differenced = dict(zip(rest, self._differences(z, rest), strict=True))
-        columns = [
-            differenced[i] if i in differenced else found[name] / self.problem.scale
-            for i, name in enumerate(names)
-        ]
-        return np.column_stack(columns)
+        rest = [i for i, name in enumerate(self.problem.parameters.names) if name not in self.exact]
+        names = self.problem.parameters.names
+        columns = np.column_stack([found.get(name, self.problem.scale) for name in names])
+        if rest:
+            columns[:, rest] = np.column_stack(self._differences(z, rest))
+        return columns / self.problem.scale[:, None]
 
     def _derivatives(self, z: Floats) -> dict[str, Floats]:
         """Exact derivatives (N,) of what the runs say by the unknowns that have had them; NaN without."""
         problem, parameters = self.problem, self.problem.parameters
         if not self.exact:
             return {}
-        values = parameters.values(z)
-        texts = [problem.text(keys, values) for keys, _ in problem.runs]
-        wanted = [(text, questions) for text, (_, questions) in zip(texts, problem.runs, strict=True)]
-        answers = self.runs.ask(wanted, tuple(self.exact))
-        found = {}
-        for name in self.exact:
-            i = parameters.names.index(name)
-            numbers: dict[tuple[str, Question], Floats] = {}
-            for (keys, questions), text, answer in zip(problem.runs, texts, answers, strict=True):
-                slope = parameters.free[name].slope(float(z[i]), number_at(tables_of("scene", text), name))
-                for one in questions:
-                    rates = [answer.outputs.get(derivative_of(each, name)) for each in one.names]
-                    numbers[digest(dict(keys)), one] = slope * np.array(rates, dtype=float)
-            rows = [numbers[digest(dict(keys)), question] for keys, question in problem.questions]
-            found[name] = np.concatenate([np.zeros(0), *rows])
+        (answers,), values, found = self._answers([z], self.exact), parameters.values(z), {}
+        scenes = [parameters.applied(problem.tables, keys, values) for keys, _ in problem.runs]
+        for name, u in zip(parameters.names, z.tolist(), strict=True):
+            if name in self.exact:
+                slopes = [parameters.free[name].slope(u, number_at(scene, name)) for scene in scenes]
+                rates = (answers[i].outputs.get(derivative_of(each, name)) for i, each in problem.places)
+                found[name] = np.array([slopes[i] for i, _ in problem.places]) * _numbers(rates)
         return found
 
     def _differences(self, z: Floats, which: Sequence[int]) -> list[Floats]:
-        """Derivatives (N,) of the residuals by some unknowns, by one-sided differences."""
-        if not which:
-            return []
+        """Derivatives (N,) of what the runs say by some unknowns, by one-sided differences."""
         _, high = self.problem.parameters.bounds
+        units = np.eye(len(z))
         steps = np.where(z + STEP <= high, STEP, -STEP)
-        here, *there = self.predicted([z, *(z + steps[i] * np.eye(len(z))[i] for i in which)])
+        here, *there = self.predicted([z, *(z + steps[i] * units[i] for i in which)])
         columns = []
         for i, beside in zip(which, there, strict=True):
             step = steps[i]
             if not np.isfinite(beside).all():
-                step, (beside,) = -step, self.predicted([z - step * np.eye(len(z))[i]])
+                step, (beside,) = -step, self.predicted([z - step * units[i]])
             if not np.isfinite(beside).all():
-                key = self.problem.parameters.names[i]
-                raise InputError(
-                    f"parameters.{key}", f"a scene that is not solved: {self.failed}", "other bounds"
-                )
-            columns.append((beside - here) / step / self.problem.scale)
+                key, given = self.problem.parameters.names[i], f"a scene that is not solved: {self.failed}"
+                raise InputError(f"parameters.{key}", given, "other bounds")
+            columns.append((beside - here) / step)
         return columns
 
     def roughness(self, z: Floats, residuals: Floats, jacobian: Floats) -> list[str]:
-        """A sentence for every unknown whose `residuals` (N,) at z change otherwise over `FAR` steps than
-        the `jacobian` (N, P) says; one run each.
-        """
+        """A sentence for every unknown whose residuals change otherwise over `FAR` steps than over one."""
         low, high = self.problem.parameters.bounds
-        steps = np.where(
-            high - z >= z - low, np.minimum(FAR * STEP, high - z), -np.minimum(FAR * STEP, z - low)
-        )
-        ways = [z + h * unit for h, unit in zip(steps, np.eye(len(z)), strict=True)]
+        up, down = (np.minimum(FAR * STEP, room) for room in (high - z, z - low))
+        steps = np.where(high - z >= z - low, up, -down)
+        ways = self.predicted([z + h * unit for h, unit in zip(steps, np.eye(len(z)), strict=True)])
         told = []
-        for key, h, far, near in zip(
-            self.problem.parameters.names, steps, self.predicted(ways), jacobian.T, strict=True
-        ):
-            slope = ((far - self.problem.measured) / self.problem.scale - residuals) / h
+        for key, h, far, near in zip(self.problem.parameters.names, steps, ways, jacobian.T, strict=True):
+            slope = (self._residuals(far) - residuals) / h
             size = max(np.linalg.norm(slope), np.linalg.norm(near))
             if size * abs(h) > NOISE * math.sqrt(len(z)) and np.linalg.norm(slope - near) > ROUGH * size:
                 told.append(
@@ -332,15 +300,17 @@ class _Residuals:
         return told
 
 
+def _numbers(values: Iterable[float | None]) -> Floats:
+    return np.array(list(values), dtype=float)
+
+
 def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
     from scipy.optimize import least_squares
 
     residuals, parameters = _Residuals(problem, runs, progress), problem.parameters
     start, bounds = np.zeros(len(parameters.free)), parameters.bounds
     if not np.isfinite(residuals(start)).all():
-        raise InputError(
-            "scene", f"one that cannot be run at the start: {residuals.failed}", "one that can be"
-        )
+        raise InputError("scene", f"one that cannot be run at the start: {residuals.failed}", "one that can")
     ends = {"xtol": UNKNOWNS, "ftol": SQUARES, "gtol": 1e-12, "max_nfev": MOST_STEPS}
     found = least_squares(residuals, start, residuals.jacobian, bounds, **ends)
     known = confidence(found.jac, found.fun, parameters.names)
@@ -358,14 +328,10 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
         predicted=problem.measured + found.fun * problem.scale,
         scale=problem.scale,
         warnings=(*warnings, *_at_bounds(parameters, found.x), *_misfit(problem, found.fun)),
-        tables=_final_tables(problem, found.x),
+        tables=parameters.applied(problem.tables, {}, parameters.values(found.x)),
         paths=problem.paths,
         provenance={**problem.provenance, "runs": runs.computed, "finished": bool(found.success)},
     )
-
-
-def _final_tables(problem: _Problem, z: Floats) -> dict[str, Any]:
-    return problem.parameters.applied(problem.tables, {}, problem.parameters.values(z))
 
 
 def _at_bounds(parameters: Parameters, z: Floats) -> list[str]:

@@ -85,14 +85,8 @@ class Single:
 
 
 Question = Along | Single
-
-
-@dataclass(frozen=True)
-class Run:
-    """One run that a measurement needs: keys of the scene that it sets, and what is asked of it."""
-
-    keys: Mapping[str, Any]
-    question: Question
+#: a run that a measurement needs: keys of the scene that it sets, and what is asked of it
+Run = tuple[Mapping[str, Any], Question]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +112,8 @@ class MeasuredCurve:
     where: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("column", "over"):
-            if getattr(self, name) not in NUMBERS:
-                given = str(getattr(self, name))
+        for name, given in (("column", str(self.column)), ("over", str(self.over))):
+            if given not in NUMBERS:
                 raise unknown(f"data.{name}", given, list(NUMBERS), f"{quoted(given)}, no column")
         set_frozen(self, at=numbers("data.at", self.at, f"a list of places, of {self.over}"))
         set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as places"))
@@ -148,35 +141,30 @@ class MeasuredCurve:
         zero: float = 0.0,
         branch: str | None = None,
     ) -> MeasuredCurve:
-        """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of
-        the history: `indentation,normal_force`; or with others, of which `columns` names those that are
-        meant, OVER first, by names or numbers from 1: {"indentation": "Travel", "normal_force": 3}.
+        """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of the history:
+        `indentation,normal_force`; or with others, of which `columns` names those that are meant, OVER first,
+        by names or numbers from 1: {"indentation": "Travel", "normal_force": 3}.
 
-        Units of the header are converted to mm, N, s, V and MPa. `zero` is the OVER (in these) at which
-        OVER shall be 0, as the travel at first touch. `branch` is "loading", up to the largest OVER, or
-        "unloading", from there on. Rows with gaps are left out, and rows at one place, as rounding makes
-        them, count by their mean.
-
-        With a `depth` (mm) the file is in N, mm2 and mJ over this depth, as an experiment is and
-        `Result.total`, and what depends on it is divided by it, `sd` too.
+        Units of the header are converted to mm, N, s, V and MPa. `zero` is the OVER (in these) at which OVER
+        shall be 0. `branch` is "loading", up to the largest OVER, or "unloading", from there on. Rows with
+        gaps are left out, rows at one place count by their mean. With a `depth` (mm) the file is in N, mm2
+        and mJ over it, as `Result.total` is, and what depends on it is divided by it, `sd` too.
         """
         table = read_headed(Path(path), "data")
         wanted = dict(zip(table.names, table.names, strict=True)) if columns is None else dict(columns)
         over, *others = (name for name in wanted if name != "sd")
+        given = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
         if len(others) != 1 or (columns is None and len(set(table.names)) < len(table.names)):
-            given = f"{Path(path).name} with the header {','.join(table.names)}"
             allowed = "two columns of the history, as indentation,normal_force; and sd; or `columns`"
             raise InputError("data", given, allowed)
-        foreign = [name for name in (over, *others) if name not in NUMBERS]
-        if foreign and columns is None:
-            given = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
+        if columns is None and not {over, *others} <= {*NUMBERS}:
             allowed = 'columns of the history, or columns={"indentation": %s, "normal_force": %s}'
             raise InputError("data", given, allowed % tuple(map(readable, (over, *others))))
-        found = [
-            table.column(f"data.columns.{name}", wanted[name], _bases(others[0] if name == "sd" else name))
-            for name in (over, *others, "sd")
-            if name in wanted
-        ]
+        found = []
+        for name, of in zip((over, *others, "sd"), (over, *others, *others), strict=True):
+            if name in wanted:  # per mm of depth, or in all
+                bases = UNITS.get(of), SPATIAL_UNITS.get(of)
+                found.append(table.column(f"data.columns.{name}", wanted[name], bases))
         at, values, *spread = _branch(np.column_stack(found), branch).T
         curve = cls(others[0], over, at - zero, values, motion, spread[0] if spread else sd, where or {})
         return curve if depth is None else curve._per_depth(DEPTH["check"]("data.depth", depth))
@@ -191,12 +179,12 @@ class MeasuredCurve:
     @property
     def names(self) -> tuple[str, ...]:
         """A name for each value."""
-        return self.runs()[0].question.names
+        return self.runs()[0][1].names
 
     def runs(self) -> list[Run]:
         """The one run."""
         at = tuple(np.asarray(self.at).tolist())
-        return [Run(self.where, Along(self.column, self.over, at, self.motion))]
+        return [(self.where, Along(self.column, self.over, at, self.motion))]
 
     def check(self, motions: int) -> None:
         """InputError for a motion that a scene with so many does not have."""
@@ -242,16 +230,13 @@ class MeasuredValues:
     @property
     def names(self) -> tuple[str, ...]:
         """A name for each value."""
-        rows = zip(*self.where.values(), strict=True)
-        told = (
-            ", ".join(f"{key} {shown(v)}" for key, v in zip(self.where, row, strict=True)) for row in rows
-        )
-        return tuple(f"{self.output}, {row}" for row in told)
+        runs = [[f"{key} {shown(value)}" for key, value in keys.items()] for keys, _ in self.runs()]
+        return tuple(", ".join([self.output, *keys]) for keys in runs)
 
     def runs(self) -> list[Run]:
         """A run for each value."""
         rows = zip(*self.where.values(), strict=True)
-        return [Run(dict(zip(self.where, row, strict=True)), Single(self.output)) for row in rows]
+        return [(dict(zip(self.where, row, strict=True)), Single(self.output)) for row in rows]
 
     def check(self, motions: int) -> None:
         """InputError for an output that a scene with so many motions does not have."""
@@ -264,22 +249,21 @@ Measured = MeasuredCurve | MeasuredValues
 def along(result: Result, column: str, over: str, at: Floats, motion: int | None = None) -> Floats:
     """Values of a column where the column `over` is `at` (N,), in a motion or in all.
 
-    Before the motion is the last state of the one before; before a first press without voltage it is zero.
-    Columns are known to `SOLVED` tolerances: a place that little beyond the end is at it. Raises InputError
-    where `over` turns round, and beyond it.
+    Before the motion is the last state of the one before, before a first press without voltage zero. A place
+    beyond the end by up to `SOLVED` tolerances is at it. InputError where `over` turns round, and beyond it.
     """
     from scipy.interpolate import PchipInterpolator
 
     rows = np.arange(len(result.step)) if motion is None else np.flatnonzero(result.motion_index == motion)
-    first = int(rows[0])
-    if first > 0:
-        rows = np.concatenate([[first - 1], rows])
-    x, y = (np.asarray(getattr(result, name), dtype=float)[rows] for name in (over, column))
-    if first == 0 and result.motion[0] == "press" and not result.voltage.any():
-        x, y = np.concatenate([[0.0], x]), np.concatenate([[0.0], y])
+    x, y = (
+        getattr(result, name)[max(rows[0] - 1, 0) : rows[-1] + 1].astype(float) for name in (over, column)
+    )
+    if rows[0] == 0 and result.motion[0] == "press" and not result.voltage.any():
+        x, y = np.append(0.0, x), np.append(0.0, y)
     if len(x) > 1 and x[-1] < x[0]:
         x, y = x[::-1], y[::-1]
-    slack = 0.0 if over == "time" else SOLVED * _tolerance(result) * float(np.abs(x).max())
+    tolerance = result.provenance.get("solver", {}).get("tolerance", Solver.tolerance)
+    slack = 0.0 if over == "time" else SOLVED * tolerance * float(np.abs(x).max())
     if len(x) < 2 or not (np.diff(x) > slack).all():
         which = "the run" if motion is None else f"motion {motion}"
         raise InputError("data.over", f"{over}, which does not advance in {which}", "one that does")
@@ -289,13 +273,7 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
     return PchipInterpolator(x, y)(np.clip(at, x[0], x[-1]))
 
 
-def _tolerance(result: Result) -> float:
-    """The solver's, of the run."""
-    return float(result.provenance.get("solver", {}).get("tolerance", Solver.tolerance))
-
-
 def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Floats | None]:
-    """Values and their standard deviations, checked."""
     found = numbers("data.values", values, allowed)
     if len(found) != count or not 0 < count <= MOST:
         raise InputError("data.values", f"{len(found)} values", f"{allowed}, from 1 to {MOST}")
@@ -308,15 +286,8 @@ def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Float
     return {"values": found, "sd": np.broadcast_to(spread, count).copy()}
 
 
-def _bases(name: str) -> tuple[str | None, ...]:
-    """Units of a column of the history, per mm of depth and in all."""
-    return UNITS.get(name), SPATIAL_UNITS.get(name)
-
-
 def _branch(rows: Floats, branch: str | None) -> Floats:
-    """Rows (n, 2 or 3) of a place, a value and perhaps its standard deviation: those of a branch, without
-    gaps, one for each place.
-    """
+    """Rows (n, 2 or 3) of place, value and perhaps sd: those of a branch, no gaps, one for each place."""
     rows = rows[np.isfinite(rows).all(axis=1)]
     if branch is not None and len(rows):
         choice("data.branch", branch, ("loading", "unloading"))
@@ -333,7 +304,8 @@ def _branch(rows: Floats, branch: str | None) -> Floats:
 def _setting(key: Any, value: Any) -> Any:
     check_key("data.where", str(key))
     found = plain_value(f"data.where.{key}", value)
-    each = found if isinstance(found, list) else [found]
-    if any(isinstance(one, float) and not math.isfinite(one) for one in each):
+    if any(
+        isinstance(one, float) and not math.isfinite(one) for one in np.ravel(np.array(found, dtype=object))
+    ):
         raise InputError(f"data.where.{key}", quoted(value), "finite numbers")
     return found

@@ -20,8 +20,6 @@ from evfem.errors import InputError
 from evfem.scene.keys import shown
 from evfem.sweeps.file import check_key, put_in
 
-APPLIES = ("value", "factor", "offset")
-
 
 @dataclass(frozen=True)
 class Parameter:
@@ -45,12 +43,10 @@ class Parameter:
     def __post_init__(self) -> None:
         low = real("parameters.low", self.low, "a finite number")
         high = real("parameters.high", self.high, f"a number above {low:g}", lambda number: number > low)
-        choice("parameters.apply", self.apply, APPLIES)
+        choice("parameters.apply", self.apply, ("value", "factor", "offset"))
         set_frozen(self, low=low, high=high)
-        start = self.start
-        if start is None:
-            start = math.sqrt(low * high) if self.logarithmic else 0.5 * (low + high)
-        allowed = f"a number from {low:g} to {high:g}"
+        middle = math.sqrt(low * high) if self.logarithmic else 0.5 * (low + high)
+        start, allowed = middle if self.start is None else self.start, f"a number from {low:g} to {high:g}"
         set_frozen(self, start=real("parameters.start", start, allowed, lambda v: low <= v <= high))
 
     @property
@@ -105,15 +101,13 @@ class Parameters:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The keys."""
         return tuple(self.free)
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest unknowns, (P,) each."""
-        low, high = (
-            [one.unknown(getattr(one, end)) for one in self.free.values()] for end in ("low", "high")
-        )
+        free = self.free.values()
+        low, high = ([one.unknown(getattr(one, end)) for one in free] for end in ("low", "high"))
         return np.array(low), np.array(high)
 
     def values(self, z: Floats) -> dict[str, float]:
@@ -145,11 +139,11 @@ class Parameters:
 def number_at(tables: Any, key: str) -> float:
     """The number that the scene has under a dotted key."""
     here = tables
-    for name in key.split("."):
-        if isinstance(here, list):
-            here = here[int(name)] if name.isdecimal() and int(name) < len(here) else None
-        else:
-            here = here.get(name) if isinstance(here, dict) else None
+    try:
+        for name in key.split("."):
+            here = here[int(name) if isinstance(here, list) else name]
+    except (KeyError, IndexError, TypeError, ValueError):
+        here = None
     if isinstance(here, bool) or not isinstance(here, (int, float)):
         given = "no number there" if here is None else shown(here)
         raise InputError(f"parameters.{key}", given, "a number in the scene, for a factor or an offset")

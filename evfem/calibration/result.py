@@ -82,9 +82,7 @@ class FitResult:
         return {key: (float(one.value(low)), float(one.value(high))) for (key, one), low, high in ends}
 
     def table(self) -> Any:
-        """A row for each parameter, with its value, the ends of its 95 % interval, its bounds and
-        what it does to its key: a `pandas.DataFrame`, or a numpy record array.
-        """
+        """A row for each parameter: value, 95 % interval, bounds, `apply`; a DataFrame or record array."""
         ends, free = list(self.intervals().values()), self.parameters.values()
         return frame(
             {
@@ -100,9 +98,9 @@ class FitResult:
 
     def __repr__(self) -> str:
         """Values with intervals, how well they explain the data, and what is doubtful."""
-        lines = [f"FitResult of {self._title}"]
-        lines += [f"  {key} = {text}" for key, text in self._rows]
-        return "\n".join([*lines, *(f"  Warning: {warning}" for warning in self.warnings)])
+        rows = [f"  {key} = {text}" for key, text in self._rows]
+        rows += [f"  Warning: {warning}" for warning in self.warnings]
+        return "\n".join([f"FitResult of {self._title}", *rows])
 
     def _repr_html_(self) -> str:
         """For notebooks: the same as a small table."""
@@ -120,9 +118,8 @@ class FitResult:
         rows = []
         for (key, one), (low, high) in zip(self.parameters.items(), self.intervals().values(), strict=True):
             kind = "" if one.apply == "value" else f" as {one.apply}"
-            known = (
-                f"{low:.3g} to {high:.3g} with 95 % confidence" if math.isfinite(high) else "not determined"
-            )
+            told = f"{low:.3g} to {high:.3g} with 95 % confidence"
+            known = told if math.isfinite(high) else "not determined"
             rows.append((key, f"{self.values[key]:.4g}{kind} ({known})"))
         return rows
 
@@ -131,7 +128,10 @@ class FitResult:
         check_ending(path, ".json")
         content: dict[str, Any] = {"format": FORMAT}
         content |= {name: getattr(self, name) for name in PLAIN}
-        content |= {name: _listed(getattr(self, name)) for name in ARRAYS}
+        for name in ARRAYS:  # None where a number is not finite
+            array: Any = np.array(getattr(self, name), dtype=object)
+            array[~np.isfinite(getattr(self, name))] = None
+            content[name] = array.tolist()
         content["parameters"] = {key: vars(one) for key, one in self.parameters.items()}
         content["paths"] = str(self.paths)
         write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -153,10 +153,3 @@ def load(path: str | Path) -> FitResult:
         raise InputError("fit", f"{path} ({error.strerror})", allowed) from error
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise InputError("fit", f"{path}, damaged or of another kind: {error}", allowed) from error
-
-
-def _listed(values: Floats) -> Any:
-    """Numbers as lists, None where they are not finite."""
-    if np.ndim(values):
-        return [_listed(value) for value in values]
-    return float(values) if math.isfinite(values) else None

@@ -7,10 +7,10 @@ its steps follow from the numbers alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -40,24 +40,22 @@ def work(job: Job) -> Answer:
     """Run one scene and ask it all questions; whatever happens to it is in the answer."""
     text, folder, questions, keys = job
     columns = sorted({column for q in questions for column in q.columns})
-    if not (keys and all(map(differentiable, columns))):
-        return answered(text, folder, lambda result: _answers(result, questions))
+    exact = keys and all(map(differentiable, columns))
 
     def run(scene: Scene) -> Result | Sensitivities:
-        try:
+        with suppress(InputError):  # of a parameter without derivatives, or else of the scene: then once more
             return sensitivities(scene, keys, columns)
-        except InputError:  # of a parameter without derivatives, or else of the scene: then once more
-            return simulate(scene)
+        return simulate(scene)
 
-    return answered(text, folder, lambda found: _with_derivatives(found, questions), run)
+    return answered(text, folder, lambda found: _outputs(found, questions), run if exact else simulate)
 
 
 def _answers(result: Result, questions: Asked) -> Outputs:
     return {k: v for q in questions for k, v in q.answers(result).items()}
 
 
-def _with_derivatives(found: Result | Sensitivities, questions: Asked) -> Outputs:
-    """The answers of a run, and their derivatives by each of its parameters."""
+def _outputs(found: Result | Sensitivities, questions: Asked) -> Outputs:
+    """The answers of a run, and where it has them their derivatives by each of its parameters."""
     if not isinstance(found, Sensitivities):
         return _answers(found, questions)
     outputs = _answers(found.result, questions)
@@ -78,10 +76,7 @@ def derivative_of(name: str, key: str) -> str:
 
 @dataclass
 class Runs:
-    """Answers to questions about scenes, computed by a pool, and kept in `folder` if there is one.
-
-    `paths`: where relative paths in the scenes start.
-    """
+    """Answers about scenes, whose paths start at `paths`, by a pool; kept in `folder` if there is one."""
 
     pool: Pool
     paths: Path
@@ -90,16 +85,13 @@ class Runs:
     computed: int = 0
 
     def ask(self, wanted: Sequence[tuple[str, Asked]], by: tuple[str, ...] = ()) -> list[Answer]:
-        """The answers to each pair of a scene's text and the questions about it, and where they have them,
-        their derivatives `by` keys of the scene (`derivative_of`).
-        """
-        jobs: dict[str, Job] = {}
-        keys = []
-        for text, questions in wanted:
-            key = self._key(text, questions, by)
-            keys.append(key)
-            if key not in self.answers:
-                jobs[key] = (text, str(self.paths), questions, by)
+        """The answers to the questions about each scene, and if there are any their derivatives `by` keys."""
+        keys = [self._key(text, questions, by) for text, questions in wanted]
+        jobs: dict[str, Job] = {
+            key: (text, str(self.paths), questions, by)
+            for key, (text, questions) in zip(keys, wanted, strict=True)
+            if key not in self.answers
+        }
         compute(work, jobs, self.pool, self._keep)
         return [self.answers[key] for key in keys]
 
@@ -111,10 +103,8 @@ class Runs:
             self.answers[key] = Answer("refused", 0.0, str(error), {})
             return key
         key = digest((scene, questions, evfem.__version__, *([by] if by else [])))
-        if key not in self.answers and self.folder is not None:
-            kept = self.folder.read(key)
-            if kept is not None:
-                self.answers[key] = kept
+        if key not in self.answers and self.folder is not None and (kept := self.folder.read(key)):
+            self.answers[key] = kept
         return key
 
     def _keep(self, key: str, answer: Answer) -> None:
@@ -122,19 +112,3 @@ class Runs:
         if self.folder is not None:
             self.folder.write(key, answer)
         self.answers[key] = answer
-
-
-def grouped(
-    wanted: Sequence[tuple[Mapping[str, Any], Question]],
-) -> list[tuple[Mapping[str, Any], tuple[Question, ...]]]:
-    """Questions about the same run, put together.
-
-    >>> from evfem.calibration.measured import Single
-    >>> a, b = Single("normal_force.last"), Single("contact_width.last")
-    >>> [len(questions) for _, questions in grouped([({}, a), ({"surface.y": 0.0}, a), ({}, b)])]
-    [2, 1]
-    """
-    found: dict[str, tuple[Mapping[str, Any], list[Question]]] = {}
-    for keys, question in wanted:
-        found.setdefault(digest(dict(keys)), (keys, []))[1].append(question)
-    return [(keys, tuple(questions)) for keys, questions in found.values()]

@@ -1,10 +1,102 @@
-"""Types of the arrays that go from room to room."""
+"""Types of the arrays that go from room to room, and dense systems of linear equations.
+
+Large systems are factorised in single precision, which takes half of the time and memory, and refined: the
+solution is that of double precision. Source: N. J. Higham, Accuracy and Stability of Numerical Algorithms,
+2nd ed. (2002), doi:10.1137/1.9780898718027, ch. 12.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evfem.common.constants import BLOCK, LARGE_SYSTEM, OLD_FACTORS, REFINED, REFINEMENTS
+
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 Words = NDArray[np.str_]
+
+
+class DenseSolver:
+    """Solves dense systems one after the other; the factors of a large one serve the next with its unknowns.
+
+    >>> matrix = np.array([[2.0, 1.0], [1.0, 3.0]])
+    >>> DenseSolver().solve(matrix, np.array([[3.0], [4.0]])).round(12).tolist()
+    [[1.0], [1.0]]
+    """
+
+    def __init__(self) -> None:
+        self._unknowns: Hashable = None
+        self._factors: tuple[Floats, Any, Any] | None = None
+
+    def solve(self, matrix: Floats, right: Floats, unknowns: Hashable = None) -> Any:
+        """Solution (n, q) of a matrix (n, n) for right-hand sides (n, q), named by its `unknowns`; raises
+        `numpy.linalg.LinAlgError` where it is singular.
+        """
+        if len(matrix) < LARGE_SYSTEM:
+            return np.linalg.solve(matrix, right)
+        old = self._unknowns is not None and unknowns == self._unknowns
+        found = self._refined(matrix, right, OLD_FACTORS) if old else None
+        if found is None and self._factorise(matrix):
+            self._unknowns = unknowns
+            found = self._refined(matrix, right, 2 * OLD_FACTORS)
+        return np.linalg.solve(matrix, right) if found is None else found
+
+    def _factorise(self, matrix: Floats) -> bool:
+        from scipy.linalg import lapack
+
+        self._unknowns = self._factors = None  # their memory is free before that of new ones is taken
+        own = np.abs(np.diagonal(matrix))
+        scale = 1.0 / np.sqrt(np.maximum(own, 1e-30 * (own.max() or 1.0)))  # within single precision
+        single = (matrix * scale).astype(np.float32)
+        single *= scale.astype(np.float32)[:, None]
+        # the transposed is in LAPACK's order: nothing is copied
+        factors, pivots, failed = lapack.sgetrf(single.T, overwrite_a=True)
+        self._factors = scale, factors, pivots
+        return not failed
+
+    def _refined(self, matrix: Floats, right: Floats, slowest: float) -> Floats | None:
+        """The solution by the factors at hand, None where the residual falls by less than `slowest`."""
+        from scipy.linalg import lapack
+
+        assert self._factors is not None
+        scale, factors, pivots = self._factors
+        scale = scale[:, None]
+        whole = np.maximum(np.abs(scale * right).max(axis=0), np.finfo(float).tiny)
+        x, rest, size = np.zeros_like(right), right, 1.0
+        for _ in range(REFINEMENTS):
+            step = lapack.sgetrs(factors, pivots, (scale * rest / whole).astype(np.float32), trans=True)[0]
+            x = x + scale * step * whole
+            rest = right - matrix @ x
+            before, size = size, float((np.abs(scale * rest).max(axis=0) / whole).max())
+            if size < REFINED:
+                return x
+            if not size < slowest * before:
+                break
+        return None
+
+
+def inverse(matrix: Any, symmetric: bool) -> Floats:
+    """Inverse (n, n); a positive definite one by Cholesky, in half of the time and the matrix's precision."""
+    from scipy.linalg import lapack
+
+    if symmetric:
+        factorise, invert = lapack.get_lapack_funcs(("potrf", "potri"), (matrix,))
+        factor, failed = factorise(np.array(matrix, order="F"), lower=True, overwrite_a=True)
+        if not failed:
+            lower, _ = invert(factor, lower=True, overwrite_c=True)
+            whole = np.array(lower, dtype=float, order="C")
+            for begin in range(0, len(whole), BLOCK):  # without a second matrix as large
+                rows = whole[begin : begin + BLOCK]
+                whole[:begin, begin : begin + BLOCK] = rows[:, :begin].T
+                square = rows[:, begin : begin + BLOCK]
+                square += np.tril(square, -1).T
+            return whole
+    factor, pivots, failed = lapack.dgetrf(matrix)
+    if failed:
+        raise np.linalg.LinAlgError("singular compliance")
+    # solving with the unit matrix, as numpy does, takes 1.6 times as long
+    return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])

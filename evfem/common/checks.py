@@ -62,11 +62,7 @@ def choice(key: str, value: object, names: Collection[str]) -> str:
 
 
 def plain(value: Values) -> Values:
-    """A Python number for a single value, the array itself otherwise.
-
-    >>> plain(np.array(2.5))
-    2.5
-    """
+    """A Python number for a single value, the array itself otherwise."""
     return value.item() if isinstance(value, (np.ndarray, np.generic)) and value.ndim == 0 else value
 
 
@@ -78,8 +74,8 @@ def above(key: str, given: Values, lowest: float, allowed: str) -> Values:
     evfem.errors.InputError: area: given -1.0; allowed: an area in mm2 above zero
     """
     value = finite(key, given, allowed)
-    if not np.all(np.real(value) > lowest):
-        raise InputError(key, _worst(given), allowed)
+    if not np.all(np.real(value) > lowest):  # the smallest alone, so that no long array floods the message
+        raise InputError(key, float(np.min(np.real(given))), allowed)
     return value
 
 
@@ -87,7 +83,7 @@ def at_least(key: str, given: Values, lowest: float, allowed: str) -> Values:
     """As `above`, with `lowest` itself allowed."""
     value = finite(key, given, allowed)
     if not np.all(np.real(value) >= lowest):
-        raise InputError(key, _worst(given), allowed)
+        raise InputError(key, float(np.min(np.real(given))), allowed)
     return value
 
 
@@ -100,11 +96,6 @@ def finite(key: str, given: Values, allowed: str) -> Values:
     if value.dtype.kind not in "iufc" or not np.all(np.isfinite(value)):
         raise InputError(key, quoted(given), allowed)
     return plain(value * 1.0)
-
-
-def _worst(given: Values) -> Values:
-    """The smallest of the values, so that a long array does not flood the message."""
-    return float(np.min(np.real(given)))
 
 
 def set_frozen(target: object, **values: object) -> None:

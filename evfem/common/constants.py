@@ -61,6 +61,20 @@ STUCK = 8
 FALLING = 0.9
 #: earlier iterations that are combined [A, B]
 ANDERSON_DEPTH = 3
+#: dense systems of so many unknowns are factorised in single precision and refined [space]
+LARGE_SYSTEM = 300
+#: until the residual is so small a fraction of the right-hand side, in so many rounds [space]
+REFINED, REFINEMENTS = 1e-14, 14
+#: as long as each round leaves less than this fraction of it: of factors of an earlier matrix [space]
+OLD_FACTORS = 0.2
+#: rows of a matrix that are copied at once
+BLOCK = 256
+#: a tangent with so many kept unknowns is factorised in single precision, [space]
+LARGE_SCHUR = 1000
+#: where that gives the motion under equal forces to this fraction [space]
+ACCURATE = 1e-3
+#: contact in space is solved to this fraction of the residual of the iterate [space]
+INNER = 0.1
 #: solves of an active set [attraction]
 ACTIVE_SET_LIMIT = 60
 #: a node's own compliance counts as no less than this fraction of the mean [attraction]

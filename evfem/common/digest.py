@@ -49,8 +49,9 @@ def _pieces(value: object, above: tuple[int, ...]) -> Iterator[bytes]:
         yield f"{type(value).__name__}:{value!r}".encode()
     elif isinstance(value, np.bool_):
         yield f"bool:{bool(value)!r}".encode()
-    elif isinstance(value, (int, float, complex, np.number)):
-        yield _number(value)
+    elif isinstance(value, (int, float, complex, np.number)):  # equal as they are in Python
+        number = complex(value)
+        yield repr(number.real if number.imag == 0.0 else number).encode()
     elif isinstance(value, np.ndarray):
         yield f"array:{value.dtype.str}:{value.shape}".encode()
         yield np.ascontiguousarray(value).tobytes()
@@ -69,12 +70,6 @@ def _pieces(value: object, above: tuple[int, ...]) -> Iterator[bytes]:
         yield f"set:{sorted(digest(item) for item in value)}".encode()
     else:
         yield from _object_pieces(value, inside)
-
-
-def _number(value: complex | np.number) -> bytes:
-    """Integers, floats and numpy scalars of equal value are equal here as they are in Python."""
-    number = complex(value)
-    return repr(number.real if number.imag == 0.0 else number).encode()
 
 
 def _object_pieces(value: object, inside: tuple[int, ...]) -> Iterator[bytes]:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from evfem.common.storage import disk, names_in, write_names
+from evfem.common.storage import disk, names_in, write_text
 from evfem.errors import StorageError
 
 
@@ -33,7 +33,7 @@ class Manifest:
             self._write()
 
     def _write(self) -> None:
-        write_names(self.path, sorted(self.names))
+        write_text(self.path, "".join(f"{name}\n" for name in sorted(self.names)))
 
     def begin(self, others: Collection[str] = ()) -> None:
         """Forget the names of files that are no longer there, and list `others`."""

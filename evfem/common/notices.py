@@ -12,7 +12,7 @@ import sys
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any, TextIO
 
 from evfem.errors import InputError, StopRun, quoted
@@ -21,18 +21,12 @@ LOG = logging.getLogger("evfem")
 
 
 def wrapped(text: str, stream: TextIO) -> str:
-    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep their lines.
-
-    >>> import io
-    >>> wrapped("one sentence " * 20, io.StringIO()).count(chr(10))
-    0
-    """
+    """`text` broken between words where `stream` is a terminal; files keep their lines."""
     if not stream.isatty():
         return text
     columns = max(shutil.get_terminal_size().columns, 40)
-    return textwrap.fill(
-        text, columns - 1, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
-    )
+    whole: Any = {"break_long_words": False, "break_on_hyphens": False}
+    return textwrap.fill(text, columns - 1, subsequent_indent="  ", **whole)
 
 
 def warn(text: str) -> None:
@@ -50,11 +44,13 @@ def tell(text: str) -> None:
     tqdm.write(wrapped(f"evfem: {text}", sys.stderr), file=sys.stderr)
 
 
-class _Lines(logging.Handler):
-    """Notices as lines."""
+class _Told(logging.Handler):
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        super().__init__()
+        self.tell = tell
 
     def emit(self, record: logging.LogRecord) -> None:
-        tell(record.getMessage())
+        self.tell(record.getMessage())
 
 
 @contextmanager
@@ -74,25 +70,16 @@ def listening(handler: logging.Handler, level: int) -> Iterator[None]:
 @contextmanager
 def shown(wanted: bool = True) -> Iterator[None]:
     """Inside, notices are lines on standard error; once, however often this is nested."""
-    if not wanted or any(isinstance(handler, _Lines) for handler in LOG.handlers):
-        yield
-        return
-    with listening(_Lines(), logging.INFO):
+    again = any(getattr(handler, "tell", None) is tell for handler in LOG.handlers)
+    with listening(_Told(tell), logging.INFO) if wanted and not again else nullcontext():
         yield
 
 
-class _NoBar:
+class _NoBar(ExitStack):
     """A progress bar that shows nothing."""
 
     leave = False
-
-    def __enter__(self) -> _NoBar:
-        return self
-
-    def __exit__(self, *reason: object) -> None:
-        return
-
-    update = set_postfix_str = close = staticmethod(lambda *told, **how: None)
+    update = set_postfix_str = staticmethod(lambda *told, **how: None)
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
@@ -118,18 +105,6 @@ def drawable() -> bool:
     return sys.stderr.isatty() or "ipykernel" in sys.modules
 
 
-class _Newest(logging.Handler):
-    """Shows the newest notice behind a status."""
-
-    def __init__(self, line: Any) -> None:
-        super().__init__()
-        self.line = line
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.line.set_postfix_str(record.getMessage(), refresh=False)
-        self.line.update()
-
-
 @contextmanager
 def status(label: str) -> Iterator[None]:
     """Inside, a terminal shows `label` and the newest detail. Elsewhere nothing is shown."""
@@ -140,16 +115,22 @@ def status(label: str) -> Iterator[None]:
 
     columns = shutil.get_terminal_size().columns
     line = tqdm(desc=label, bar_format="{desc}{postfix}", leave=False, ncols=columns)
-    with line, listening(_Newest(line), logging.DEBUG):
+
+    def newest(text: str) -> None:
+        line.set_postfix_str(text, refresh=False)
+        line.update()
+
+    with line, listening(_Told(newest), logging.DEBUG):
         yield
 
 
 def check_observers(observers: Sequence[object]) -> None:
     """Raise InputError for an object that would be told of nothing."""
+    allowed = (
+        "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint), finished(result)"
+    )
     for i, observer in enumerate(observers):
         if not any(hasattr(observer, event) for event in ("started", "step", "finished")):
-            allowed = "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint) "
-            allowed += "or finished(result)"
             raise InputError(f"observers[{i}]", quoted(observer), allowed)
 
 
@@ -157,11 +138,8 @@ def tell_observers(observers: Sequence[object], event: str, *arguments: Any) -> 
     """Tell every observer; the reasons of those who want the run to end."""
     reasons = []
     for observer in observers:
-        method: Callable[..., None] | None = getattr(observer, event, None)
-        if method is None:
-            continue
         try:
-            method(*arguments)
+            getattr(observer, event, lambda *_: None)(*arguments)
         except StopRun as stop:
             if event != "step":
                 raise

@@ -40,22 +40,16 @@ def read_grey(
             values, white = _values(image)
     except InputError:
         raise
-    except OSError as error:
-        raise InputError(
-            key, f"{path.name} ({error.strerror or 'cut off or of another kind'})", allowed
-        ) from None
-    except Exception:  # whatever the many decoders raise for a damaged file
-        raise InputError(key, f"{path.name} (damaged)", allowed) from None
+    except Exception as error:  # whatever the many decoders raise for a damaged file
+        reason = getattr(error, "strerror", None) or "cut off, damaged or of another kind"
+        raise InputError(key, f"{path.name} ({reason})", allowed) from None
     known = values[np.isfinite(values)]
     if not known.size:
         raise InputError(key, f"{path.name}, in which nothing is to be seen", allowed)
     low, high = float(known.min()), float(known.max())
     if white is None:
-        values = (values - low) / (high - low or 1.0)
-        return (
-            values,
-            f"Grey values {low:.6g} to {high:.6g}: black and white, as such numbers have no others.",
-        )
+        told = f"Grey values {low:.6g} to {high:.6g}: black and white, as such numbers have no others."
+        return (values - low) / (high - low or 1.0), told
     return values / white, f"Grey values {low:g} to {high:g} of {white:g}."
 
 

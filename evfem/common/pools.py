@@ -100,17 +100,16 @@ def blas_limits(threads: int | None = 1) -> threadpool_limits:
 
 
 def _begin(function: Callable[..., None], line: Connection, *arguments: Any) -> None:
+    def end_with_parent() -> None:
+        parent = parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     blas_limits()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     function(line, *arguments)
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def _serve(line: Connection) -> None:
@@ -129,11 +128,7 @@ def _serve(line: Connection) -> None:
 
 @contextmanager
 def processes(workers: int) -> Iterator[Pool]:
-    """A pool of at most so many processes, started when there is work for them.
-
-    Raises InputError in a process of a pool, and the pool does where no process can start: it
-    begins by importing the script that it comes from.
-    """
+    """A pool of at most so many processes, started when needed; InputError where none can start."""
     if getattr(current_process(), "_inheriting", False):  # a worker imports a script without the guard
         raise SystemExit  # the script itself says so below
     if parent_process() is not None:

@@ -41,17 +41,14 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        yield temporary
-        os.replace(temporary, target)
-    except OSError as error:
-        _remove(temporary)
-        if isinstance(error, StorageError):
+    with disk(f"write {target}"):
+        try:
+            yield temporary
+            os.replace(temporary, target)
+        except BaseException:  # Ctrl-C too leaves nothing behind
+            with suppress(OSError):
+                temporary.unlink()
             raise
-        raise StorageError(f"cannot write {target}: {error.strerror or error}") from error
-    except BaseException:  # Ctrl-C too leaves nothing behind
-        _remove(temporary)
-        raise
 
 
 def check_ending(path: str | Path, own: str, instead: str = "") -> None:
@@ -86,11 +83,7 @@ def disk(doing: str) -> Iterator[None]:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Inside, this is the only process at work in `folder`, which is made, and removed if it is left empty.
-
-    The lock belongs to the opened folder, so that nothing is written for it and it ends with the
-    process, however that ends. Raises StorageError where another one has it, or the disk refuses.
-    """
+    """Inside, no other process works in `folder`, which is made, and removed if left empty."""
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     with disk(f"use {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -121,11 +114,6 @@ def _lock(folder: Path) -> int | None:
     except OSError as error:  # some disks in a network
         LOG.info("no lock on %s (%s): start no second run into it", folder, error.strerror or error)
     return lock
-
-
-def write_names(manifest: str | Path, names: Iterable[str]) -> None:
-    """List the names that the owner of a folder may replace or remove in it."""
-    write_text(manifest, "".join(f"{name}\n" for name in names))
 
 
 def names_in(manifest: Path) -> list[str]:
@@ -202,8 +190,3 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
     if dtype.kind not in "biufU" or math.prod(shape) * dtype.itemsize != len(data):
         raise ValueError("no plain array, or not as long as its header says")
     return np.ndarray(shape, dtype, data, order="F" if by_columns else "C").astype(dtype.newbyteorder("="))
-
-
-def _remove(path: Path) -> None:
-    with suppress(OSError):
-        path.unlink()

@@ -7,6 +7,7 @@ import io
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,23 +22,17 @@ from evfem.errors import InputError, quoted, unknown
 MOST_ROWS, MOST_BYTES = 1_000_000, 200_000_000
 #: unit -> the one that is meant without a word, and the number of these
 UNITS: Mapping[str, tuple[str, float]] = {
-    **{name: ("mm", size) for name, size in {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3}.items()},
-    "nm": ("mm", 1e-6),
-    "cm": ("mm", 10.0),
-    "m": ("mm", 1e3),
-    "s": ("s", 1.0),
-    "ms": ("s", 1e-3),
-    "us": ("s", 1e-6),
-    "V": ("V", 1.0),
-    "kV": ("V", 1e3),
-    "N": ("N", 1.0),
-    "mN": ("N", 1e-3),
-    "kN": ("N", 1e3),
-    "N/mm": ("N/mm", 1.0),
-    "mm2": ("mm2", 1.0),
-    "MPa": ("MPa", 1.0),
-    "kPa": ("MPa", 1e-3),
-    "Pa": ("MPa", 1e-6),
+    name: (base, size)
+    for base, sizes in {
+        "mm": {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "nm": 1e-6, "cm": 10.0, "m": 1e3},
+        "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+        "V": {"V": 1.0, "kV": 1e3},
+        "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+        "N/mm": {"N/mm": 1.0},
+        "mm2": {"mm2": 1.0},
+        "MPa": {"MPa": 1.0, "kPa": 1e-3, "Pa": 1e-6},
+    }.items()
+    for name, size in sizes.items()
 }
 #: name of a column -> what it is in
 IN = {"time": "s", "voltage": "V", **dict.fromkeys(("x", "y", "z", "height", "position"), "mm")}
@@ -91,9 +86,7 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
 
 
 def gridded(key: str, x: Floats, z: Floats, value: Floats) -> tuple[Floats, Floats, Floats]:
-    """Increasing x, increasing z and values (rows z, columns x) of rows x, z, value in any order; raises
-    `InputError` with `key` unless there is one row for every pair of at least two x and two z.
-    """
+    """Rising x and z, and values (rows z, columns x), of rows in any order; no pair may be missing."""
     xs, zs = np.unique(x), np.unique(z)
     order = np.lexsort((x, z))
     full = len(xs) * len(zs) == len(x) and min(len(xs), len(zs)) > 1
@@ -109,17 +102,11 @@ def frame(columns: Mapping[str, Any]) -> Any:
         from pandas import DataFrame
 
         return DataFrame(columns)
-    arrays = {name: np.asarray(values) for name, values in columns.items()}
-    length = len(next(iter(arrays.values())))
-    records = np.recarray(length, [(name, values.dtype) for name, values in arrays.items()])
-    for name, values in arrays.items():
-        records[name] = values
-    return records
+    names: Any = list(columns)
+    return np.rec.fromarrays([np.asarray(values) for values in columns.values()], names=names)
 
 
-def dataset(
-    variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Mapping[str, Any]
-) -> Any:
+def dataset(variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Any) -> Any:
     """An `xarray.Dataset`; InputError where xarray is not installed."""
     try:
         from xarray import Dataset
@@ -140,36 +127,36 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
     return buffer.getvalue()
 
 
-def read_table(path: Path, key: str) -> dict[str, Any]:
-    """All columns of a csv file by the names in its first line: arrays of numbers, or lists of words.
-
-    Raises `InputError` with `key` for a file that cannot be read, has nothing below its first
-    line, a name twice, or lines of another length.
-    """
-    allowed = "a readable csv file: names in the first line, as many values in each other line"
+def csv_rows(path: Path, key: str, allowed: str) -> list[list[str]]:
+    """The lines of a csv file, the names first, then as many values in each; InputError for others."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as lines:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(lines) if row]
+            names, *body = [row for row in csv.reader(lines, strict=True) if row] or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(key, f"{path.name} ({reason})", allowed) from None
-    names, *body = rows or [[]]
     odd = [row for row in body if len(row) != len(names)]
-    if odd or not body or len(set(names)) < len(names):
-        reason = f"{','.join(odd[0])[:60]!r}" if odd else "no line of values" if not body else "a name twice"
+    if odd or len(set(names)) < len(names):
+        reason = f"{','.join(odd[0])[:60]!r}" if odd else "a name twice"
         raise InputError(key, f"{path.name} with {','.join(names)[:60]!r}, then {reason}", allowed)
     if len(body) > MOST_ROWS:
         raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
-    return {
-        name: words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
-    }
+    return [names, *body]
+
+
+def read_table(path: Path, key: str) -> dict[str, Any]:
+    """Columns of a csv file by the names in its first line: arrays of numbers, or lists of words."""
+    allowed = "a readable csv file: names in the first line, as many values in each other line"
+    names, *body = csv_rows(path, key, allowed)
+    if not body:
+        raise InputError(key, f"{path.name} with {','.join(names)[:60]!r}, then no line of values", allowed)
+    columns = zip(names, zip(*body, strict=True), strict=True)
+    return {name.strip(): words_or_numbers(map(str.strip, column)) for name, column in columns}
 
 
 @dataclass(frozen=True, eq=False)
 class Headed:
-    """Columns of numbers, NaN where one is missing, with the names and units of their header: small
-    letters, and None where no unit is said. `commas`: whether numbers had decimal commas.
-    """
+    """Columns, NaN for gaps, with names and units; `commas`: whether numbers had decimal commas."""
 
     names: list[str]
     units: list[str | None]
@@ -191,9 +178,7 @@ class Headed:
 
 
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
-    """Columns of a text file (`read_headed`) with exactly the names `header` and a number everywhere, in
-    mm, s and V.
-    """
+    """Columns of a text with exactly the names `header` and a number everywhere, in mm, s and V."""
     allowed = f"a readable csv file with the header {','.join(header)}"
     table = read_headed(path, key, allowed, gaps=False)
     if table.names != header:
@@ -203,6 +188,8 @@ def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
     return [table.column(f"{key}.{name}", name, (IN.get(name),)) for name in header]
 
 
+#: a cell of a line of units
+UNIT = re.compile(r"[\[(]?([cµμunm]?m|[mu]?s|[mk]?N|N/mm|mm2|k?V|[kM]?Pa|g|m/s\^?2|1/mm|1|-|)[\])]?")
 #: name and unit in a header: x [mm], x (mm), x/mm, "x, mm", x_mm, x mm
 NAMED = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\)|[/,]\s*([^/,]+)|_([µμunm]?m|[mu]?s)|\s([µμunm]?m|[mk]?N))?")
 
@@ -236,7 +223,7 @@ def read_headed(
     above = [_cells(line.lstrip("#% "), separator) for n, line in lines if n < rows[0][0]]
     heads = [cells for cells in above if len(cells) == width] or above
     parts = [_named(cell) for cell in heads[-1]] if heads else []
-    if len(heads) > 1 and len(heads[-2]) == len(parts) and all(_is_unit(cell) for cell in heads[-1]):
+    if len(heads) > 1 and len(heads[-2]) == len(parts) and all(map(UNIT.fullmatch, heads[-1])):
         parts = [(name.lower(), unit.strip("[]()")) for name, unit in zip(*heads[-2:], strict=True)]
     parts = parts or [(str(i), None) for i in range(1, width + 1)]
     while len(parts) > 1 and not parts[-1][0]:  # a separator at the end of the header
@@ -271,12 +258,9 @@ def _text(path: Path, key: str, allowed: str) -> str:
     data = read_bytes(path, key, allowed, MOST_BYTES, f"at most {MOST_BYTES // 10**6} MB")
     codings = ("utf-16",) if data.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "latin-1")
     for coding in codings:
-        try:
-            text = data.decode(coding)
-        except UnicodeDecodeError:
-            continue
-        if "\0" not in text:
-            return text
+        with suppress(UnicodeDecodeError):
+            if "\0" not in (text := data.decode(coding)):
+                return text
     raise InputError(key, f"{path.name} (not a text file)", allowed)
 
 
@@ -303,29 +287,16 @@ def _cells(line: str, separator: str | None) -> list[str]:
 def _numbers(cells: list[str]) -> list[float]:
     """Numbers of a line, NaN for gaps; none where one is something else."""
     try:
-        return [_real(cell) for cell in cells]
+        values = [float(cell.replace(",", ".") or "nan") for cell in cells]
     except ValueError:
         return []
-
-
-def _real(cell: str) -> float:
-    value = float(cell.replace(",", ".") or "nan")
-    if math.isinf(value):
-        raise ValueError(cell)
-    return value
+    return [] if any(map(math.isinf, values)) else values
 
 
 def _named(cell: str) -> tuple[str, str | None]:
     found = NAMED.fullmatch(cell)
     name, *units = found.groups() if found else (cell, None)
     return name.lower(), next((unit.strip() for unit in units if unit), None)
-
-
-def _is_unit(cell: str) -> bool:
-    return (
-        re.fullmatch(r"[\[(]?([cµμunm]?m|[mu]?s|[mk]?N|N/mm|mm2|k?V|[kM]?Pa|g|m/s\^?2|1/mm|1|-|)[\])]?", cell)
-        is not None
-    )
 
 
 def words_or_numbers(words: Iterable[str]) -> Any:

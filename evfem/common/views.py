@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from inspect import cleandoc
 from textwrap import fill
 from typing import Any
@@ -33,30 +33,22 @@ def changed(value: Any) -> dict[str, Any]:
     >>> changed(Slide(distance=5.0, steps=10))
     {'distance': 5.0, 'steps': 10}
     """
-    shown = [spec for spec in fields(value) if spec.init and spec.repr]
-    return {spec.name: v for spec in shown if _differs(v := getattr(value, spec.name), spec)}
-
-
-def _differs(value: Any, spec: Field[Any]) -> bool:
-    default = spec.default if spec.default_factory is MISSING else spec.default_factory()
-    return default is MISSING or bool(value != default)
+    shown = {}
+    for spec in fields(value):
+        default = spec.default if spec.default_factory is MISSING else spec.default_factory()
+        found = getattr(value, spec.name)
+        if spec.init and spec.repr and (default is MISSING or bool(found != default)):
+            shown[spec.name] = found
+    return shown
 
 
 def called(name: str, arguments: Mapping[str, Any]) -> str:
-    """The call that makes an object.
-
-    >>> called("Slide", {"distance": 5.0, "hold": "force"})
-    "Slide(distance=5.0, hold='force')"
-    """
+    """The call that makes an object."""
     return f"{name}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
 
 
 def plus(value: float) -> float:
-    """The number itself, with 0 for -0 and for what rounds to it in a table.
-
-    >>> plus(-0.0), plus(-1e-13), plus(-0.5)
-    (0.0, 0.0, -0.5)
-    """
+    """The number itself, with 0 for -0 and for what rounds to it in a table."""
     return 0.0 if abs(value) < TINY else float(value)
 
 
@@ -78,10 +70,7 @@ def table(title: str, rows: Sequence[tuple[str, str]], below: str = "") -> str:
 
 
 def curves(lines: Mapping[str, tuple[str, Sequence[float]]]) -> str:
-    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG.
-
-    Coordinates are number and value; the view box scales them. About one point for each pixel is drawn.
-    """
+    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG."""
     finite = [0.0, *(v for _, values in lines.values() for v in values if math.isfinite(v))]
     longest = max(len(values) for _, values in lines.values())
     step, height = max(longest // WIDTH, 1), max(finite) - min(finite) or 1.0

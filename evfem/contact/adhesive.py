@@ -19,10 +19,10 @@ from evfem.surface.adhesion import ON
 
 @dataclass(frozen=True, eq=False)
 class WithAdhesion(Attraction):
-    """The attraction `of_voltage` (None: none) and that `of_adhesion`; law and charges are the voltage's."""
+    """The `electric` attraction (None: none) and the `adhesive` one; law and charges are the voltage's."""
 
-    of_voltage: Attraction | None = None
-    of_adhesion: Attraction | None = None
+    electric: Attraction | None = None
+    adhesive: Attraction | None = None
 
     @classmethod
     def of(cls, electric: Attraction | None, adhesive: Attraction) -> WithAdhesion:
@@ -33,36 +33,26 @@ class WithAdhesion(Attraction):
         common = (a.pad, a.surface, a.direction, True, a.roughness)
         return cls(law, layers, *common, charging, electric, adhesive)
 
-    @property
-    def electric(self) -> Attraction | None:
-        """That of the voltage, None without one."""
-        return self.of_voltage
-
-    @property
-    def adhesive(self) -> Attraction | None:
-        """That of adhesion."""
-        return self.of_adhesion
-
     def acts(self, voltage: float) -> bool:
         """Always."""
         return True
 
     def _parts(self, voltage: float) -> Iterator[tuple[Attraction, float]]:
         """What attracts at a voltage (V), and the voltage that it takes."""
-        if self.of_voltage is not None and self.of_voltage.acts(voltage):
-            yield self.of_voltage, voltage
-        assert self.of_adhesion is not None
-        yield self.of_adhesion, ON
+        if self.electric is not None and self.electric.acts(voltage):
+            yield self.electric, voltage
+        assert self.adhesive is not None
+        yield self.adhesive, ON
 
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        assert self.of_adhesion is not None
+        assert self.adhesive is not None
         on = np.full(voltages.shape, ON)
-        found = self.of_adhesion.forces_along(positions, on, touching, pressing)
-        if self.of_voltage is None:
+        found = self.adhesive.forces_along(positions, on, touching, pressing)
+        if self.electric is None:
             return found
-        return found + self.of_voltage.forces_along(positions, voltages, touching, pressing)
+        return found + self.electric.forces_along(positions, voltages, touching, pressing)
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
         found = [one for part, at in self._parts(voltage) if (one := part.restored(at)) is not None]
@@ -83,7 +73,5 @@ class WithAdhesion(Attraction):
         )
         return np.asarray(sum(each))
 
-    def stiffness(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Any:
+    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
         return sum(part.stiffness(position, at, touching, pressing) for part, at in self._parts(voltage))

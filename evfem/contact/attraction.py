@@ -1,18 +1,15 @@
 r"""Electrostatic attraction of the pad: nodal forces (9a), (9b), (10) and their derivative.
 
 Each pad node j carries the pressure p(g_j) of its current gap on its current projected length A_j, the nodal
-rule of the weak form `attraction` below (docs, Theory).
-
-Trial states that penetrate count as touching, g = 0.
+rule of the weak form `attraction` below (docs, Theory). Trial states that penetrate count as touching, g = 0.
 
 - ``vertical`` (the paper): :math:`f_y = -p(g_j) A_j`. Not conservative: moving a neighbour sideways changes
   A_j without work.
 - ``normal``: minus the derivative of :math:`W = \sum_j \Pi(g_j) A_j`, the Maxwell traction on the deformed
   outline; its tangent is symmetric.
 
-Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
-
-In three dimensions A_j is the node's projected area (`evfem.surface.skin`), and forces are in N.
+Without an air layer only touching nodes carry force. Forces act on the finger, in N per mm of depth; in three
+dimensions A_j is the node's projected area (`evfem.surface.skin`), and forces are in N.
 
 Rough faces keep a separation s(p) where they touch (`evfem.electrostatics.roughness`): the law then
 has the gap g + s, with p the node's own contact pressure, its pressing force over A_j. A node that is
@@ -103,9 +100,7 @@ class Attraction:
         found = self.charging.after(gap, voltage, length) if charges is None else charges
         return Charged(found, voltage, gap, length)
 
-    def forces(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
+    def forces(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
         """Nodal forces on the finger (P, dim); without an air layer only `touching` nodes (P,) have any."""
         pressed = None if pressing is None else pressing[None]
         return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
@@ -121,11 +116,10 @@ class Attraction:
     #: what rounding does to the forces, as a fraction of the largest nodal one
     rounding = 0.0
 
-    def column_forces(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """The forces (P, 2) whose derivative is `stiffness`."""
-        return self.forces(position, voltage, touching, pressing)
+    @property
+    def column_law(self) -> Attraction:
+        """The attraction whose derivative `stiffness` is, and that resolves how it grows as gaps close."""
+        return self
 
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
@@ -161,22 +155,12 @@ class Attraction:
         size = self.pad.nodes.shape
         return np.broadcast_to(withheld, size), np.broadcast_to(left, size)
 
-    def tangent_factor(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Any:
-        """Factor (P,), or 1, of the derivatives of `column_forces` in the tangent of the forces."""
+    def tangent_factor(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
+        """Factor (P,), or 1, of the derivatives of the `column_law` in the tangent of the forces."""
         return 1.0
 
-    def way_forces(
-        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """`forces_along` of the columns alone, which resolve how the attraction grows as gaps close."""
-        return self.forces_along(positions, voltages, touching, pressing)
-
     def _sideways(self, position: Floats, potential: Floats) -> Floats:
-        """Forces (P, dim) along the display that enlarge what nodes at (P, dim) stand for, by the potential
-        (P,).
-        """
+        """Forces (P, dim) along the display that enlarge what nodes stand for, by the potential (P,)."""
         of, moved, value = self.pad.tributary_gradient(position)
         found = np.bincount(moved, -potential[of] * value, position.size)
         return found.astype(float, copy=False).reshape(position.shape)
@@ -191,9 +175,9 @@ class Attraction:
         """Contact pressure in MPa of the nodes at (..., P, dim)."""
         if pressing is None:
             return np.zeros(position.shape[:-1])
-        share = self.pad.tributary(position)
-        facing = share > 0.0
-        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, share, 1.0), 0.0)
+        length = self.pad.tributary(position)
+        facing = length > 0.0
+        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, length, 1.0), 0.0)
 
     def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
         """Growth of a node's attraction per contact force (P,): the rough faces come closer."""
@@ -208,9 +192,8 @@ class Attraction:
     def negative_stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """Decrease of the attraction of a node with its vertical gap, -dp/dg A (P,) in N/mm
-        per mm; 0 where it touches, where contact holds the gap, and where losses make it grow with
-        the gap: that stabilises, and the iterations do without it.
+        """Decrease of a node's attraction with its vertical gap, -dp/dg A (P,) in N/mm per mm; 0 where
+        contact holds the gap, and where losses make it grow with the gap, which stabilises.
         """
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
@@ -227,12 +210,10 @@ class Attraction:
         seen = lambda g: law.traction(g, self._voltages(g, voltage, position), self.layers)  # noqa: E731
         return derivative(seen, apart, GAP_STEP)
 
-    def stiffness(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Any:
+    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
         """Derivative of `forces` by node positions, sparse (dim P, dim P), ordered (node, component)."""
         size, dim = position.shape
-        frame, ways = surface_state(self.surface, position), np.arange(0, dim, 2)
+        frame, horizontal = surface_state(self.surface, position), np.arange(0, dim, 2)
         on = 1.0 if self.air_layer else touching.astype(float)
         apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
         voltages = self._voltages(apart, voltage, position)
@@ -240,7 +221,7 @@ class Attraction:
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)
-        up, aside = dim * nodes + 1, dim * nodes[:, None] + ways
+        up, aside = dim * nodes + 1, dim * nodes[:, None] + horizontal
         blocks = [
             (up, up, -dp),
             (up[:, None], aside, dp[:, None] * frame.slope),
@@ -251,7 +232,7 @@ class Attraction:
             square = frame.slope[:, :, None] * frame.slope[:, None, :]
             own = w[:, None, None] * frame.curvature - dp[:, None, None] * square
             shared = (p[:, None] * frame.slope)[of] * value[:, None]
-            at = dim * of[:, None] + ways
+            at = dim * of[:, None] + horizontal
             blocks += [
                 (aside, up[:, None], dp[:, None] * frame.slope),
                 (aside[:, :, None], aside[:, None, :], own),

@@ -1,12 +1,9 @@
 """Charges of the pad nodes under a voltage that is resolved in time: internal variables of the attraction.
 
 Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.relaxation`) on its
-tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them. In a step first
-the pad moves with its charges and voltage, r A of each node staying what it is while A changes; then charge
-flows for the seconds of the step while the voltage changes linearly to its new value. The charges at the end
-are a function of gap and voltage; contact and Newton's method need no further unknowns.
-
-The balance of a step, each term from its own integral::
+tributary length A: M = 2 charges, with their polarisations where dielectrics relax. In a step first the pad
+moves with its charges and voltage, then charge flows while the voltage changes linearly to its new value. The
+charges at the end are a function of gap and voltage. Each term of the balance has its own integral::
 
     source work = change of the field energy + leakage + work of the attraction while the pad moves
                   + work of the field on the tributary lengths, which a vertical traction leaves out
@@ -25,8 +22,7 @@ from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.relaxation import Sandwich
 from evfem.tensor import STEP
 
-#: pieces of a step, each so many times as long as the one before, from one relaxation of the fastest
-#: charge on; Gauss points of each
+#: pieces of a step, from the fastest charge's relaxation on, grow by this factor; Gauss points of each
 LONGER, POINTS = 3.0, 8
 #: positions at which the effective voltage is remembered
 REMEMBERED = 4
@@ -71,7 +67,10 @@ class Charging:
 
     def carried(self, length: Floats) -> Floats:
         """The charges (M, P) of the beginning on other tributary lengths (P,)."""
-        return np.asarray(self.old.charges * np.where(length > 0.0, self.old.length / _positive(length), 1.0))
+        some = length > 0.0
+        return np.asarray(
+            self.old.charges * np.where(some, self.old.length / np.where(some, length, 1.0), 1.0)
+        )
 
     def after(self, gap: Any, voltage: float, length: Floats) -> Any:
         """The charges (M, P) at the end of the step, in the new place under the new voltage."""
@@ -166,7 +165,3 @@ class Charging:
         length = np.diff(ends)[:, None]
         at = np.array(ends[:-1])[:, None] + length * (0.5 + 0.5 * x)
         return at.ravel(), (0.5 * length * w).ravel()
-
-
-def _positive(length: Floats) -> Floats:
-    return np.where(length > 0.0, length, 1.0)

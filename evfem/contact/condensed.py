@@ -1,10 +1,9 @@
 r"""The linearised body condensed onto its contact candidates, and the contact problem on that compliance.
 
-The compliance :math:`C = S_{cc}^{-1}` (`evfem.solver`) is kept with the factorisation.
-On a curved profile the contact force turns with the node, a follower force:
-:math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes
-in every iteration but touches only the nodes near contact, so it is put into their small block alone
-(`evfem.contact.follower`). On a relief over x and z it turns with both (`evfem.surface.pad.SurfaceState`).
+The compliance :math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved surface contact forces turn
+with the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`. That
+changes in every iteration, and is put into the small block of the nodes near contact alone
+(`evfem.contact.follower`).
 
 Algorithm (`LinearContactStep.solve`)::
 
@@ -25,12 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import DenseSolver, Floats, Ints, inverse
 from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
-    BACKWARD,
-    FORWARD,
     OPEN,
     SLIP,
     AttractionStiffness,
@@ -40,6 +37,7 @@ from evfem.contact.signorini import (
     ExtraUnknowns,
     Roughness,
     Unstable,
+    side,
 )
 from evfem.contact.solve import solve_with_attraction
 from evfem.surface.pad import SurfaceState
@@ -75,8 +73,8 @@ class Candidates:
     slip_stiffness: Floats | None = None
 
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z],
-        (c, 1 + d, d); `own` (c, d) are its compliances along them.
+        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z], (c, 1 + d, d),
+        of the own compliances (c, d) along them.
         """
         turned = self.surface.turned(self.force)
         grown = np.einsum("caj,cak->ckj", self.friction_growth(own), self.surface.axes[:, 1:])
@@ -86,7 +84,7 @@ class Candidates:
     def shear_direction(self) -> Floats:
         """Unit vectors (c, d) of the friction of slipping nodes, 0 of others."""
         if self.force.shape[1] == 2:
-            return np.subtract(self.status == BACKWARD, self.status == FORWARD, dtype=float)[:, None]
+            return side(self.status)
         shear = np.hypot(*self.force[:, 1:].T)
         slips = (self.status == SLIP) & (shear > 0.0)
         return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
@@ -105,21 +103,20 @@ class Candidates:
 
     def friction_growth(self, own: Floats) -> Floats:
         """That part of it which is friction: change of the shear force (a) per displacement of the node along
-        x[, z] (j), (c, d, d).
-
-        `own` (c, d) are each node's compliances along them. Where friction falls faster than the tissue
-        stiffens, a node snaps forward: its friction stays at the present coefficient. Friction that rises
-        along the way holds in any case.
+        x[, z] (j), (c, d, d). Where it falls faster than the tissue stiffens, a node snaps forward: its
+        friction stays at the present coefficient.
         """
-        way = self.shear_direction
-        growth = way[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
-        along = np.any(way, axis=1, keepdims=True)
+        direction = self.shear_direction
+        growth = direction[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
+        along = np.any(direction, axis=1, keepdims=True)
         if self.slip_stiffness is not None:
             # a node that slips is held along its slip, one that sticks either way
-            held = np.where(along[:, :, None], way[:, :, None] * way[:, None, :], np.eye(way.shape[1]))
+            held = np.where(
+                along[:, :, None], direction[:, :, None] * direction[:, None, :], np.eye(direction.shape[1])
+            )
             growth -= self.slip_stiffness[:, None, None] * (held @ self.surface.travel)
         steep = np.trace(growth, axis1=1, axis2=2)
-        gives = np.sum(np.where(along, way**2, 1.0 / way.shape[1]) * own, axis=1)
+        gives = np.sum(np.where(along, direction**2, 1.0 / direction.shape[1]) * own, axis=1)
         kept: Any = (steep < 0.0) | (steep * gives < STABLE)
         return np.asarray(np.where(kept[:, None, None], growth, 0.0))
 
@@ -151,18 +148,19 @@ class CandidatesBed:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """Condensed tangent on (candidates, bone x, y[, z]) and compliance of the candidates, with attraction."""
+    """Condensed tangent on (candidates, bone x, y[, z]), compliance of the candidates, with attraction."""
 
     schur: Floats
     compliance: Floats
     dim: int = 2
+    dense: DenseSolver = field(default_factory=DenseSolver, repr=False)
     _last: dict[bytes, Floats] = field(default_factory=dict, repr=False)
 
     @classmethod
     def make(cls, schur: Floats, coupling: Floats | None, dim: int = 2) -> CondensedTangent:
         """From S (m, m) and the attraction's stiffness between nodes (m - dim, m - dim), or None."""
         inner = schur[:-dim, :-dim] if coupling is None else schur[:-dim, :-dim] - coupling
-        return cls(schur, _inverse(inner, symmetric=coupling is None), dim)
+        return cls(schur, inverse(inner, symmetric=coupling is None), dim)
 
     def rows(self, near: Ints) -> Ints:
         """Rows of these candidates, (y, x[, z]) node by node."""
@@ -185,10 +183,12 @@ class CondensedTangent:
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """`row` (m,) times displacements of candidates and bone plus `share` (p,) times unknowns is `wanted`."""
+    """`row` (m,) times displacements of candidates and bone plus `by_unknowns` (p,) times unknowns is
+    `wanted`.
+    """
 
     row: Floats
-    share: Floats
+    by_unknowns: Floats
     wanted: float
 
 
@@ -216,11 +216,8 @@ class ExtraUnknown:
 
 @dataclass(frozen=True, eq=False)
 class LinearContactStep:
-    """One linear step of the condensed body: contact is solved on it, and the candidates'
-    displacement comes back.
-
-    `residual` g (m,) of the forward solve; `bone` (dim,) the bone's known increment; `unknowns` what
-    else moves the body.
+    """One linear step of the condensed body: `residual` g (m,) of the forward solve, the bone's known
+    increment (dim,), the `unknowns` that also move the body, and the `tolerance` of `ContactProblem`.
     """
 
     body: CondensedTangent
@@ -229,6 +226,7 @@ class LinearContactStep:
     bone: Floats
     unknowns: tuple[ExtraUnknown, ...] = ()
     bed: CandidatesBed | None = None
+    tolerance: float = ROUNDING
 
     @cached_property
     def seen(self) -> Floats:
@@ -255,7 +253,8 @@ class LinearContactStep:
             found, pushed = self._solve_near(near, free, alone, status[near])
             solves += found.solves
             status[near] = found.status
-            whole = self._whole(near, pushed)
+            whole = np.zeros(free.shape[0])
+            whole[self.body.rows(near)] = pushed
             moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
             gap = normal_gap + self._along_normal(moved)
             gap[near] = 0.0  # the dense problem has settled theirs
@@ -266,8 +265,8 @@ class LinearContactStep:
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(-1, self.body.dim)
         # the shear of closed nodes also follows its place within the step, by the slope of their friction
-        way = moved.reshape(-1, self.body.dim)[:, ::2]
-        grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), way)
+        horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
+        grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
         given = None
         if self.bed is not None:
@@ -306,9 +305,8 @@ class LinearContactStep:
         """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1 + p)."""
         dim = self.body.dim
         right = self.residual[:-dim] - self._present - self.body.schur[:-dim, -dim:] @ self.bone
-        return self.body.compliance @ np.column_stack(
-            [right, *(unknown.push[:-dim] for unknown in self.unknowns)]
-        )
+        pushes = (unknown.push[:-dim] for unknown in self.unknowns)
+        return self.body.compliance @ np.column_stack([right, *pushes])
 
     @cached_property
     def _present(self) -> Floats:
@@ -316,21 +314,14 @@ class LinearContactStep:
         force = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.surface.axes)
         return force[:, COMPONENTS[: self.body.dim]].ravel()
 
-    def _whole(self, near: Ints, pushed: Floats) -> Floats:
-        """Forces on all candidates (dim c,), of those on the near ones in `CondensedTangent.rows`."""
-        force = np.zeros(self.body.dim * self.candidates.status.size)
-        force[self.body.rows(near)] = pushed
-        return force
-
     def _solve_near(
         self, near: Ints, free: Floats, alone: Floats, status: Ints
     ) -> tuple[ContactSolution, Floats]:
         """Contact among the `near` nodes, by how they move `free` of contact forces, and the body `alone`:
-        solution in their frames, and the forces (dim k,) that move the
-        body, those of the follower stiffness included.
+        solution in their frames, and the forces (dim k,) on the body, those of the follower stiffness too.
 
-        What moves beyond the present forces `held` is small near the equilibrium: a steep stiffness, of
-        friction that rises with the speed for example, multiplies that and not the whole free motion.
+        That stiffness may be steep: it multiplies what moves beyond the present forces `held`, which is small
+        near the equilibrium, and not the whole free motion.
         """
         known, rows, dim = self.candidates, self.body.rows(near), self.body.dim
         follower = FollowerStiffness.of(known.follower_rate(self._own)[near])
@@ -339,12 +330,9 @@ class LinearContactStep:
         C, W = follower.apply(among, own)
         W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
         problem = self._problem(near, (C, W), self._bone_balance(rows, alone, (C, W), follower))
-        attraction = AttractionStiffness(
-            known.negative_stiffness[near],
-            known.surface.normal_gap[near],
-            known.gain_on_closing[near],
-            None if known.roughness is None else known.roughness.of(near),
-        )
+        rough = None if known.roughness is None else known.roughness.of(near)
+        gap, gain = known.surface.normal_gap[near], known.gain_on_closing[near]
+        attraction = AttractionStiffness(known.negative_stiffness[near], gap, gain, rough)
         touching = np.where((status != OPEN)[:, None], known.force[near], 0.0).ravel()
         try:
             found = solve_with_attraction(problem, attraction, status, touching)
@@ -378,6 +366,8 @@ class LinearContactStep:
             chords=known.by_chords(near, compliance),
             cohesion=None if known.cohesion is None else known.cohesion[near],
             give=known.interface_compliance[near].ravel() if known.interface_compliance.any() else None,
+            tolerance=self.tolerance,
+            dense=self.body.dense,
         )
 
     def _bone_balance(
@@ -387,35 +377,28 @@ class LinearContactStep:
         if not self.unknowns:
             return None
         C, W = near
-        S, share, wanted, carried = self.equations
+        S, by_unknowns, wanted, carried = self.equations
         dim, row = self.body.dim, carried[:, rows]
         through = follower.transposed(row)
-        pivot = S[:, :-dim] @ free[:, 1:] + share + through @ W[:, 1:]
+        pivot = S[:, :-dim] @ free[:, 1:] + by_unknowns + through @ W[:, 1:]
         value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0] - through @ W[:, 0]
         return row + through @ C, self._held(pivot, free), value
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Equations of the p unknowns: what displacements (p, m) and unknowns (p, p) add, their right-hand
-        sides (p,), and what forces on the candidates add (p, m - dim); the bone's balance along their axes,
-        or a condition.
+        """Of the p unknowns, the bone's balance along their axes or a condition: what displacements (p, m)
+        and unknowns (p, p) add, right-hand sides (p,), and what forces on the candidates add (p, m - dim).
         """
         dim = self.body.dim
-        S, carried, pushed, residual = (
-            np.stack([unknown.part(rows) for unknown in self.unknowns])
-            for rows in (
-                self.body.schur[-dim:],
-                self.body.bone_rows,
-                np.stack([unknown.push[-dim:] for unknown in self.unknowns], axis=1),
-                self.residual[-dim:],
-            )
-        )
-        share, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
+        pushes = np.stack([unknown.push[-dim:] for unknown in self.unknowns], axis=1)
+        bone = (self.body.schur[-dim:], self.body.bone_rows, pushes, self.residual[-dim:])
+        S, carried, pushed, residual = (np.stack([one.part(rows) for one in self.unknowns]) for rows in bone)
+        by_unknowns, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:
-                S[i], share[i], wanted[i] = condition.row, condition.share, condition.wanted
-                carried[i] = condition.row[: -self.body.dim] @ self.body.compliance
-        return S, share, wanted, carried
+                S[i], by_unknowns[i], wanted[i] = condition.row, condition.by_unknowns, condition.wanted
+                carried[i] = condition.row[:-dim] @ self.body.compliance
+        return S, by_unknowns, wanted, carried
 
     def _held(self, pivot: Floats, free: Floats) -> Floats:
         """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
@@ -424,19 +407,3 @@ class LinearContactStep:
         floor = SMALLEST_PIVOT * np.abs(S[:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
         return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
-
-
-def _inverse(matrix: Floats, symmetric: bool) -> Floats:
-    """Inverse; a positive definite one by Cholesky, which takes half of the time."""
-    from scipy.linalg import lapack
-
-    if symmetric:
-        factor, failed = lapack.dpotrf(matrix, lower=True)
-        if not failed:
-            lower, _ = lapack.dpotri(factor, lower=True)
-            return lower + np.tril(lower, -1).T
-    factor, pivots, failed = lapack.dgetrf(matrix)
-    if failed:
-        raise np.linalg.LinAlgError("singular compliance")
-    # solving with the unit matrix, as numpy does, takes 1.6 times as long
-    return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])

@@ -1,15 +1,10 @@
 r"""The mean attraction over the cycle from the full field, in layers that conduct.
 
-As `evfem.contact.fullfield`, with Poisson's problem of complex permittivities at each harmonic n of
-the drive and the mean pulls :math:`F_n` on the nodes at 1 V (`evfem.field.meanattraction`),
-
-.. math:: f_j = U^2 \sum_n w_n F_{n, j}, \qquad \sum_n w_n = 1,
-
-with the share w_n of a harmonic in the squared effective voltage. The attraction stays proportional
-to the squared voltage, so controls and encodings are the same; the tangent is that of
-the column law with the same losses. The forces have no energy: on the way between two states the
-work is that of the column law, and that of the fringes is counted trapezoidally. The bounds are
-those of an energy; of the layers without losses they decide for `auto`.
+As `evfem.contact.fullfield`, with Poisson's problem of complex permittivities at each harmonic n of the drive
+and the mean pulls :math:`F_n` on the nodes at 1 V (`evfem.field.meanattraction`): with the weight w_n of a
+harmonic in the squared effective voltage :math:`f_j = U^2 \sum_n w_n F_{n, j}`, :math:`\sum_n w_n = 1`. The
+tangent is that of the column law with the same losses. The forces have no energy: between two states the
+work is that of the column law, and that of the fringes is counted trapezoidally.
 """
 
 from __future__ import annotations
@@ -21,15 +16,15 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.contact.fullfield import FieldAttraction
-from evfem.field.columns import Columns, Nearby
+from evfem.field.columns import Columns
 from evfem.field.meanattraction import mean_pull
 
 
 @dataclass(frozen=True)
 class Harmonic:
-    """A sine of a cycle: share of the squared effective voltage, complex eps_r of insulator, gap, skin."""
+    """A sine of a cycle: weight of the squared effective voltage, complex eps_r of insulator, gap, skin."""
 
-    share: float
+    weight: float
     insulator: complex
     gap: complex
     skin: complex
@@ -53,22 +48,17 @@ class DrivenFieldAttraction(FieldAttraction):
     def _of_harmonics(self) -> tuple[tuple[float, Columns], ...]:
         stacks = ((one.insulator, one.gap, one.skin) for one in self.harmonics)
         real = (tuple(eps if eps.imag else eps.real for eps in stack) for stack in stacks)
-        shares = (one.share for one in self.harmonics)
-        return tuple((share, self.columns_of(*stack)) for share, stack in zip(shares, real, strict=True))
+        weights = (one.weight for one in self.harmonics)
+        return tuple((weight, self.columns_of(*stack)) for weight, stack in zip(weights, real, strict=True))
 
     @cached_property
     def _columns(self) -> Columns:
         return self._of_harmonics[0][1]
 
-    def _nearby(self, x: Floats, levels: Floats) -> None:
-        """Every field is solved anew: its forces need a second potential."""
-
-    def _solved(
-        self, x: Floats, levels: Floats, slope: Floats, near: Nearby | None = None
-    ) -> tuple[None, Floats]:
+    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[None, Floats]:
         """Mean forces (L, 2) on the lines at 1 V effective, whatever the slope below."""
         pulls = (
-            share * mean_pull(columns, x, levels, self._electrodes, self.floating).forces
-            for share, columns in self._of_harmonics
+            weight * mean_pull(columns, x, levels, self._electrodes, self.floating).forces
+            for weight, columns in self._of_harmonics
         )
         return None, np.asarray(sum(pulls))

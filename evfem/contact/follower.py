@@ -3,12 +3,9 @@ r"""Stiffness of contact forces that turn with the profile, in the small block o
 A node that moves along a profile, by dx[, dz], takes the direction of its contact force along, and at a
 slope of the friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body that gives
 :math:`u = C (f + T u)`, so :math:`(1 - C T)^{-1} C` takes the place of C, and the same of free motions.
+Where the feedback C T exceeds 1, stability is lost: no solution, or one in the wrong direction.
 
-Where the feedback C T of the slipping nodes exceeds 1, the forces push them aside harder than the
-tissue holds them: stability is lost, and the linear problem has no solution, or one the wrong way.
-
-Components of the block are ordered per node, (y, x[, z]): on a flat surface those along its normal and
-tangents. Axes (k, 1 + d, 1 + d) hold the rows n, t[, t2] of every node in that order.
+Components are ordered per node, (y, x[, z]); axes (k, 1 + d, 1 + d) are rows n, t[, t2] in that order.
 """
 
 from __future__ import annotations
@@ -23,11 +20,11 @@ from evfem.common.arrays import Floats, Ints
 @dataclass(frozen=True, eq=False)
 class FollowerStiffness:
     """Forces (y, x[, z]) per displacement of nodes, `rate` (l, 1 + d): of the `loaded` nodes (l,) among the
-    near ones, along x (`way` 1) or z (2).
+    near ones, along x (`axis` 1) or z (2).
     """
 
     loaded: Ints
-    way: Ints
+    axis: Ints
     rate: Floats
 
     @classmethod
@@ -35,8 +32,8 @@ class FollowerStiffness:
         """From the rates of all nodes (k, 1 + d, d); on flat surfaces without slopes of friction none
         counts.
         """
-        loaded, way = np.nonzero(rate.any(axis=1))
-        return cls(loaded, way + 1, rate[loaded, :, way])
+        loaded, axis = np.nonzero(rate.any(axis=1))
+        return cls(loaded, axis + 1, rate[loaded, :, axis])
 
     @property
     def _first(self) -> Ints:
@@ -52,20 +49,20 @@ class FollowerStiffness:
         """(1 - C T)^-1 applied to the compliance (m, m) and to motions (m, p): T has few columns."""
         if not self.loaded.size:
             return C, W
-        x, B = self._first + self.way, self._through(C)
+        x, B = self._first + self.axis, self._through(C)
         gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
         return C + gain @ C[x], W + gain @ W[x]
 
     def force(self, moved: Floats) -> Floats:
         """Change of the forces (m,) by displacements (m,)."""
         change = np.zeros((moved.size // self.rate.shape[1], self.rate.shape[1]))
-        np.add.at(change, self.loaded, self.rate * moved[self._first + self.way, None])
+        np.add.at(change, self.loaded, self.rate * moved[self._first + self.axis, None])
         return change.ravel()
 
     def transposed(self, rows: Floats) -> Floats:
         """Rows (p, m) times T."""
         through = np.zeros_like(rows)
-        through[:, self._first + self.way] = self._through(rows)
+        through[:, self._first + self.axis] = self._through(rows)
         return through
 
 

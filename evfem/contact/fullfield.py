@@ -3,25 +3,21 @@ r"""The attraction of the pad from the full field instead of column by column.
 Below the part of the outline that faces the display (its flanks keep the column law) Poisson's problem is
 solved in insulator, air and stratum corneum, in columns that stand at the pad nodes, on quadratic edges
 between them too, and move with them (`evfem.field.columns`). The electrode is at the voltage, living tissue
-at 0; the skin's layer is as thick above each node as it is undeformed. Nodes that touch keep `SERIES_GAP` of
-the insulator's reduced thickness, and what rough faces keep, as a gap in series. Nodal forces are derivatives
-of the discrete energy
+at 0. Nodes that touch keep `SERIES_GAP` of the insulator's reduced thickness, and what rough faces keep, as a
+gap in series. Nodal forces are derivatives of the discrete energy
 
-.. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)},
+.. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)}.
 
-with tangential parts. The outer iteration of a step takes them as they are; its tangent is that of
-the column law, which they are close to, so contact, friction and controls know nothing of the
-field; between rough faces it is scaled by the ratio of the forces (`tangent_factor`).
-Where that tangent leads nowhere, among ridges or steep waves close to a thin insulator, it is
-replaced by the field's own (`fringe_stiffness`), by differences: a node's field decays within a few
-nodes, so every `APART`-th one is moved at once, and the potential follows with the factor of
-where it began (`Columns.nearby`). In every accepted state C lies between its bounds (`certificate`).
+The tangent of a step is that of the column law, between rough faces scaled by the ratio of the forces
+(`tangent_factor`). Where it leads nowhere, among ridges or steep waves close to a thin insulator, it is the
+field's own by differences (`fringe_stiffness`): a node's field decays within a few nodes, so every
+`APART`-th one is moved at once. In every accepted state C lies between its bounds (`certificate`).
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -35,18 +31,18 @@ from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
-from evfem.field.columns import Capacitance, Columns, Nearby
+from evfem.field.columns import Capacitance, Columns
 from evfem.surface.pad import Pad, surface_state
 
-#: gap of touching nodes, as a share of the insulator's reduced thickness
+#: gap of touching nodes, as a fraction of the insulator's reduced thickness
 SERIES_GAP = 1e-4
 #: outer edges steeper than this, ``|n_y|`` below it, belong to the flanks
 FLANK = 0.3
-#: rows as shares of the layers' heights: fine where insulator and skin meet the air
+#: rows as fractions of the layers' heights: fine where insulator and skin meet the air
 INSULATOR = 1.0 - np.linspace(1.0, 0.0, 5) ** 2
 AIR = np.linspace(0.0, 1.0, 5)
 SKIN = np.linspace(0.0, 1.0, 6) ** 2
-#: share by which a discrete capacitance may miss its bounds
+#: fraction by which a discrete capacitance may miss its bounds
 MARGIN = 1e-3
 #: columns follow an outline up to this slope
 STEEP = 6.0
@@ -82,16 +78,16 @@ def in_sight(places: Floats) -> Ints:
 
 def facing(pad: Pad, points: Floats) -> Ints:
     """Edges (K,), left to right, of the chain below the lowest node's flanks; `points` (P, 2) undeformed."""
-    way = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
+    edge = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
     after = {int(edge[0]): k for k, edge in enumerate(pad.edges)}
     before = {int(edge[1]): k for k, edge in enumerate(pad.edges)}
     start = int(np.argmin(points[pad.edges[:, :2], 1].min(axis=1)))
     chain = [start]
-    while (k := after.get(int(pad.edges[chain[-1], 1]))) is not None and way[k, 0] > 0.0 and k != start:
+    while (k := after.get(int(pad.edges[chain[-1], 1]))) is not None and edge[k, 0] > 0.0 and k != start:
         chain.append(k)
-    while (k := before.get(int(pad.edges[chain[0], 0]))) is not None and way[k, 0] > 0.0 and k != chain[-1]:
+    while (k := before.get(int(pad.edges[chain[0], 0]))) is not None and edge[k, 0] > 0.0 and k != chain[-1]:
         chain.insert(0, k)
-    flat = way[chain, 0] >= FLANK * np.hypot(*way[chain].T)
+    flat = edge[chain, 0] >= FLANK * np.hypot(*edge[chain].T)
     flat[chain.index(start)] = True
     ends = np.flatnonzero(flat)[[0, -1]]
     return np.array(chain[ends[0] : ends[1] + 1])
@@ -147,11 +143,15 @@ class FieldAttraction(Attraction):
         return self.pad
 
     @cached_property
+    def column_law(self) -> Attraction:
+        """The column law on all edges, for the tangent."""
+        return Attraction(**{each.name: getattr(self, each.name) for each in fields(Attraction)})
+
+    @cached_property
     def flanks(self) -> Attraction:
         """The column law on the other edges."""
         others = np.setdiff1d(np.arange(len(self._plane.edges)), self.edges)
-        pad = replace(self._plane, edges=self._plane.edges[others])
-        return Attraction(self.law, self.layers, pad, self.surface, self.direction, True, self.roughness)
+        return replace(self.column_law, pad=replace(self._plane, edges=self._plane.edges[others]))
 
     @cached_property
     def _lines(self) -> Any:
@@ -159,9 +159,8 @@ class FieldAttraction(Attraction):
         ends = self._plane.edges[self.edges]
         if ends.shape[1] == 2:
             node = np.append(ends[:, 0], ends[-1, 1])
-            return sparse.csr_matrix(
-                (np.ones(node.size), (np.arange(node.size), node)), (node.size, self._size)
-            )
+            every = np.arange(node.size)
+            return sparse.csr_matrix((np.ones(node.size), (every, node)), (node.size, self._size))
         at = np.arange(PARTS) / PARTS
         shapes = np.stack([(1 - at) * (1 - 2 * at), at * (2 * at - 1), 4 * at * (1 - at)], axis=1)
         row = np.repeat(np.arange(PARTS * len(ends)), 3)
@@ -178,12 +177,12 @@ class FieldAttraction(Attraction):
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
         """Forces (W, P, 2) at W places of a way, each from its own solution."""
-        share = self.share(positions[..., 0])[..., None]
-        forces = share**2 * self.flanks.forces_along(positions, voltages, touching, pressing)
+        fraction = self.voltage_fraction(positions[..., 0])[..., None]
+        forces = fraction**2 * self.flanks.forces_along(positions, voltages, touching, pressing)
         for k, (position, voltage) in enumerate(zip(positions, voltages.tolist(), strict=True)):
             if voltage != 0.0:
                 own = None if pressing is None else pressing[k]
-                forces[k] += voltage**2 * self._unit_forces(position, own)
+                forces[k] += voltage**2 * self._remembered(position, own)[1]
         return forces
 
     def weights(self, position: Floats) -> Floats:
@@ -193,19 +192,6 @@ class FieldAttraction(Attraction):
         own = lines.T @ (np.append(half, 0.0) + np.append(0.0, half))
         return np.asarray(own + self.flanks.pad.tributary(position))
 
-    def column_forces(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """The column law's forces (P, 2), for the tangent."""
-        pressed = None if pressing is None else pressing[None]
-        return self.way_forces(position[None], np.array([voltage]), touching, pressed)[0]
-
-    def way_forces(
-        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """The column law's forces (W, P, 2)."""
-        return Attraction.forces_along(self, positions, voltages, touching, pressing)
-
     has_fringes = True
     rounding = FIELD_ROUNDING
 
@@ -214,18 +200,14 @@ class FieldAttraction(Attraction):
         """Without rough faces, whose gap depends on the contact forces."""
         return self.roughness is None
 
-    def tangent_factor(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """Factor (P,) of the column law's derivatives: the squared share of the voltage below a node.
-
-        Between rough faces it is the ratio of the field's force to the columns', at most 1: on a summit the
-        field pulls less, and gains less. Without them a field may pull less and yet weaken faster with the
-        gap.
+    def tangent_factor(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
+        """Factor (P,) of the column law's derivatives: the squared fraction of the voltage below a node,
+        between rough faces the ratio of the field's force to the columns', at most 1: on a summit it gains
+        less.
         """
         if self.roughness is None:
-            return self.share(position[:, 0]) ** 2
-        columns = self.column_forces(position, voltage, touching, pressing)[:, 1]
+            return self.voltage_fraction(position[:, 0]) ** 2
+        columns = self.column_law.forces(position, voltage, touching, pressing)[:, 1]
         forces = self.forces(position, voltage, touching, pressing)[:, 1]
         pulled = columns < 0.0
         return np.where(pulled, np.clip(forces / np.where(pulled, columns, 1.0), 0.0, 1.0), 1.0)
@@ -249,21 +231,17 @@ class FieldAttraction(Attraction):
         before, after = self.solve(begin), self.solve(end)
         energy = 0.25 * sum(squared) * (after.value - before.value)
         ends = zip(squared, (begin, end), strict=True)
-        forces = sum(square * self._unit_forces(at, None) for square, at in ends)
+        forces = sum(square * self._remembered(at, None)[1] for square, at in ends)
         return energy - 0.5 * float(np.sum(forces * (end - begin)))
 
     def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
-        """The field under the pad at `position` (P, 2); the last solutions are remembered."""
+        """The field under the pad at `position` (P, 2)."""
         found = self._remembered(position, pressing)[0]
         assert found is not None
         return found
 
-    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
-        """Forces (P, 2) of the field at 1 V."""
-        return self._remembered(position, pressing)[1]
-
     def _remembered(self, position: Floats, pressing: Floats | None) -> tuple[Capacitance | None, Floats]:
-        """Field and forces, anew where they are not among the last `KEPT`."""
+        """Field and forces (P, 2) at 1 V, anew where they are not among the last `KEPT`."""
         key = position.tobytes()
         if self.roughness is not None and pressing is not None:
             key += pressing.tobytes()
@@ -275,48 +253,40 @@ class FieldAttraction(Attraction):
         return found
 
     def _above(
-        self, position: Floats, lines: Any, pressing: Floats | None, near: Nearby | None = None
+        self, position: Floats, lines: Any, pressing: Floats | None
     ) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
         x, levels = self.outline(position, lines, pressing)
-        field, forces = self._solved(
-            x, levels, surface_state(self.surface, lines @ position).slope[:, 0], near
-        )
+        field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope[:, 0])
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
         """Derivative of `forces` by positions, sparse (2 P, 2 P); touching nodes move along the surface."""
         lines, frame = self.visible(position), surface_state(self.surface, position)
         nodes = in_line(self._plane, self.edges)
-        closed, near = frame.gap <= TOUCHING, self._nearby(*self.outline(position, lines, pressing))
-        start = self._above(position, lines, pressing, near)[1]
-        ways = np.zeros((2, self._size, 2))
-        ways[0, :, 0] = 1.0
-        ways[0, closed, 1], ways[1, ~closed, 1] = frame.slope[closed, 0], 1.0
+        closed = frame.gap <= TOUCHING
+        start = self._above(position, lines, pressing)[1]
+        directions = np.zeros((2, self._size, 2))
+        directions[0, :, 0] = 1.0
+        directions[0, closed, 1], directions[1, ~closed, 1] = frame.slope[closed, 0], 1.0
         triplets = []
         for axis, first in product(range(2), range(min(APART, nodes.size))):
             moved = nodes[first::APART]
             place = position.copy()
-            place[moved] += MOVED * ways[axis, moved]
-            rate = voltage**2 / MOVED * (self._above(place, lines, pressing, near)[1] - start)[nodes]
+            place[moved] += MOVED * directions[axis, moved]
+            rate = voltage**2 / MOVED * (self._above(place, lines, pressing)[1] - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
             triplets += [(rate[:, k], 2 * nodes + k, column) for k in range(2)]
         value, row, column = (np.concatenate(part) for part in zip(*triplets, strict=True))
         size = 2 * self._size
         outer = self.flanks.stiffness(position, voltage, np.ones(self._size, dtype=bool), pressing)
-        share = sparse.diags_array(np.repeat(self.share(position[:, 0]) ** 2, 2))
-        return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(share @ outer)
+        scale = sparse.diags_array(np.repeat(self.voltage_fraction(position[:, 0]) ** 2, 2))
+        return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(scale @ outer)
 
-    def _nearby(self, x: Floats, levels: Floats) -> Nearby | None:
-        """Start values of the fields of close outlines; None if each is solved anew."""
-        return None if self.floating or self._electrodes is not None else self._columns.nearby(x, levels)
-
-    def _solved(
-        self, x: Floats, levels: Floats, slope: Floats, near: Nearby | None = None
-    ) -> tuple[Capacitance | None, Floats]:
+    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
         """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""
-        found = self._columns.solve(x, levels, self._electrodes, self.floating, near)
+        found = self._columns.solve(x, levels, self._electrodes, self.floating)
         along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
         return found, 0.5 * np.stack([along, found.by_level[2:].sum(axis=0)], axis=1)
 
@@ -326,11 +296,11 @@ class FieldAttraction(Attraction):
         electrodes = getattr(self.surface, "electrodes", None)
         return None if electrodes is None else np.asarray(electrodes, dtype=float)
 
-    def share(self, x: Floats) -> Floats:
-        """Share of the voltage of the electrode below x (...); 0 where there is none."""
+    def voltage_fraction(self, x: Floats) -> Floats:
+        """Fraction of the voltage of the electrode below x (...); 0 where there is none."""
         if self._electrodes is None:
             return np.ones_like(x)
-        over = [np.where((x >= a) & (x <= b), share, 0.0) for a, b, share in self._electrodes]
+        over = [np.where((x >= a) & (x <= b), fraction, 0.0) for a, b, fraction in self._electrodes]
         return np.asarray(sum(over))
 
     @cached_property

@@ -1,10 +1,9 @@
 r"""Unilateral contact with Coulomb friction on the dense compliance of the contact candidates: the problem,
 its laws, and its equations where every node has a status.
 
-A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered
-per node (n, t) or (n, t1, t2). With the contact forces :math:`\lambda` the new gaps and slips are
-:math:`v = (g, s) = v_0 + C\lambda + e\,d`, where d are optional extra unknowns (the bone's travel under a
-prescribed force, the squared voltage under a prescribed friction force) with the equations
+A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered per
+node. With the contact forces :math:`\lambda` the new gaps and slips are :math:`v = (g, s) = v_0 + C\lambda +
+e\,d`, where d are extra unknowns (the bone's travel under a prescribed force) with the equations
 :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
 
 ======  ==============================  =====================================================
@@ -21,16 +20,13 @@ e = z/abs(z), and the direction is an unknown of its own (`solve_statuses`). The
 .. math:: \lambda_n = \max(0, p), \quad \lambda_t = \mathrm{proj}_{\mu\lambda_n}(z), \qquad
           p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
 
-for any positive r; taken is the inverse of the node's own compliance. Where the attraction grows with
-areas that follow the nodes, that may vanish or be negative: r is then bounded by what is usual among the
-nodes, and g = 0 to rounding stays a small p.
+for any positive r; taken is the inverse of the node's own compliance, bounded by what is usual among the
+nodes where it vanishes or is negative.
 
-The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
-has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
-none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
-only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
-closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
-gained. For the tangent of a concave law one of the two statuses is always consistent.
+The attraction of an open node weakens with its gap, a negative stiffness k_e: its drop is one more unknown,
+f = k_e (g - g_ref). A closed node needs none, as its gap is known. Between rough faces the attraction also
+grows with what presses the node (`Roughness`): a closed node moves the body with (1 - kappa) lam_n, and one
+that opens loses what its contact force gained.
 
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
@@ -48,8 +44,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import DISC_OWN
+from evfem.common.arrays import DenseSolver, Floats, Ints
+from evfem.common.constants import DISC_OWN, ROUNDING
 
 
 @dataclass(frozen=True)
@@ -69,9 +65,8 @@ class Roughness:
 
 @dataclass(frozen=True)
 class AttractionStiffness:
-    """Linearised attraction of every node: it decreases by `negative_stiffness` (k,) per unit of gap from
-    its value at `reference_gap` (k,) while open, and is larger by `gain_on_closing` (k,) at g = 0.
-    `roughness` is its dependence on the contact force there.
+    """Linearised attraction of every node: it decreases by `negative_stiffness` (k,) per unit of gap from its
+    value at `reference_gap` (k,), is larger by `gain_on_closing` (k,) at g = 0, and depends on contact there.
     """
 
     negative_stiffness: Floats
@@ -80,26 +75,8 @@ class AttractionStiffness:
     roughness: Roughness | None = None
 
 
-def feedback(compliance: Floats, held_by: Floats, gaps: Ints, held: Ints, stiffness: Floats) -> float:
-    """Largest factor by which the attraction of open nodes returns to itself: from 1 on they snap.
-
-    Their `gaps` (m,) are rows of the compliance, and the attraction weakens with them by `stiffness`
-    (m,). The rows `held` (h,) of closed nodes do not move; `held_by` is the compliance to their forces.
-    """
-    if not gaps.size:
-        return 0.0
-    free = compliance[np.ix_(gaps, gaps)]
-    if held.size:
-        back = np.linalg.solve(held_by[np.ix_(held, held)], compliance[np.ix_(held, gaps)])
-        free = free - compliance[np.ix_(gaps, held)] @ back
-    root = np.sqrt(stiffness)
-    gain = root[:, None] * free * root
-    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
-
-
 #: of a node; `FORWARD` or `BACKWARD` in the plane where it slips, `SLIP` in three dimensions
-OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
-SLIP = 2
+OPEN, STICK, FORWARD, BACKWARD, SLIP = 0, 1, 2, 3, 2
 NO_NODES: Ints = np.zeros(0, dtype=np.int64)
 
 
@@ -129,10 +106,10 @@ class ExtraUnknowns:
     conditioned: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
-    def followed(self) -> Floats:
-        """Reduction of the compliance (m, m) by the conditioned components."""
+    def followed(self) -> tuple[Floats, Any]:
+        """Factors (m, c), (c, m) of what the conditioned components take off the compliance."""
         some = self.conditioned
-        return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
+        return self.columns[:, some], np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +127,8 @@ class ContactProblem:
     (n, t[, t2]), friction coefficients (k,), optional extra_unknowns and attraction, the shear force that
     friction has without a pressing one, `cohesion` (k,) in N/mm (N in three dimensions), and how far the
     interface itself gives way to contact forces, not to attraction, `give` (m,) in mm per N/mm.
-    `chords` (k,): coefficients that take the place of tangents and cohesion of a friction law.
+    `chords` (k,): coefficients that take the place of tangents and cohesion of a friction law. The laws hold
+    to `tolerance`, relative to the largest force; `dense` solves.
     """
 
     start: Floats
@@ -161,6 +139,8 @@ class ContactProblem:
     cohesion: Floats | None = None
     give: Floats | None = None
     chords: Floats | None = None
+    tolerance: float = ROUNDING
+    dense: DenseSolver = field(default_factory=DenseSolver)
 
     @property
     def by_chords(self) -> ContactProblem:
@@ -235,11 +215,6 @@ class ContactSolution:
     solves: int
     reduced: bool = False
 
-    @classmethod
-    def of(cls, problem: ContactProblem, forces: Forces, status: Ints, solves: int) -> ContactSolution:
-        """These forces, with these statuses of the nodes, after so many dense solves."""
-        return cls(forces.contact, forces.drop, status, forces.extra, problem.state(forces), solves)
-
 
 @dataclass(frozen=True, eq=False)
 class Projected:
@@ -271,94 +246,83 @@ class Projected:
         return cls(p, z, status, np.abs(wanted - force).max(axis=1) / scale)
 
 
+def side(status: Ints) -> Floats:
+    """Side (k, 1) along which friction acts in the plane, against the slip; 0 where nothing slips."""
+    return np.subtract(status == BACKWARD, status == FORWARD, dtype=float)[:, None]
+
+
 def sizes(vectors: Floats) -> Floats:
     """Lengths (k,) of vectors (k, d) in the plane of contact."""
     return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1] if vectors.shape[1] > 1 else 0.0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Unknowns:
-    """Those of nodes with statuses: at `place` (u,) of the m components first the pressing forces of the
-    `closed` nodes, which the body feels as `felt` (c, 1 + d), the shear forces of those that stick, and
-    the drops of the `attracted` open ones; then the shear forces of the `turned` nodes (t,) along `aside`
-    (t, d), which keep the share `kept` (t,), the slip across counting `turns` (t,).
+class _Equations:
+    """Unknowns and equations of nodes that have these statuses (k,).
+
+    Per node, (k, 1 + d), are known: the force of a closed one that presses with 1, `sheared`, the attraction
+    that this adds, `gain`, and the `drop` and `shear` that no unknown changes. Unknown are, at `place` of the
+    m components, first the pressing forces of the `closed` nodes, which the body feels as `felt` (c, 1 + d),
+    the shear forces of those that stick, and the drops of the `attracted` open ones; then the shear forces
+    of the `turned` nodes (t,) along `aside` (t, 2), of which the fraction `kept` (t,) stays, the slip across
+    counting `turns` (t,). All components that act with them are `whole` (w,), at `index` (m,) of these.
     """
 
-    place: Ints
-    closed: Ints
-    attracted: Ints
-    felt: Floats
-    turned: Ints
-    aside: Floats
-    kept: Floats
-    turns: Floats
+    def __init__(
+        self, problem: ContactProblem, status: Ints, along: Floats, turning: Floats | None = None
+    ) -> None:
+        n, opened, resists = problem.dim, (status == OPEN)[:, None], problem.resists
+        along = np.where((status >= SLIP)[:, None], along, 0.0)
+        self.sheared = np.hstack([np.ones(opened.shape), problem.friction[:, None] * along])
+        self.gain, self.drop, self.shear = np.zeros((3, *self.sheared.shape))
+        if problem.cohesion is not None:
+            self.shear[:, 1:] = problem.cohesion[:, None] * along
+        attracted = np.zeros(0, dtype=np.int64)
+        if (attraction := problem.attraction) is not None:
+            attracted = np.flatnonzero(opened[:, 0] & (attraction.negative_stiffness > 0.0))
+            self.drop[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
+            if (rough := attraction.roughness) is not None:
+                self.gain = rough.gain
+                self.drop += np.where(opened, rough.loss_on_opening, rough.gain * rough.present[:, None])
+        turned = np.flatnonzero((status == SLIP) & resists & (turning is not None))
+        m = np.ones(status.size) if turning is None else turning
+        self.attracted, self.turned, self.closed = attracted, turned, np.flatnonzero(status != OPEN)
+        self.aside = along[turned, ::-1] * np.array([-1.0, 1.0]) if turned.size else np.zeros((0, n - 1))
+        self.kept, self.turns = 1.0 - m[turned], m[turned] / problem.own[1][turned]
+        self._find(n, status)
 
-    @classmethod
-    def of(
-        cls, problem: ContactProblem, known: _Known, status: Ints, turning: tuple[Floats, Floats] | None
-    ) -> _Unknowns:
-        n, closed, stick = problem.dim, np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
-        attracted = turned = np.zeros(0, dtype=np.int64)
-        aside = kept = turns = np.zeros(0)
-        if problem.attraction is not None:
-            attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
-        if turning is not None:
-            turned = np.flatnonzero((status == SLIP) & problem.resists)
-            aside = turning[0][turned, ::-1] * np.array([-1.0, 1.0])
-            kept, turns = 1.0 - turning[1][turned], turning[1][turned] / problem.own[1][turned]
-        held = (n * stick[:, None] + np.arange(1, n)).ravel()
-        place = np.concatenate([n * closed, held, n * attracted])
-        return cls(place, closed, attracted, (known.sheared - known.gain)[closed], turned, aside, kept, turns)
+    def _find(self, n: int, status: Ints) -> None:
+        """Where among the m components the unknowns are, and what acts with them."""
+        closed, tangents = self.closed, np.arange(1, n)
+        self.felt = (self.sheared - self.gain)[closed]
+        sheared = closed[(status[closed] != STICK) & self.felt[:, 1:].any(axis=1)]
+        beside = np.append(self.turned, np.setdiff1d(sheared, self.turned))
+        held = (n * np.flatnonzero(status == STICK)[:, None] + tangents).ravel()
+        self.place = np.concatenate([n * closed, held, n * self.attracted])
+        self.whole = np.append(self.place, (tangents[:, None] + n * beside).ravel())
+        self.index = np.zeros(n * status.size, dtype=np.int64)
+        self.index[self.whole] = np.arange(self.whole.size)
 
     def columns(self, C: Floats) -> Floats:
-        """Their effect on the rows of C, (q, m)."""
-        found, n = C[:, self.place], self.felt.shape[1]
-        first = found[:, : self.closed.size]
+        """Effect of the unknowns (q, u) from that of the `whole` (q, w), which is overwritten."""
+        n, first = self.felt.shape[1], C[:, : self.closed.size]
         if (self.felt[:, 0] != 1.0).any():
             first *= self.felt[:, 0]
         for a in range(1, n):
             if (some := np.flatnonzero(self.felt[:, a])).size:
-                first[:, some] += C[:, n * self.closed[some] + a] * self.felt[some, a]
-        if not self.turned.size:
-            return found
-        across = (C[:, n * self.turned + 1 + a] * self.aside[:, a] for a in range(n - 1))
-        return np.hstack([found, sum(across)])
+                first[:, some] += C[:, self.index[n * self.closed[some] + a]] * self.felt[some, a]
+        return self._across(C.T, self.aside).T
 
     def rows(self, v: Floats) -> Floats:
-        """Their equations' part of gaps and slips v (m, q)."""
-        if not self.turned.size:
-            return v[self.place]
-        n, weight = self.felt.shape[1], self.turns[:, None] * self.aside
-        across = (v[n * self.turned + 1 + a] * weight[:, a, None] for a in range(n - 1))
-        return np.vstack([v[self.place], sum(across)])
+        """The equations' part (u, q) of gaps and slips of the `whole` (w, q), which are overwritten."""
+        return self._across(v, self.turns[:, None] * self.aside)
 
-
-@dataclass(frozen=True, eq=False)
-class _Known:
-    """Per node, (k, 1 + d): the force of a closed one that presses with 1, what attraction that adds
-    (`gain`), and the drops and shear forces that no unknown changes.
-    """
-
-    sheared: Floats
-    gain: Floats
-    drop: Floats
-    shear: Floats
-
-    @classmethod
-    def of(cls, problem: ContactProblem, status: Ints, along: Floats) -> _Known:
-        k, attraction, opened = problem.size, problem.attraction, (status == OPEN)[:, None]
-        along = np.where((status >= SLIP)[:, None], along, 0.0)
-        sheared = np.hstack([np.ones((k, 1)), problem.friction[:, None] * along])
-        gain, drop, shear = np.zeros_like(sheared), np.zeros_like(sheared), np.zeros_like(sheared)
-        if problem.cohesion is not None:
-            shear[:, 1:] = problem.cohesion[:, None] * along
-        if attraction is None:
-            return cls(sheared, gain, drop, shear)
-        drop[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
-        if (rough := attraction.roughness) is not None:
-            gain = rough.gain
-            drop += np.where(opened, rough.loss_on_opening, gain * rough.present[:, None])
-        return cls(sheared, gain, drop, shear)
+    def _across(self, v: Floats, weight: Floats) -> Floats:
+        """v (w, q) with the tangential components of turned nodes as one, by a `weight` (t, 2) of each."""
+        size, end = self.place.size, self.place.size + self.turned.size
+        if self.turned.size:
+            v[size:end] *= weight[:, :1]
+            v[size:end] += v[self.index[self.felt.shape[1] * self.turned + 2]] * weight[:, 1:]
+        return v[:end]
 
 
 def solve_statuses(
@@ -373,42 +337,43 @@ def solve_statuses(
 
     with m given as `turning` (k,); at the solution r drops out.
     """
-    k, n, extra = problem.size, problem.dim, problem.extra_unknowns
-    known = _Known.of(problem, status, along)
-    unknowns = _Unknowns.of(problem, known, status, None if turning is None else (along, turning))
-    place, closed, attracted = unknowns.place, unknowns.closed, unknowns.attracted
-    rows = unknowns.rows(problem.compliance)
-    matrix, right = unknowns.columns(rows), -unknowns.rows(problem.start[:, None])[:, 0]
+    extra, system = problem.extra_unknowns, _Equations(problem, status, along, turning)
+    place, closed, attracted, whole = system.place, system.closed, system.attracted, system.whole
+    steady = (system.drop + system.shear).ravel()
+    start = problem.start + problem.compliance @ steady if steady.any() else problem.start
+    right = -system.rows(start[whole, None])
+    matrix = system.rows(system.columns(problem.compliance[np.ix_(whole, whole)]))
     pressed, own = np.split(np.arange(place.size), [place.size - attracted.size])
-    last, steady = np.arange(place.size, right.size), (known.drop + known.shear).ravel()
-    matrix[last, last] += unknowns.kept
+    last = np.arange(place.size, len(right))
+    matrix[last, last] += system.kept
     if problem.give is not None:
         matrix[pressed, pressed] += problem.give[place[pressed]]
-    if steady.any():
-        right -= rows @ steady
     if attracted.size:
         assert problem.attraction is not None
         matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
-        right[own] += problem.attraction.reference_gap[attracted]
-    if extra is not None:
-        moved, balance = unknowns.rows(extra.columns), unknowns.columns(extra.rows)
-        matrix = np.block([[matrix, moved], [balance, extra.pivot]])
-        right = np.append(right, extra.right - extra.rows @ steady)
-    x: Any = np.linalg.solve(matrix, right)
-    pressing = np.zeros((k, 1))
+        right[own, 0] += problem.attraction.reference_gap[attracted]
+    names = whole.tobytes(), last.size
+    if extra is None:
+        x, d = problem.dense.solve(matrix, right, names)[:, 0], np.zeros(0)
+    else:
+        balance, rest = system.columns(extra.rows[:, whole]), extra.right - extra.rows @ steady
+        right = np.hstack([right, system.rows(extra.columns[whole])])
+        both = problem.dense.solve(matrix, right, names)
+        d = np.linalg.solve(extra.pivot - balance @ both[:, 1:], rest - balance @ both[:, 0])
+        x = both[:, 0] - both[:, 1:] @ d
+    pressing = np.zeros((problem.size, 1))
     pressing[closed, 0] = x[: closed.size]
-    force, drop = known.shear + pressing * known.sheared, known.drop - pressing * known.gain
+    force, drop = system.shear + pressing * system.sheared, system.drop - pressing * system.gain
     force.ravel()[place[closed.size : pressed.size]] = x[closed.size : pressed.size]
-    force[unknowns.turned, 1:] += x[last, None] * unknowns.aside.reshape(-1, n - 1)
+    force[system.turned, 1:] += x[last, None] * system.aside
     drop[attracted, 0] += x[own]
-    return Forces(force.ravel(), drop.ravel(), x[place.size + last.size :])
+    return Forces(force.ravel(), drop.ravel(), d)
 
 
 def linearised(problem: ContactProblem, found: Projected) -> Forces:
     """The forces that solve the equations linearised where the laws were projected."""
     if problem.dim == 2:
-        against = np.subtract(found.status == BACKWARD, found.status == FORWARD, dtype=float)
-        return solve_statuses(problem, found.status, against[:, None])
+        return solve_statuses(problem, found.status, side(found.status))
     size = np.maximum(sizes(found.z), 1e-200)
     limit = np.where(found.status == SLIP, np.maximum(problem.limit(found.p), 0.0), 0.0)
     return solve_statuses(problem, found.status, found.z / size[:, None], np.minimum(1.0, limit / size))

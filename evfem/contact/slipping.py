@@ -22,14 +22,11 @@ HALVINGS = 60
 
 
 class OscillatingNodes:
-    """Nodes that have slipped and stick again, or whose speed oscillates: `nodes` (P,) bool.
-
-    The tangent of a law that rises steeply from rest and levels off, extrapolated to rest, overestimates
-    static friction: the node would slip and stick in turn; at a kink each side may lead to the other. Such a
-    node is placed at the speed at which the law gives its present force, with the tangent there, or, if it
-    sticks under more than static friction, with the chord from rest. If no speed so far gives that force, a
-    slipping node has the steepest of chord, tangent and last slope, near the end the tangent; a sticking
-    node has the last slope.
+    """Nodes that have slipped and stick again, or whose speed oscillates: `nodes` (P,) bool. The tangent of
+    such a law, extrapolated to rest, overestimates static friction. The node is placed at the speed at which
+    the law gives its present force, with the tangent there, or, if it sticks under more than static friction,
+    with the chord from rest. If no speed so far gives that force, a slipping node has the steepest of chord,
+    tangent and last slope, near the end the tangent; a sticking node has the last slope.
     """
 
     def __init__(self, size: int) -> None:

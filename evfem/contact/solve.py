@@ -11,12 +11,9 @@ Newton's method on the laws as projections, a primal-dual active set::
         change all violated nodes; from the first statuses on that have been met before, the worst one
             alone; give up where these go round in a circle
 
-No constant has to be chosen. What has not converged is never used. In three dimensions it begins again from
-what the laws make of the last iteration's forces after the motion, then with the nodes that touched, and
-with all nodes, sticking: slips found by chance may drive it about, but nothing changes for nodes that stick.
-
-If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no solution, or
-the wrong one; its negative stiffness is then scaled to 0.9 of the critical value (`solve_with_attraction`).
+What has not converged is never used. In three dimensions it begins again from what the laws make of the last
+iteration's forces after the motion, then with the nodes that touched, and with all nodes, sticking: slips
+found by chance may drive it about, but nothing changes for nodes that stick.
 
 The projections' sources are in `evfem.contact.signorini`; primal-dual active set: S. Hueeber, G. Stadler,
 B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
@@ -27,12 +24,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
+from evfem.common.constants import ACTIVE_SET_LIMIT, STABLE
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
@@ -45,7 +41,6 @@ from evfem.contact.signorini import (
     ContactSolution,
     Forces,
     Projected,
-    feedback,
     linearised,
 )
 
@@ -61,8 +56,9 @@ def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = 
         forces, found, solves, softest = _newton(problem, start)
         total += solves
         if forces is not None:
-            return ContactSolution.of(problem, forces, found.status, total)
-    keep = int((found.miss > ROUNDING).sum())
+            kept = forces.contact, forces.drop, found.status, forces.extra, problem.state(forces)
+            return ContactSolution(*kept, total)
+    keep = int((found.miss > problem.tolerance).sum())
     raise ContactNotSolved(f"{keep} of {problem.size} nodes keep changing", softest)
 
 
@@ -99,7 +95,7 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
         rest = changed if problem.dim == 2 else changed | (after.status == SLIP)
         if not np.isfinite(after.miss).all():
             break
-        if not (after.miss[rest] > ROUNDING).any():
+        if not (after.miss[rest] > problem.tolerance).any():
             return forces, found, solves, softest
         if changed.any():
             softest = np.where(changed, OPEN, found.status)
@@ -121,12 +117,10 @@ def solve_with_attraction(
 ) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted, started from statuses (k,) and forces (m,).
 
-    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
-    linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
-    `STABLE` of the critical value, which gives small steps in the right direction: the critical value
-    with the closed nodes fixed, then with those fixed that no longer change, at last with all nodes
-    free. Friction is linearised by tangents first, then by chords: the tangent of a law that levels
-    off soon may be so steep that there is no solution.
+    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), its negative
+    stiffness is scaled to `STABLE` of the critical value, which gives small steps in the right direction:
+    with the closed nodes fixed, then those that no longer change, at last none. Friction is linearised by
+    tangents first, then by chords: the tangent of a law that levels off soon may be too steep.
     """
     laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:
@@ -164,12 +158,32 @@ def _first(problems: Sequence[ContactProblem], status: Ints, force: Floats | Non
 
 
 def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
-    """`feedback` where the nodes have these statuses (k,)."""
+    """Largest factor by which the attraction of open nodes returns to itself where the nodes have these
+    statuses (k,), from 1 on they snap: it weakens with their gaps, and what is closed does not move.
+    """
     stiffness, opened, n = attraction.negative_stiffness, status == OPEN, problem.dim
-    gaps, stick = np.flatnonzero(opened & (stiffness > 0.0)), np.flatnonzero(status == STICK)
-    held = np.concatenate([n * np.flatnonzero(~opened), *(n * stick + a for a in range(1, n))])
-    taken: Any = 0.0 if problem.extra_unknowns is None else problem.extra_unknowns.followed
-    return feedback(problem.compliance - taken, problem.under_forces - taken, n * gaps, held, stiffness[gaps])
+    pulled, stick = np.flatnonzero(opened & (stiffness > 0.0)), np.flatnonzero(status == STICK)
+    if not pulled.size:
+        return 0.0
+    gaps, held = (
+        n * pulled,
+        np.concatenate([n * np.flatnonzero(~opened), *(n * stick + a for a in range(1, n))]),
+    )
+    left, right = np.zeros((problem.start.size, 0)), np.zeros((0, problem.start.size))
+    if problem.extra_unknowns is not None:
+        left, right = problem.extra_unknowns.followed
+
+    def block(compliance: Floats, rows: Ints, columns: Ints) -> Floats:
+        return np.asarray(compliance[np.ix_(rows, columns)] - left[rows] @ right[:, columns])
+
+    C, under_forces = problem.compliance, problem.under_forces
+    free = block(C, gaps, gaps)
+    if held.size:
+        back = np.linalg.solve(block(under_forces, held, held), block(C, held, gaps))
+        free = free - block(C, gaps, held) @ back
+    root = np.sqrt(stiffness[pulled])
+    gain = root[:, None] * free * root
+    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
 
 
 def _passing(before: Projected, after: Projected) -> Projected:
@@ -178,8 +192,8 @@ def _passing(before: Projected, after: Projected) -> Projected:
     """
     if after.z.shape[1] == 2:
         return after
-    way = after.z[:, 0]
-    enters = (before.status == OPEN) & (after.status == STICK) & (way != 0.0)
+    trial = after.z[:, 0]
+    enters = (before.status == OPEN) & (after.status == STICK) & (trial != 0.0)
     turns = (before.status >= SLIP) & (after.status >= SLIP) & (before.status != after.status)
-    slip = np.where(way < 0.0, FORWARD, BACKWARD)
+    slip = np.where(trial < 0.0, FORWARD, BACKWARD)
     return replace(after, status=np.where(enters, slip, np.where(turns, STICK, after.status)))

@@ -1,20 +1,15 @@
 r"""Which force takes an equilibrium its stability, and how close it is.
 
-At an equilibrium the closed nodes are held along the normal, the sticking ones along the tangent
-too. What is left to move are the slips q of the slipping nodes and the gaps of the open ones. With
-the compliance C of body and bone, local frames, and :math:`m = \pm\mu` of the slipping nodes, forces
-:math:`t` along the slips move them by
+Closed nodes are held along the normal, sticking ones along the tangent too. What is left to move are the
+slips of the slipping nodes and the gaps of the open ones. With the compliance C of body and bone in local
+frames, and :math:`m = \pm\mu` of the slipping nodes, forces along the slips move them by
 
 .. math:: A = C_{tt} - (C_{tn} + C_{tt} m)\,(C_{nn} + C_{nt} m)^{-1} C_{nt},
 
-the held forces eliminated; gaps of open nodes likewise. Four forces grow with such a motion, by
-a stiffness D of their own:
-
-- contact forces that turn with the profile, :math:`D = -\lambda_n (1 + \mu^2)\,h''/(1 + h'^2)^{3/2}`, which
-  is positive on a crest; friction turns with the normal force that it needs,
-- friction whose coefficient falls along the way, :math:`D = -\lambda_n\,d\mu/ds`,
-- friction that falls with the speed, :math:`D = -(db/dv)/\Delta t`,
-- the attraction of open nodes, :math:`D = -A\,dp/dg` with their gaps.
+gaps of open nodes likewise. Four forces grow with such a motion, by a stiffness D of their own: contact
+forces that turn with the profile, :math:`D = -\lambda_n (1 + \mu^2)\,h''/(1 + h'^2)^{3/2}`, positive on a
+crest; friction whose coefficient falls along the path, :math:`D = -\lambda_n\,d\mu/ds`; friction that falls
+with the speed, :math:`D = -(db/dv)/\Delta t`; the attraction of open nodes, :math:`D = -A\,dp/dg`.
 
 `stability_ratio` is the ratio of destabilising to stabilising stiffness: the largest real eigenvalue
 of A D. At 1 stability is lost; the cause named is the force that works most in the eigenvector.
@@ -53,48 +48,35 @@ def stability_ratio(step: LinearContactStep) -> StabilityRatio:
     known, surface = step.candidates, step.candidates.surface
     slipping = np.flatnonzero(known.status >= FORWARD)
     opened = np.flatnonzero((known.status == OPEN) & (known.negative_stiffness > 0.0))
-    ratio, normal = _shear_ratio(step)[slipping], np.maximum(known.force[slipping, 0], 0.0)
+    ratio = (known.friction * known.shear_direction[:, 0])[slipping]
+    normal = np.maximum(known.force[slipping, 0], 0.0)
     turning = -normal * (1.0 + ratio**2) * (surface.curvature[:, 0, 0] / surface.stretch**3)[slipping]
     slope = known.friction_slope[slipping, 0] / surface.stretch[slipping]
-    falling = np.sign(ratio) * normal * slope
-    faster = np.zeros(slipping.size)
-    if known.slip_stiffness is not None:
-        faster = -known.slip_stiffness[slipping]
-    none, far = np.zeros(slipping.size), np.zeros(opened.size)
+    falling, none, far = np.sign(ratio) * normal * slope, np.zeros(slipping.size), np.zeros(opened.size)
+    faster = none if known.slip_stiffness is None else -known.slip_stiffness[slipping]
     grows = {
         SLOPES: np.concatenate([turning, far]),
         FALLING: np.concatenate([falling, far]),
         FASTER: np.concatenate([faster, far]),
         ATTRACTION: np.concatenate([none, known.negative_stiffness[opened]]),
     }
-    share, motion = _fastest(
-        _freed(step, slipping, opened), sum(grows.values(), np.zeros(none.size + far.size))
-    )
-    return StabilityRatio(share, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
-
-
-def _shear_ratio(step: LinearContactStep) -> Floats:
-    """Shear force per pressing force of the candidates (c,): against the slip, 0 unless they slip."""
-    return step.candidates.friction * step.candidates.shear_direction[:, 0]
+    stiffness = sum(grows.values(), np.zeros(none.size + far.size))
+    largest, motion = _fastest(_freed(step, slipping, opened), stiffness)
+    return StabilityRatio(largest, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
 
 
 def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
     """Compliance (f, f) of these slips and gaps, contact held, the bone free where it is loaded."""
-    known = step.candidates
-    C, bone = _compliance(step), _bone(step)
+    known, bone, axes = step.candidates, _bone(step), step.candidates.surface.axes
+    C = local(axes, local(axes, step.among(np.arange(known.status.size))).T).T
+    C = C + np.diag(_yielding(known).ravel())
     closed, stick = np.flatnonzero(known.status != OPEN), np.flatnonzero(known.status == STICK)
     held, free = np.append(2 * closed, 2 * stick + 1), np.append(2 * slipping + 1, 2 * opened)
-    pushes, ratio = np.vstack([C, bone.rows])[:, held], _shear_ratio(step)[closed]
+    pushes, ratio = np.vstack([C, bone.rows])[:, held], (known.friction * known.shear_direction[:, 0])[closed]
     pushes[:, : closed.size] += np.vstack([C, bone.rows])[:, 2 * closed + 1] * ratio
     matrix = np.block([[pushes[held], bone.columns[held]], [pushes[len(C) :], bone.pivot]])
     moved = np.linalg.solve(matrix, np.vstack([C[np.ix_(held, free)], bone.rows[:, free]]))
     return C[np.ix_(free, free)] - np.hstack([pushes[free], bone.columns[free]]) @ moved
-
-
-def _compliance(step: LinearContactStep) -> Floats:
-    """Compliance of the candidates (2 c, 2 c) below a bone that stands still, in their frames."""
-    axes, C = step.candidates.surface.axes, step.among(np.arange(step.candidates.status.size))
-    return local(axes, local(axes, C).T).T + np.diag(_yielding(step.candidates).ravel())
 
 
 def _yielding(known: Candidates) -> Floats:
@@ -116,8 +98,8 @@ def _bone(step: LinearContactStep) -> ExtraUnknowns:
         return ExtraUnknowns(none.T, none, np.zeros((0, 0)), np.zeros(0))
     pushes = np.column_stack([unknown.push for unknown in step.unknowns])
     moved = step.body.compliance @ pushes[:-2]
-    S, share, wanted, carried = step.equations
-    pivot, carried = S[:, :-2] @ moved + share, local(axes, carried[:, rows].T).T
+    S, by_unknowns, wanted, carried = step.equations
+    pivot, carried = S[:, :-2] @ moved + by_unknowns, local(axes, carried[:, rows].T).T
     return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(wanted.size))
 
 

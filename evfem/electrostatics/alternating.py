@@ -29,7 +29,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, above, at_least, finite, plain
-from evfem.electrostatics.dielectrics import dielectric
+from evfem.electrostatics.dielectrics import constants, dielectric
 from evfem.electrostatics.laws import Layer, Layers, StrongTroxel, eps_0
 from evfem.electrostatics.relaxation import Relaxing, Sandwich
 from evfem.errors import InputError, quoted
@@ -106,7 +106,8 @@ def step_pressure(
     voltage = np.asarray(finite("voltage", voltage, "a voltage in V"))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
     layers = Layers(stack.reference, np.asarray(skin_thickness) + insulator.thickness)
-    return StrongTroxel().traction(gap, voltage * stack.step_response(gap, time), layers)
+    charges = stack.after(gap, np.zeros(2), voltage, voltage, time)
+    return StrongTroxel().traction(gap, stack.effective(gap, voltage, charges), layers)
 
 
 def step_rates(
@@ -123,8 +124,13 @@ def step_rates(
     """
     gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
-    slow, fast = stack.eigenvalues(gap)
-    return plain(np.asarray(-fast)), plain(np.asarray(-slow))
+    (k1, k2, k3), (s1, s2, s3) = stack.rates, stack.reduced(gap)
+    # sum of s_j r / (r - k_j) = 0: r^2 - a r + b = 0
+    total = s1 + s2 + s3
+    a = (s1 * (k2 + k3) + s2 * (k1 + k3) + s3 * (k1 + k2)) / total
+    b = (s1 * k2 * k3 + s2 * k1 * k3 + s3 * k1 * k2) / total
+    fast = 0.5 * (a + np.sqrt(np.maximum(a**2 - 4.0 * b, 0.0)))
+    return plain(np.asarray(fast)), plain(np.asarray(b / np.where(fast > 0.0, fast, 1.0)))
 
 
 def _sandwich(
@@ -135,9 +141,10 @@ def _sandwich(
     sigma = np.asarray(at_least("skin_conductivity", conductivity, 0.0, _SIGMA))
     leak = np.asarray(at_least("gap_conductivity", gap_conductivity, 0.0, _SIGMA))
     thickness = np.asarray(at_least("skin_thickness", thickness, 0.0, "a thickness in mm, not negative"))
-    film = Sandwich.of(Layer(0.0, 1.0), _layer(insulator), frequency=None, gap_conductivity=leak)
-    skin = Relaxing(thickness / eps_r, 1.0, sigma / (eps_0 * eps_r))
-    return Sandwich(skin, film.insulator, film.leak, skin.thickness + film.reference)
+    below, loss = constants(_layer(insulator), None)
+    film = Relaxing(insulator.thickness, below, np.asarray(loss) / eps_0)
+    reference = thickness / eps_r + insulator.thickness / below
+    return Sandwich(Relaxing(thickness, eps_r, sigma / eps_0), film, leak / eps_0, reference)
 
 
 def square_wave_pressure(
@@ -179,9 +186,8 @@ def corner_frequencies(
     """
     gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
-    (skin, leak, _), film = stack.rates, stack.insulator.thickness
-    of_gap = leak / (1.0 + gap / film)
-    of_skin = skin / (1.0 + stack.skin.thickness / (gap + film))
+    (skin, leak, _), (solid, air, film) = stack.rates, stack.reduced(gap)
+    of_gap, of_skin = leak / (1.0 + air / film), skin / (1.0 + solid / (air + film))
     return plain(np.asarray(of_gap / (2.0 * np.pi))), plain(np.asarray(of_skin / (2.0 * np.pi)))
 
 

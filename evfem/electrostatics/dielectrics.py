@@ -37,11 +37,8 @@ _POLE = "(d_eps, tau in s, alpha), or with a fourth number for the lower exponen
 _TOLERANCE = "a relative error above 0, up to 0.5"
 #: frequencies of a fit per decade; numbers of relaxation times that are tried, one after the other, and how
 #: far (decades) they may reach beyond the band
-PER_DECADE, POLES, BEYOND = (
-    20,
-    (1, 2, 3, 4, 6, 8, 10, 12, 14, 16, 20, 24, 32, 40),
-    (0.0, 0.25, 0.5, 0.75, 1.0),
-)
+PER_DECADE, BEYOND = 20, (0.0, 0.25, 0.5, 0.75, 1.0)
+POLES = (1, 2, 3, 4, 6, 8, 10, 12, 14, 16, 20, 24, 32, 40)
 #: frequencies (Hz) over which a dielectric becomes a sum of Debye poles, widened to `WIDER` times either
 #: side of the voltage's; largest relative error
 BAND, WIDER, FITTED = (1.0, 1e5), 10.0, 2e-3
@@ -87,28 +84,19 @@ class _Fitted:
         above("f_low", f_low, 0.0, "a frequency in Hz above 0")
         above("f_high", f_high, f_low, "a frequency in Hz above f_low")
         real("tolerance", tolerance, _TOLERANCE, Within(0.0, 0.5, above=True))
-        decades = float(np.log10(f_high / f_low))
-        best = np.inf
-        band = _band(f_low, f_high, decades)
+        best, decades = np.inf, float(np.log10(f_high / f_low))
+        band = np.geomspace(f_low, f_high, 2 + int(np.ceil(PER_DECADE * decades)))
+        ends = [
+            (2.0 * np.pi * f_high * 10.0**beyond, 2.0 * np.pi * f_low / 10.0**beyond) for beyond in BEYOND
+        ]
         for number in POLES:
-            tried = [_fit(self, band, _times(f_low, f_high, number, reach)) for reach in BEYOND]
+            tried = [_fit(self, band, 1.0 / np.geomspace(*end, number)) for end in ends]
             found, error = min(tried, key=lambda one: one[1])
             if error <= tolerance:
                 return found
             best = min(best, error)
         allowed = f"an error that Debye poles can reach; these come to {best:.2g}"
         raise InputError("tolerance", tolerance, allowed)
-
-
-def _band(low: float, high: float, decades: float) -> Floats:
-    """Frequencies (Hz) at which a fit is compared."""
-    return np.geomspace(low, high, 2 + int(np.ceil(PER_DECADE * decades)))
-
-
-def _times(low: float, high: float, number: int, reach: float) -> Floats:
-    """Relaxation times (s) of a band of frequencies, and `reach` decades beyond it."""
-    beyond = 10.0**reach
-    return np.asarray(np.geomspace(1.0 / (2.0 * np.pi * high * beyond), beyond / (2.0 * np.pi * low), number))
 
 
 def _fit(of: _Fitted, frequency: Floats, times: Floats) -> tuple[Dielectric, float]:
@@ -291,7 +279,8 @@ def debye_layer(layer: Layer, frequency: float | None) -> Layer:
     3
     """
     of: Any = layer.eps_r
-    if not relaxes(layer) or _is_debye(of):
+    own = isinstance(of, Dielectric) and all(not any(pole[2:]) and len(pole) == 3 for pole in of.poles)
+    if not relaxes(layer) or own:
         return layer
     if not callable(getattr(of, "debye", None)):
         allowed = "a Dielectric or a DielectricTable where the voltage is resolved in time"
@@ -300,11 +289,6 @@ def debye_layer(layer: Layer, frequency: float | None) -> Layer:
     if frequency is not None:
         low, high = min(low, frequency / WIDER), max(high, frequency * WIDER)
     return Layer(layer.thickness, _remembered(of, low, high))
-
-
-def _is_debye(of: Any) -> bool:
-    """Whether all poles are Debye's."""
-    return isinstance(of, Dielectric) and all(not any(pole[2:]) and len(pole) == 3 for pole in of.poles)
 
 
 @lru_cache(maxsize=32)

@@ -7,6 +7,7 @@ forces are per mm of depth; then only a linear area law (m = 1) keeps its k, in 
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,53 +189,29 @@ def fit_power(x: Values, y: Values, *, relative: bool = True) -> PowerFit:
     >>> round(fit.k, 9), round(fit.m, 9)
     (63.0, 0.68)
     """
-    x, y = _points(x, y)
-    if relative:
-        above("y", y, 0.0, "values above zero for a fit of relative errors")
-        k, m = _straight_line(np.log(x), np.log(y))
-        errors = _standard_errors(
-            np.stack([np.ones_like(x), np.log(x)]), np.log(y) - np.log(k) - m * np.log(x)
-        )
-        return PowerFit(k, m, k * errors[0], errors[1])
-    from scipy.optimize import least_squares
+    from scipy.optimize import OptimizeWarning, curve_fit
 
-    usable = y > 0
-    enough = np.unique(x[usable]).size >= 2
-    start = _straight_line(np.log(x[usable]), np.log(y[usable])) if enough else (float(np.mean(y)), 1.0)
-    scale = np.max(np.abs(y))
-    found = least_squares(
-        lambda p: (start[0] * p[0] * x ** p[1] - y) / scale,
-        (1.0, start[1]),
-        xtol=1e-14,
-        ftol=1e-14,
-        gtol=1e-14,
-    )
-    errors = _standard_errors(found.jac.T, found.fun)
-    return PowerFit(float(start[0] * found.x[0]), float(found.x[1]), abs(start[0]) * errors[0], errors[1])
-
-
-def _points(x: Values, y: Values) -> tuple[Floats, Floats]:
     x = np.asarray(above("x", x, 0.0, "values above zero"))
     y = np.asarray(finite("y", y, "finite values"))
     if x.ndim != 1 or x.shape != y.shape or np.unique(x).size < 2:
-        raise InputError(
-            "x, y", f"shapes {x.shape} and {y.shape}", "two lists of equal length, two different x"
-        )
-    return x, y
+        allowed = "two lists of equal length, two different x"
+        raise InputError("x, y", f"shapes {x.shape} and {y.shape}", allowed)
+    if relative:
+        above("y", y, 0.0, "values above zero for a fit of relative errors")
+    usable = y > 0
+    enough = np.unique(x[usable]).size >= 2
+    m, log_k = np.polyfit(np.log(x[usable]), np.log(y[usable]), 1) if enough else (1.0, 0.0)
+    k = float(np.exp(log_k)) if enough else float(np.mean(y))
 
+    def law(at: Floats, share: float, power: float) -> Floats:
+        return np.log(share * k) + power * np.log(at) if relative else share * k * at**power
 
-def _straight_line(log_x: Floats, log_y: Floats) -> tuple[float, float]:
-    m, log_k = np.polyfit(log_x, log_y, 1)
-    return float(np.exp(log_k)), float(m)
-
-
-def _standard_errors(jacobian: Floats, residual: Floats) -> Floats:
-    """Square roots of the diagonal of s^2 (J J^T)^-1, s^2 per degree of freedom; J (parameters, points)."""
-    freedom = residual.size - len(jacobian)
-    if freedom == 0:
-        return np.full(len(jacobian), np.inf)
-    covariance = np.linalg.inv(jacobian @ jacobian.T) * (residual @ residual) / freedom
-    return np.sqrt(np.diag(covariance))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OptimizeWarning)  # errors without degrees of freedom are infinite
+        wanted = np.log(y) if relative else y
+        found, spread = curve_fit(law, x, wanted, (1.0, m), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    errors = np.sqrt(np.diag(spread))
+    return PowerFit(float(k * found[0]), float(found[1]), abs(k) * float(errors[0]), float(errors[1]))
 
 
 def fit_area_to_friction(

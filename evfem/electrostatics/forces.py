@@ -1,4 +1,4 @@
-"""Closed-form forces on flat and ellipsoidal pads (2)-(8b), (11), (24); skin thickness from thresholds.
+"""Closed-form forces on flat and ellipsoidal pads (3)-(8b), (24); skin thickness from thresholds.
 
 Units: mm, N, V; permittivities relative. All arguments broadcast; scalars give a float. Equation numbers are
 those of the paper on modelling and validating electrovibration displays that the project starts from.
@@ -13,23 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from evfem.common.checks import Values, above, at_least, plain
-from evfem.electrostatics.laws import Layer, Layers, eps_0
+from evfem.electrostatics.laws import Layer, Layers
 from evfem.errors import InputError, quoted
 from evfem.protocols import ForceLaw
 
 Outline = Literal["rectangle", "ellipse"]
-
-
-def capacitor_force(area: Values, voltage: Values, thickness: Values, eps_r: Values) -> Values:
-    """Force in N on plates of `area` in mm^2, one dielectric, equation (2): eps_0 eps A U^2 / (2 d^2).
-
-    >>> round(1e3 * capacitor_force(area=100.0, voltage=1000.0, thickness=0.1, eps_r=1.0), 3)  # mN
-    44.271
-    """
-    area = at_least("area", area, 0.0, "an area in mm^2, not negative")
-    thickness = above("thickness", thickness, 0.0, "a length in mm above zero")
-    eps_r = at_least("eps_r", eps_r, 1.0, "a relative permittivity of at least 1")
-    return plain(np.asarray(0.5 * eps_0 * eps_r * area * (np.asarray(voltage) / thickness) ** 2))
 
 
 def plate_force(law: ForceLaw, area: Values, gap: Values, voltage: Values, layers: Layers) -> Values:
@@ -68,17 +56,12 @@ _POINTS = 28  # per direction; error below 3e-12 for every pad and law with gap 
 _BATCH = 256  # evaluations at a time, so that memory stays small whatever the sweep
 
 
-def _unit_gauss() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
-    return 0.5 * (nodes + 1.0), 0.5 * weights
-
-
 def _near_pole(scale: Values, upper: Values) -> tuple[Values, Values]:
     """Gauss points and weights (last axis) on [0, upper] for 1 / (scale^2 + t^2)^q: t = scale sinh(v)."""
-    nodes, weights = _unit_gauss()
-    end = np.arcsinh(upper / scale)[..., None]
-    scale = np.asarray(scale)[..., None]
-    return scale * np.sinh(end * nodes), weights * end * scale * np.cosh(end * nodes)
+    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
+    end, scale = 0.5 * np.arcsinh(upper / scale)[..., None], np.asarray(scale)[..., None]
+    at = end * (nodes + 1.0)
+    return scale * np.sinh(at), weights * end * scale * np.cosh(at)
 
 
 def _pole_distance(gap: Values, height: Values, layers: Layers) -> Values:
@@ -161,25 +144,13 @@ def pad_force_per_depth(
     return plain(np.sum(width * weight * np.cos(t) * traction, axis=-1))
 
 
-def air_layer_ratio(normal_force: Values, alpha: Values, beta: Values) -> Values:
-    """Attraction of the air layer relative to that of touching skin alone, equation (11): alpha F_n^-beta.
-
-    `normal_force` in N/mm in the two-dimensional model. The share of the total is ratio / (1 + ratio).
-    """
-    force = above("normal_force", normal_force, 0.0, "a normal force above zero")
-    return plain(np.asarray(alpha * np.asarray(force) ** -np.asarray(beta)))
-
-
 def _threshold_weights(
     voltages: tuple[Values, Values], friction: tuple[Values, Values]
 ) -> tuple[Values, Values]:
     """U^2 mu of both experiments."""
-    positive = "two voltages in V above zero"
-    first, second = (above("voltages", u, 0.0, positive) for u in voltages)
-    mu_first, mu_second = (
-        above("friction", mu, 0.0, "two friction coefficients above zero") for mu in friction
-    )
-    return first**2 * mu_first, second**2 * mu_second
+    first, second = (above("voltages", u, 0.0, "two voltages in V above zero") for u in voltages)
+    one, other = (above("friction", mu, 0.0, "two friction coefficients above zero") for mu in friction)
+    return first**2 * one, second**2 * other
 
 
 def effective_thickness_from_thresholds(

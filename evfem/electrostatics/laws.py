@@ -43,19 +43,6 @@ eps_0 = 8.8541878188e-12
 #: step of differences of a law by its gap (mm)
 GAP_STEP = 1e-5
 
-__all__ = [
-    "FILM",
-    "FORCE_LAWS",
-    "INSULATORS",
-    "TOUCHSCREEN",
-    "Kaczmarek",
-    "Layer",
-    "Layers",
-    "StrongTroxel",
-    "eps_0",
-    "traction_derivative",
-]
-
 
 @dataclass(frozen=True)
 class Layer:

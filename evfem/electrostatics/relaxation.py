@@ -10,27 +10,11 @@ polarisation p_k (over eps_0, a field) for each pole:
           \dot x_1 = \kappa_1 E_1 - \kappa_2 E_2, \quad \dot x_2 = \kappa_2 E_2 - \kappa_3 E_3, \qquad
           \sum_j d_j E_j = U(t) .
 
-For a fixed gap this is linear, with real, negative rates. **Without poles** (Maxwell and Wagner), with
-:math:`s_k = d_k / \varepsilon_k`, S their sum and the rates :math:`\kappa_k` for
-:math:`\kappa_k/\varepsilon_k`,
+For a fixed gap this is linear, with real, negative rates. With given charges every force law stays what it
+is, under the voltage of the same field in the gap.
 
-.. math:: \dot x = A x + b U, \quad
-   A = \frac1S \begin{pmatrix}
-       -\kappa_1 (s_2 + s_3) - \kappa_2 s_1 & -(\kappa_1 - \kappa_2) s_3 \\
-       (\kappa_2 - \kappa_3) s_1 & -\kappa_2 s_3 - \kappa_3 (s_1 + s_2) \end{pmatrix}, \quad
-   b = \frac1S \begin{pmatrix} \kappa_1 - \kappa_2 \\ \kappa_2 - \kappa_3 \end{pmatrix} .
-
-Under a voltage that goes straight from U_0 to U_1 in the time h the exponential integrator is exact,
-
-.. math:: x(h) = e^{Ah} x_0 + h\,\varphi_1(Ah)\,b\,U_0 + h\,\varphi_2(Ah)\,b\,(U_1 - U_0),
-
-with :math:`\varphi_1(z) = (e^z - 1)/z`, :math:`\varphi_2(z) = (\varphi_1(z) - 1)/z`, and functions
-of A by their divided difference on the two rates. The field in the gap is that of a stack without
-charges under the **effective voltage** :math:`V = U + s_1 x_1 - s_3 x_2`, so that with given charges every
-force law stays what it is.
-
-**With poles** Laplace's transform makes it algebra: with
-the admittance :math:`Y_j(s) = \varepsilon_{\infty j} + \kappa_j/s + \sum_k \Delta_k/(1 + s\tau_k)`,
+Laplace's transform makes it algebra: with the admittance
+:math:`Y_j(s) = \varepsilon_{\infty j} + \kappa_j/s + \sum_k \Delta_k/(1 + s\tau_k)`,
 :math:`z_j = d_j/Y_j`, and what the state at the beginning, index 0, leaves behind,
 :math:`h_j = \sum_k p_k^0\tau_k/(1 + s\tau_k)`,
 
@@ -50,8 +34,8 @@ its end. Energy and loss per area over eps_0 are
 .. math:: \tfrac12\sum_j d_j\Big(\varepsilon_\infty E^2 + \sum_k p_k^2/\Delta_k\Big)_j, \qquad
           \sum_j d_j\Big(\kappa E^2 + \sum_k \tau_k\dot p_k^2/\Delta_k\Big)_j .
 
-A force law sees the layers with their permittivity at the voltage's frequency (static without one) and the
-voltage of the same field in the gap. Other dielectrics are fitted by Debye poles (`debye_layer`).
+A force law sees the layers with their permittivity at the voltage's frequency (static without one). Other
+dielectrics are fitted by Debye poles (`debye_layer`).
 Lengths in mm, charges and polarisations over eps_0 in V/mm,
 rates in 1/s. Arguments broadcast; gaps may have a small imaginary part (for derivatives).
 """
@@ -65,32 +49,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values
-from evfem.electrostatics.dielectrics import Dielectric, constants, debye_layer, relaxes, seen_at
+from evfem.electrostatics.dielectrics import Dielectric, debye_layer, seen_at
 from evfem.electrostatics.laws import Layer, eps_0
 
-#: magnitude of z below which phi_2 is summed as a series, and its terms
-SMALL, TERMS = 0.2, 12
 #: points of Talbot's contour, and Weideman's constants
 POINTS, SCALE, TURN, SHIFT, RISE = 26, 0.5017, 0.6407, 0.6122, 0.2645
-
-
-def _phi(z: Any) -> tuple[Any, Any, Any]:
-    """exp(z), phi_1(z), phi_2(z) to rounding, for z with a real part up to 0."""
-    small = np.abs(z) < SMALL
-    safe, near = np.where(small, 1.0, z), np.where(small, z, 0.0)
-    term = series = 0.5 * np.ones_like(near)
-    for k in range(3, 3 + TERMS):
-        term = term * near / k
-        series = series + term
-    second = np.where(small, series, (np.expm1(safe) / safe - 1.0) / safe)
-    return np.exp(z), 1.0 + z * second, second
-
-
-def _difference(f: tuple[Any, Any], rates: tuple[Any, Any]) -> Any:
-    """Divided difference of a function over two rates, times A; the derivative where they are one."""
-    apart = rates[0] - rates[1]
-    same = apart == 0.0
-    return np.where(same, 0.0, (f[0] - f[1]) / np.where(same, 1.0, apart))
 
 
 def _contour() -> tuple[Any, Any]:
@@ -174,16 +137,13 @@ class Sandwich:
 
     @classmethod
     def of(
-        cls, skin: Layer, insulator: Layer, *, frequency: Values | None, gap_conductivity: Values,
+        cls, skin: Layer, insulator: Layer, *, frequency: float | None, gap_conductivity: float,
         gap_eps_r: float = 1.0,
     ) -> Sandwich:  # fmt: skip
-        """Without poles, of two solid layers; dielectrics at `frequency` (Hz), or by conductivity alone."""
-        (eps_1, sigma_1), (eps_3, sigma_3) = (constants(layer, frequency) for layer in (skin, insulator))
-        # a layer as its displacement sees it: reduced thickness, permittivity 1, relaxation rate
-        first = Relaxing(skin.thickness / eps_1, 1.0, sigma_1 / (eps_0 * eps_1))
-        third = Relaxing(insulator.thickness / eps_3, 1.0, sigma_3 / (eps_0 * eps_3))
-        leak, reference = gap_conductivity / eps_0, first.thickness + third.thickness
-        return cls(first, third, leak, reference, gap_eps_r)
+        """Of two solid layers; `frequency` (Hz) is the voltage's, None of a direct one."""
+        layers = [Relaxing.of(debye_layer(layer, frequency)) for layer in (skin, insulator)]
+        reference = sum(layer.thickness / seen_at(layer, frequency)[0] for layer in (skin, insulator))
+        return cls(layers[0], layers[1], gap_conductivity / eps_0, reference, gap_eps_r)
 
     @property
     def states(self) -> int:
@@ -197,22 +157,17 @@ class Sandwich:
 
     def effective(self, gap: Any, voltage: Values, charges: Any) -> Any:
         """Voltage (V) that makes the same field in the gap of layers without charges, whatever the `gap`."""
-        if self.states == 2:
-            return self._driving(voltage, charges)
         return self.fields(gap, voltage, charges)[1] * (gap / self.gap_eps_r + self.reference)
 
     def fields(self, gap: Any, voltage: Values, charges: Any) -> tuple[Any, Any, Any]:
         """Displacements over eps_0 (V/mm) in skin, gap and insulator."""
-        middle = self._driving(voltage, charges) / sum(self._reduced(gap))
+        first, third = (np.sum(part, axis=0) for part in self._polarisations(charges))
+        skin, air, film = self.reduced(gap)
+        driving = voltage + skin * (charges[0] + first) - film * (charges[1] - third)
+        middle = driving / (skin + air + film)
         return middle - charges[0], middle, middle + charges[1]
 
-    def _driving(self, voltage: Values, charges: Any) -> Any:
-        """Voltage (V) over the reduced thicknesses of all layers."""
-        first, third = (np.sum(part, axis=0) for part in self._polarisations(charges))
-        skin, _, film = self._reduced(0.0)
-        return voltage + skin * (charges[0] + first) - film * (charges[1] - third)
-
-    def _reduced(self, gap: Any) -> tuple[Any, Any, Any]:
+    def reduced(self, gap: Any) -> tuple[Any, Any, Any]:
         """Thickness over permittivity (mm) at high frequency of skin, gap and insulator."""
         skin, film = (one.thickness / one.eps_inf for one in (self.skin, self.insulator))
         return skin, gap / self.gap_eps_r, film
@@ -236,12 +191,11 @@ class Sandwich:
 
     def after(self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values) -> Any:
         """State (M, ...) of `charges` after `seconds` at `gap` (mm), voltage from `before` to `after` (V)."""
-        if self.states == 2:
-            return self._exactly(gap, charges, before, after, seconds)
-        axes = np.broadcast(gap, before, after, seconds, charges[0]).ndim
-        if not np.any(seconds):
-            return np.array(charges, dtype=float)
-        time, charges = _lifted(np.asarray(seconds, dtype=float), axes), np.asarray(charges)
+        charges = np.asarray(charges, dtype=float)
+        axes, lasts = np.broadcast(gap, before, after, seconds, charges[0]).ndim, np.asarray(seconds) > 0.0
+        if not lasts.any():
+            return charges.copy()
+        time = _lifted(np.where(lasts, seconds, 1.0), axes)
         charges = np.stack([_lifted(one, axes) for one in charges])
         z, weight = (one.reshape((-1,) + (1,) * axes) for one in _contour())
         s = z / time
@@ -251,7 +205,7 @@ class Sandwich:
         value = value + self._kept(charges, time)
         if np.iscomplexobj(gap):
             value = value + 1j * np.imag(gap) * self._moved(s, weight / time, slopes)
-        return value
+        return np.where(lasts, value, charges)
 
     def _kept(self, charges: Any, time: Any) -> Any:
         """Decay of a state (M, ...) over the `time` without fields."""
@@ -298,70 +252,7 @@ class Sandwich:
         skin, film = (one.kappa / one.eps_inf for one in (self.skin, self.insulator))
         return skin, self.leak / self.gap_eps_r, film
 
-    def _exactly(self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values) -> Any:
-        """Charges (2, ...) of layers without poles."""
-        (a11, a12, a21, a22), (b1, b2) = self._system(gap)
-        slow, fast = self.eigenvalues(gap)
-        of_slow, of_fast = _phi(slow * seconds), _phi(fast * seconds)
-        drive, ramp = seconds * before, seconds * (np.asarray(after) - before)
-        inputs = ((charges[0], charges[1]), (b1 * drive, b2 * drive), (b1 * ramp, b2 * ramp))
-        result: list[Any] = [0.0, 0.0]
-        for f, g, (x, y) in zip(of_slow, of_fast, inputs, strict=True):
-            slope = _difference((f, g), (slow, fast))
-            result[0] = result[0] + f * x + slope * ((a11 - slow) * x + a12 * y)
-            result[1] = result[1] + f * y + slope * (a21 * x + (a22 - slow) * y)
-        return np.stack(np.broadcast_arrays(*result))
-
-    def step_response(self, gap: Any, time: Values) -> Any:
-        """Without poles effective voltage at `time` (s) after 1 V from no charge, by start, slope, end."""
-        k1, k2, k3 = self.rates
-        slow, fast = self.eigenvalues(gap)
-        skin, air, film = self._reduced(gap)
-        total = skin + air + film
-        slope = (skin * (k1 - k2) - film * (k2 - k3)) / total
-        product = self._determinant(gap) * total
-        end = np.where(product > 0.0, k1 * k3 / np.where(product > 0.0, product, 1.0), 0.0) * total
-        decay, faster = np.exp(slow * time), np.exp(fast * time)
-        both = np.where(fast == slow, time * decay, _difference((decay, faster), (slow, fast)))
-        return end + decay * (1.0 - end) + both * (slope - slow * (1.0 - end))
-
-    def eigenvalues(self, gap: Any) -> tuple[Any, Any]:
-        """The slower and the faster rate (1/s, not positive) at a fixed `gap` (mm), without poles."""
-        (a11, a12, a21, a22), _ = self._system(gap)
-        square = (0.5 * (a11 - a22)) ** 2 + a12 * a21
-        root = np.sqrt(np.where(np.real(square) > 0.0, square, 0.0))
-        fast = 0.5 * (a11 + a22) - root
-        # the product of the rates is the determinant: so the slow one is right to rounding
-        still = fast == 0.0
-        return np.where(still, 0.0, self._determinant(gap) / np.where(still, 1.0, fast)), fast
-
-    def _system(self, gap: Any) -> tuple[tuple[Any, Any, Any, Any], tuple[Any, Any]]:
-        """A by rows, and b."""
-        k1, k2, k3 = self.rates
-        s1, s2, s3 = self._reduced(gap)
-        total = s1 + s2 + s3
-        rows = (-k1 * (s2 + s3) - k2 * s1, -(k1 - k2) * s3, (k2 - k3) * s1, -k2 * s3 - k3 * (s1 + s2))
-        return tuple(entry / total for entry in rows), ((k1 - k2) / total, (k2 - k3) / total)
-
-    def _determinant(self, gap: Any) -> Any:
-        """Product of the two rates of A."""
-        k1, k2, k3 = self.rates
-        s1, s2, s3 = self._reduced(gap)
-        return (k1 * k2 * s3 + k1 * k3 * s2 + k2 * k3 * s1) / (s1 + s2 + s3)
-
 
 def _lifted(values: Any, axes: int) -> Any:
     """With so many axes, the further ones in front."""
     return values.reshape((1,) * (axes - values.ndim) + values.shape)
-
-
-def stack_of(
-    skin: Layer, insulator: Layer, *, frequency: float | None, gap_conductivity: float, gap_eps_r: float
-) -> Sandwich:
-    """The layers as their charges see them. `frequency` (Hz) is the voltage's, None of a direct one."""
-    if not (relaxes(skin) or relaxes(insulator)):
-        given = {"gap_conductivity": gap_conductivity, "gap_eps_r": gap_eps_r}
-        return Sandwich.of(skin, insulator, frequency=frequency, **given)
-    layers = [Relaxing.of(debye_layer(layer, frequency)) for layer in (skin, insulator)]
-    reference = sum(layer.thickness / seen_at(layer, frequency)[0] for layer in (skin, insulator))
-    return Sandwich(layers[0], layers[1], gap_conductivity / eps_0, reference, gap_eps_r)

@@ -76,10 +76,6 @@ class ConstantRoughness(Checked):
         """Separation in mm at contact pressures in MPa."""
         return plain(np.full(np.shape(pressure), self.gap))
 
-    def separation_derivative(self, pressure: Values) -> Values:
-        """ds/dp in mm/MPa."""
-        return plain(np.zeros(np.shape(pressure)))
-
 
 @dataclass(frozen=True)
 class PowerRoughness(Checked):
@@ -107,12 +103,6 @@ class PowerRoughness(Checked):
         p, (least, at) = np.asarray(pressure), self._tangent
         law = self.gap * (np.where(p.real > least, p, least) / self.pressure) ** -self.exponent
         return plain(np.where(p.real > least, law, self.open_gap - self.exponent * at * p / least))
-
-    def separation_derivative(self, pressure: Values) -> Values:
-        """ds/dp in mm/MPa."""
-        p, (least, _) = np.asarray(pressure), self._tangent
-        within = np.maximum(p, least)
-        return plain(-self.exponent * self.gap * (within / self.pressure) ** -self.exponent / within)
 
 
 @dataclass(frozen=True)
@@ -146,11 +136,6 @@ class ExponentialRoughness:
         inside = np.where(p.real < self.pressure, p, self.pressure)
         law = self.decay * np.log(self.pressure / np.where(p.real > least, inside, least))
         return plain(np.where(p.real > least, law, self.open_gap - self.decay * p / least))
-
-    def separation_derivative(self, pressure: Values) -> Values:
-        """ds/dp in mm/MPa."""
-        p = np.asarray(pressure)
-        return plain(np.where(p < self.pressure, -self.decay / np.maximum(p, self._least), 0.0))
 
 
 LAWS = {cls.law: cls for cls in (ConstantRoughness, PowerRoughness, ExponentialRoughness)}

@@ -22,12 +22,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import count, real, set_frozen
+from evfem.common.checks import Within, check_fields, count, number, real, set_frozen
 from evfem.common.storage import replacing, write_text
 from evfem.common.tables import MOST_ROWS
 from evfem.electrostatics import timesignals, wav
@@ -39,6 +39,24 @@ MAP_FORM = "evfem-friction-map-1"
 MOST_COLUMNS, ROWS = 100_000, 64
 #: what a friction perception of a .hjif says of its coefficients
 FRICTIONS = re.compile(r"coefficient, (\S+) to (\S+),")
+
+
+def _coefficients(key: str, given: Any) -> tuple[float, float]:
+    allowed = "two friction coefficients, at 0 V and at full scale, the second one larger"
+    if not isinstance(given, (tuple, list)) or len(given) != 2:
+        raise InputError(key, given, allowed)
+    natural = real(key, given[0], allowed, lambda mu: mu >= 0.0)
+    return natural, real(key, given[1], allowed, lambda mu: mu > natural)
+
+
+def _above(what: str) -> dict[str, Any]:
+    """Rule of a number above zero."""
+    return number(f"{what} above zero", Within(0.0, above=True))
+
+
+#: what a file needs of a `Playback`
+SPEED, NEEDED_FRICTION = "a speed in mm/s", "two friction coefficients, at 0 V and at full scale"
+NEEDED = {".wav": {"speed": SPEED}, ".hjif": {"speed": SPEED, "friction": NEEDED_FRICTION}}
 
 
 @dataclass(frozen=True)
@@ -55,41 +73,20 @@ class Playback:
     evfem.errors.InputError: speed: given -1.0; allowed: a speed in mm/s above zero
     """
 
-    full_scale: float
-    speed: float | None = None
-    friction: tuple[float, float] | None = None
-    rate: int = 48_000
+    full_scale: Annotated[float, _above("a voltage in V")]
+    speed: Annotated[float | None, _above("a speed in mm/s")] = None
+    friction: Annotated[tuple[float, float] | None, {"check": _coefficients}] = None
+    rate: Annotated[int, {"check": count}] = 48_000
     carrier: float | None = None
-    pixel: float = 0.1
+    pixel: Annotated[float, _above("a width in mm")] = 0.1
 
     def __post_init__(self) -> None:
-        set_frozen(
-            self,
-            full_scale=_positive("full_scale", self.full_scale, "a voltage in V"),
-            pixel=_positive("pixel", self.pixel, "a width in mm"),
-            rate=count("rate", self.rate),
-        )
-        if self.speed is not None:
-            set_frozen(self, speed=_positive("speed", self.speed, "a speed in mm/s"))
-        if self.friction is not None:
-            set_frozen(self, friction=_coefficients(self.friction))
+        check_fields(self)
         if self.carrier is not None:
             allowed = f"a frequency in Hz above 0 and below half the rate of {self.rate} Hz"
             set_frozen(
                 self, carrier=real("carrier", self.carrier, allowed, lambda f: 0.0 < f < self.rate / 2)
             )
-
-
-def _positive(key: str, value: object, what: str) -> float:
-    return real(key, value, f"{what} above zero", lambda x: x > 0.0)
-
-
-def _coefficients(given: Any) -> tuple[float, float]:
-    allowed = "two friction coefficients, at 0 V and at full scale, the second one larger"
-    if not isinstance(given, (tuple, list)) or len(given) != 2:
-        raise InputError("friction", given, allowed)
-    natural = real("friction", given[0], allowed, lambda mu: mu >= 0.0)
-    return natural, real("friction", given[1], allowed, lambda mu: mu > natural)
 
 
 def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback | None = None) -> None:
@@ -134,16 +131,21 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     if ending not in (".csv", ".wav", ".png", ".hjif"):
         raise InputError("path", str(path), "a file called .csv, .wav, .png or .hjif")
     if playback is not None:
-        _check_fit(profile, playback)
+        largest = float(np.max(np.abs(profile.voltage)))
+        if largest > playback.full_scale:
+            raise _too_much(f"{largest:g} V", playback)
     if ending == ".csv":
         profile.to_csv(path)
         return
-    if playback is None:
-        raise _missing("full_scale", "a voltage in V", ending)
+    for key, what in ({"full_scale": "a voltage in V"} | NEEDED.get(ending, {})).items():
+        if getattr(playback, key, None) is None:
+            raise InputError(key, ABSENT, f"{what}, needed for {ending}")
+    assert playback is not None
     if not np.ptp(profile.position) > 0.0:
         raise InputError("profile", f"{profile.position.size} rows at one position", "a signal with a length")
     if ending == ".hjif":
-        write_text(path, _hjif(profile, playback))
+        scale: Any = playback.full_scale, playback.speed, playback.friction, playback.carrier
+        write_text(path, json.dumps(haptics(profile, *scale), separators=(",", ":")) + "\n")
         return
     data = _wav(profile, playback) if ending == ".wav" else _map(profile, playback)
     with replacing(path) as temporary:
@@ -190,28 +192,8 @@ def read_voltage(path: str | Path) -> VoltageProfile | Sampled:
     return read_signal(path)
 
 
-def _check_fit(profile: VoltageProfile, playback: Playback) -> None:
-    largest = float(np.max(np.abs(profile.voltage)))
-    if largest > playback.full_scale:
-        raise _too_much(f"{largest:g} V", playback)
-
-
 def _too_much(given: str, playback: Playback) -> InputError:
     return InputError("voltage", given, f"at most the full scale of {playback.full_scale:g} V")
-
-
-def _missing(key: str, what: str, ending: str) -> InputError:
-    return InputError(key, ABSENT, f"{what}, needed for {ending}")
-
-
-def _hjif(profile: VoltageProfile, playback: Playback) -> str:
-    if playback.speed is None:
-        raise _missing("speed", "a speed in mm/s", ".hjif")
-    if playback.friction is None:
-        raise _missing("friction", "two friction coefficients, at 0 V and at full scale", ".hjif")
-    scale = playback.full_scale, playback.speed, playback.friction, playback.carrier
-    file = haptics(profile, *scale)
-    return json.dumps(file, separators=(",", ":")) + "\n"
 
 
 def _positions(number: int, start: float, spacing: float) -> Floats:
@@ -229,8 +211,7 @@ def _number(profile: VoltageProfile, spacing: float, most: int, what: str) -> in
 
 
 def _wav(profile: VoltageProfile, playback: Playback) -> bytes:
-    if playback.speed is None:
-        raise _missing("speed", "a speed in mm/s", ".wav")
+    assert playback.speed is not None
     spacing, start = playback.speed / playback.rate, float(profile.position[0])
     number = _number(profile, spacing, wav.MOST_SAMPLES - 1, "samples") + 1
     volts = profile(_positions(number, start, spacing))
@@ -261,8 +242,8 @@ def _from_wav(path: Path) -> VoltageProfile:
     if samples.size > MOST_ROWS:  # before they take four times the memory
         raise InputError("path", f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
     try:
-        full_scale = _positive("full_scale_V", scale["full_scale_V"], "a voltage in V")
-        speed = _positive("speed_mm_per_s", scale["speed_mm_per_s"], "a speed in mm/s")
+        full_scale = _above("a voltage in V")["check"]("full_scale_V", scale["full_scale_V"])
+        speed = _above(SPEED)["check"]("speed_mm_per_s", scale["speed_mm_per_s"])
         start = real("start_mm", scale["start_mm"], "a position in mm")
     except InputError as error:
         given = f"{path}, whose {error.key} is {readable(error.given)}"

@@ -22,8 +22,6 @@ from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_colum
 from evfem.common.views import plus
 from evfem.errors import ABSENT, InputError
 
-#: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
-APPLIED_TO_EFFECTIVE = 2.0
 HEADER = ["position", "voltage"]
 #: largest magnitude of a position (mm) and of a voltage (V)
 LARGEST = 1e6
@@ -95,15 +93,9 @@ class VoltageProfile:
             raise InputError("start, stop", (start, stop), "two positions in mm, the second one larger")
         inside = (self.position > start) & (self.position < stop)
         x = np.concatenate([[start], self.position[inside], [stop]])
-        before = np.concatenate([self.voltage[inside], [self._just_before(stop)]])  # limit from the left
-        after = np.concatenate([[self(start)], self.voltage[inside]])
-        square = (after**2 + after * before + before**2) / 3.0
-        return float(np.sqrt(np.sum(np.diff(x) * square) / (stop - start)))
-
-    def _just_before(self, position: float) -> float:
-        """The limit from the left at `position`: the first of repeated rows counts."""
-        reverse = VoltageProfile(-self.position[::-1], self.voltage[::-1])
-        return float(reverse(-position))
+        middle, half = 0.5 * (x[1:] + x[:-1]), 0.5 * np.diff(x)
+        square = sum(np.asarray(self(middle + side * half)) ** 2 for side in (-(3.0**-0.5), 3.0**-0.5))
+        return float(np.sqrt(np.sum(half * square) / (stop - start)))
 
     def steepest(self) -> float:
         """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in V/s."""
@@ -150,15 +142,6 @@ def carrier_amplitude(effective: Values) -> Values:
     return plain(np.sqrt(2.0) * np.asarray(effective))
 
 
-def applied_voltage(effective: Values) -> Values:
-    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17): about 2 U.
-
-    This is a rule from experience that contains losses outside the finger; `carrier_amplitude` is
-    the mean alone.
-    """
-    return plain(APPLIED_TO_EFFECTIVE * np.asarray(effective))
-
-
 @dataclass(frozen=True)
 class Amplifier:
     """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
@@ -192,20 +175,12 @@ class Amplifier:
         return _no_steeper(cut, self.slew / above("speed", speed, 0.0, "a speed in mm/s above zero"))
 
     def _clipped(self, profile: VoltageProfile) -> VoltageProfile:
-        x, u = profile.position, profile.voltage
-        parts_x, parts_u = [x[:1]], [u[:1]]
-        for i in range(x.size - 1):
-            levels = [
-                level
-                for level in (-self.voltage_max, self.voltage_max)
-                if (u[i] - level) * (u[i + 1] - level) < 0
-            ]
-            crossings = sorted((level - u[i]) / (u[i + 1] - u[i]) for level in levels)
-            share = np.array([*crossings, 1.0])
-            parts_x.append(x[i] + share * (x[i + 1] - x[i]))
-            parts_u.append(u[i] + share * (u[i + 1] - u[i]))
-        voltage = np.clip(np.concatenate(parts_u), -self.voltage_max, self.voltage_max)
-        return VoltageProfile(np.concatenate(parts_x), voltage)
+        x, u, most = profile.position, profile.voltage, self.voltage_max
+        row = np.arange(x.size)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = (np.array([[-most], [most]]) - u[:-1]) / np.diff(u)
+        at = np.sort(np.append(row, (row[:-1] + share)[(share > 0.0) & (share < 1.0)]))
+        return VoltageProfile(np.interp(at, row, x), np.clip(np.interp(at, row, u), -most, most))
 
 
 def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:

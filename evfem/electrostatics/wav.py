@@ -13,7 +13,8 @@ import json
 import re
 import struct
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,21 @@ def shares(samples: Any) -> Floats:
     return np.asarray(samples / float(np.iinfo(samples.dtype).max))
 
 
+@contextmanager
+def _parsed(path: Path, key: str, allowed: str) -> Iterator[Any]:
+    """What a JSON file holds; InputError where it cannot be read, or lacks what is looked for inside."""
+    try:
+        with path.open("rb") as file:
+            whole = json.loads(file.read(MOST_BYTES))
+        yield whole
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise InputError(key, f"{path.name}, of another kind or damaged", allowed) from None
+
+
 def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
     """Intensity (n,), 0 to 1, of a haptic pattern (AHAP, JSON) at `rate` (Hz) from time 0 on: at every moment
     that of its strongest event, times the curves and values of its HapticIntensityControl.
@@ -96,10 +112,8 @@ def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
     A transient event, which has no duration, lasts `tap` s. Sharpness, audio and envelopes are left out.
     Raises InputError for a file that is missing, damaged, without events or longer than 1,000,000 samples.
     """
-    allowed = "an AHAP file: JSON with a Pattern of haptic events"
-    try:
-        with path.open("rb") as file:
-            pattern = json.loads(file.read(MOST_BYTES))["Pattern"]
+    with _parsed(path, key, "an AHAP file: JSON with a Pattern of haptic events") as whole:
+        pattern = whole["Pattern"]
         events = [_event(one["Event"], tap) for one in pattern if "Event" in one]
         events = [one for one in events if one[2] > 0.0]
         size = int(np.ceil(max(end for _, end, _ in events) * rate)) + 1
@@ -111,12 +125,6 @@ def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
             found[inside] = np.maximum(found[inside], strength)
         for one in pattern:
             found *= _control(one, time)
-    except InputError:
-        raise
-    except OSError as error:
-        raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        raise InputError(key, f"{path.name}, of another kind or damaged", allowed) from None
     return np.clip(found, 0.0, 1.0)
 
 
@@ -152,9 +160,7 @@ def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:
     Raises InputError for a file without one, or one that is no curve over a length.
     """
     allowed = "a .hjif with a friction perception: a curve of two or more keyframes over a length"
-    try:
-        with path.open("rb") as file:
-            whole = json.loads(file.read(MOST_BYTES))
+    with _parsed(path, "path", allowed) as whole:
         (told, *_) = (one for one in whole["perceptions"] if one["perception_modality"] == "Friction")
         (channel,) = told["channels"]
         ((frames,),) = ([effect["keyframes"] for effect in band["effects"]] for band in channel["bands"])
@@ -168,8 +174,4 @@ def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:
         friction = float(channel["gain"]) * share
         if place.size < 2 or not (np.diff(position) > 0.0).all() or not np.isfinite(friction).all():
             raise ValueError("keyframes")
-    except OSError as error:
-        raise InputError("path", f"{path.name} ({error.strerror or error})", allowed) from None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        raise InputError("path", f"{path.name}, of another kind or damaged", allowed) from None
     return position, friction, dict(told)

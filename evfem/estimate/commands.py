@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ import numpy as np
 from evfem.common.checks import keys_of
 from evfem.common.notices import status, tell
 from evfem.common.storage import write_text
-from evfem.common.tables import csv_text
 from evfem.electrostatics.signalfile import write_signal
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError, quoted
@@ -29,16 +27,8 @@ from evfem.textures.texture import Texture, is_data, write
 
 def run(given: argparse.Namespace) -> None:
     """Do one of the commands."""
-    commands: dict[str, Callable[[argparse.Namespace], None]] = {
-        "list": _list,
-        "show": _show,
-        "make": _make,
-        "import": _import,
-        "simulate": _simulate,
-        "estimate": _estimate,
-        "database": _database,
-    }
-    commands[given.what](given)
+    commands = {"list": _list, "show": _show, "make": _make, "import": _import, "simulate": _simulate}
+    {**commands, "estimate": _estimate, "database": _database}[given.what](given)
 
 
 def _list(given: argparse.Namespace) -> None:
@@ -87,7 +77,6 @@ def _written(texture: Texture, out: Path) -> None:
 
 
 def _felt(given: argparse.Namespace) -> tuple[Touch, Device]:
-    """The finger and the display."""
     return Touch(**_given(given, Touch)), Device(**_given(given, Device, friction="display"))
 
 
@@ -99,11 +88,11 @@ def _simulate(given: argparse.Namespace) -> None:
         exact, comparison = exact_voltage(reference, device) if given.exact else (None, None)
     curve = friction_of(reference.result)
     _curve(curve, given.out)
-    if exact is not None:
+    if exact is None:
+        _render(curve, touch, device, given.signal)
+    else:
         print(f"exact: {comparison}")
         _signal(VoltageProfile(exact.x, exact.voltage), touch, device, given.signal)
-    elif given.signal is not None:
-        _render(curve, touch, device, given.signal)
 
 
 def _estimate(given: argparse.Namespace) -> None:
@@ -117,24 +106,22 @@ def _estimate(given: argparse.Namespace) -> None:
         print(f"at the usual touch of a {finger} finger it is off the model by {error:.1%} of the range")
     for note in found.notes:
         tell(f"note: {note}")
-    if given.signal is not None:
-        _render(found.curve, touch, device, given.signal)
+    _render(found.curve, touch, device, given.signal)
 
 
 def _check_outputs(given: argparse.Namespace) -> None:
-    """Before anything is computed."""
-    for key, path, endings in (
-        ("--out", given.out, (".csv",)),
-        ("--signal", given.signal, (".csv", ".wav", ".png", ".hjif")),
-    ):
-        if path is not None and path.suffix.lower() not in endings:
-            raise InputError(key, quoted(str(path)), f"a file called {', '.join(endings)}")
+    endings = {"out": (".csv",), "signal": (".csv", ".wav", ".png", ".hjif")}
+    for key, path in ((key, getattr(given, key)) for key in endings):
+        if path is not None and path.suffix.lower() not in endings[key]:
+            raise InputError(f"--{key}", quoted(str(path)), f"a file called {', '.join(endings[key])}")
         if path is not None and is_data(path):
-            raise InputError(key, f"{path}, which has the rows of a texture", "another file")
+            raise InputError(f"--{key}", f"{path}, which has the rows of a texture", "another file")
 
 
-def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path) -> None:
-    """Print how good the voltage is, and write it."""
+def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path | None) -> None:
+    """Print how good the voltage is, and write it, if it has a path."""
+    if path is None:
+        return
     found = render(curve, touch, device)
     print(
         f"up to {found.signal.largest:.4g} V, rms {found.signal.rms:.4g} V; {found.lost.mean():.0%} of the "
@@ -148,10 +135,9 @@ def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path) -> N
 
 
 def _signal(profile: VoltageProfile, touch: Touch, device: Device, path: Path | None) -> None:
-    if path is None:
-        return
-    write_signal(path, profile, playback(profile, touch, device))
-    print(path, flush=True)
+    if path is not None:
+        write_signal(path, profile, playback(profile, touch, device))
+        print(path, flush=True)
 
 
 def _curve(curve: FrictionCurve, out: Path | None) -> None:
@@ -159,11 +145,9 @@ def _curve(curve: FrictionCurve, out: Path | None) -> None:
     low, high, mean = curve.friction.min(), curve.friction.max(), curve.friction.mean()
     band = "" if curve.error is None else f", each +- {curve.error:.2g}"
     print(f"{curve.source}: friction {low:.4g} to {high:.4g}, {mean:.4g} on average{band}", flush=True)
-    if out is None:
-        return
-    rows = zip(curve.x.tolist(), curve.friction.tolist(), strict=True)
-    write_text(out, csv_text([["x", "friction"], *rows]))
-    print(out, flush=True)
+    if out is not None:
+        write_text(out, curve.rows())
+        print(out, flush=True)
 
 
 def _database(given: argparse.Namespace) -> None:

@@ -42,9 +42,7 @@ def corrections(friction: Floats, linear: Floats, wavelength: Floats, slope: Flo
 
 
 def importance(friction: Floats, linear: Floats, wavelength: Floats, slope: Floats) -> Floats:
-    """How much the root mean square of a curve's change is for a unit of each, (N, 3), as a share of
-    the range of `friction`; arguments as those of `corrections`.
-    """
+    """Rms change of a curve for a unit of each, (N, 3), as a share of the range of `friction`."""
     given = np.abs(np.fft.rfft(linear, axis=1)[:, 1:]) * np.sqrt(2.0) / linear.shape[1]
     q = 2.0 * np.pi * np.arange(1, given.shape[1] + 1) / wavelength[:, None]
     sizes = [slope, np.linalg.norm(given, axis=1), np.linalg.norm(q * given, axis=1)]

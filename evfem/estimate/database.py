@@ -36,7 +36,7 @@ from evfem.estimate.pressed import FILE as PADS
 from evfem.estimate.pressed import Remembered, remember, write
 from evfem.estimate.pressed import read as read_pad
 from evfem.estimate.sliding import slid
-from evfem.estimate.touch import Touch, steps_over, touch_scene
+from evfem.estimate.touch import Touch, friction_of, steps_over, touch_scene
 from evfem.scene.file import dump
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
@@ -53,11 +53,9 @@ ERROR = "error"
 
 @dataclass(frozen=True, eq=False)
 class Database:
-    """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and,
-    as `linear`, that of a pad that yields linearly.
-
-    Sample i is F_t / F_n at x = (i + 1) / SAMPLES wavelengths behind a place where the first sine
-    rises through zero. `errors` (N,) are those of the estimator that does not know the point.
+    """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and, as
+    `linear`, that of a pad that yields linearly, at x = (i + 1) / SAMPLES wavelengths behind a place where
+    the first sine rises through zero; `errors` (N,) of the estimator that does not know the point.
     """
 
     textures: tuple[Parametric, ...]
@@ -68,41 +66,36 @@ class Database:
     smoothing: float
 
     @cached_property
-    def slope(self) -> Floats:
-        """Slopes (N,) of the first sines."""
-        return np.array([texture.slope for texture in self.textures])
-
-    @cached_property
     def responses(self) -> tuple[Floats, Floats, Floats]:
         """Places (N, 6), corrections (N, 3) and their importance (N, 3)."""
         return responses_of(self.textures, self.friction, self.linear)
 
     @cached_property
     def estimator(self) -> Estimator:
-        """The estimator of corrections at places in the box."""
         points, responses, _ = self.responses
         return Estimator(points, responses, self.scale, self.smoothing)
 
     @property
     def relative_errors(self) -> Floats:
         """The errors (N,) as shares of the range of each curve."""
-        return np.asarray(self.errors * self.slope / np.ptp(self.friction, axis=1))
+        slope = np.array([texture.slope for texture in self.textures])
+        return np.asarray(self.errors * slope / np.ptp(self.friction, axis=1))
 
     def errors_of(self, responses: Floats) -> Floats:
         """Root mean square error (N,) of the curves with these corrections (N, 3), over the slope."""
-        found = np.empty(len(self.textures))
-        for i, one in enumerate(self.textures):
-            curve = corrected(_samples(one), self.linear[i], responses[i], one.slope, one.wavelength)
-            found[i] = np.sqrt(np.mean((curve - self.friction[i]) ** 2)) / one.slope
-        return found
+        parts = zip(self.textures, self.friction, self.linear, responses, strict=True)
+        curves = [
+            corrected(_samples(one), linear, response, one.slope, one.wavelength) - friction
+            for one, friction, linear, response in parts
+        ]
+        slope = np.array([texture.slope for texture in self.textures])
+        return np.sqrt(np.mean(np.square(curves), axis=1)) / slope
 
 
 def responses_of(
     textures: Sequence[Parametric], friction: Floats, linear: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Places (N, 6) of textures, the corrections (N, 3) that are interpolated, and how much each
-    counts (N, 3).
-    """
+    """Places (N, 6) of textures, their corrections (N, 3), and how much each of these counts (N, 3)."""
     points = np.array([texture.point() for texture in textures])
     wavelength, slope = np.array([[texture.wavelength, texture.slope] for texture in textures]).T
     curves = (friction, linear, wavelength, slope)
@@ -146,9 +139,7 @@ def shipped(ridged: bool) -> Database:
 
 @cache
 def reference_curves(ridged: bool) -> dict[str, tuple[Floats, Floats]]:
-    """Of each reference texture of heights, x (mm) and the model's friction of one finger at the
-    usual touch.
-    """
+    """x (mm) and the model's friction of one finger at the usual touch, for each reference texture."""
     table = read_table(DATA / CURVES, "references")
     of = table["ridged"] == float(ridged)
     return {name: (table["x"][of], table[name][of]) for name in REFERENCES}
@@ -167,17 +158,12 @@ def textures() -> list[Parametric]:
 
 def references() -> dict[tuple[str, bool], Scene]:
     """The scenes of the reference textures of heights, by their names and whether ridged."""
-    return {
-        (name, ridged): touch_scene(reference(name), Touch(ridged=ridged))
-        for name in REFERENCES
-        for ridged in (False, True)
-    }
+    both = itertools.product(REFERENCES, (False, True))
+    return {(name, ridged): touch_scene(reference(name), Touch(ridged=ridged)) for name, ridged in both}
 
 
 def _ask(result: Result) -> dict[str, float | None]:
-    last = result.motion_index == 2
-    mu = result.applied_tangential_force[last] / result.applied_force[last]
-    return {f"mu{i:02d}": value for i, value in enumerate(mu.tolist())}
+    return {f"mu{i:02d}": value for i, value in enumerate(friction_of(result).friction.tolist())}
 
 
 def _evaluate(text: str) -> Answer:
@@ -187,11 +173,8 @@ def _evaluate(text: str) -> Answer:
 def compute_database(
     folder: str | Path, *, workers: int | None = None, scheduler: str | None = None
 ) -> tuple[Path, dict[str, int]]:
-    """Run the model at every point and over every reference texture that is not finished in `folder`,
-    and write `FILE`, `KERNELS`, `CURVES` and `PADS` there.
-
-    `workers` and `scheduler` as in `evfem.sweep`. Returns the file, and how many points are done and
-    how many are not converged.
+    """Run the model at every point and over every reference texture that is not finished in `folder`, and
+    write `FILE`, `KERNELS`, `CURVES` and `PADS` there; the file, and how many points are done and are not.
     """
     folder = Path(folder)
     scenes: list[tuple[Parametric | tuple[str, bool], Scene]] = [(one, scene(one)) for one in textures()]
@@ -230,9 +213,8 @@ def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
         words = [f"{value:.4g}" for value in (*scale, smoothing)]
         kernels.append([str(int(ridged)), *words])
         written = np.array([float(word) for word in words])
-        rows += _rows(
-            Database(textures, friction, linear, np.zeros(0), written[:-1], float(written[-1])), ridged
-        )
+        known = Database(textures, friction, linear, np.zeros(0), written[:-1], float(written[-1]))
+        rows += _rows(known, ridged)
     write_text(folder / KERNELS, csv_text([["ridged", *RANGES, "smoothing"], *kernels]))
     write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *LINEAR, ERROR], *rows]))
 
@@ -240,6 +222,7 @@ def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
 def _rows(database: Database, ridged: bool) -> list[list[str]]:
     """The rows of one finger, with the errors of points that are left out."""
     found = database.errors_of(database.estimator.left_out())
+    rows = zip(database.textures, database.friction, database.linear, found, strict=True)
     return [
         [
             *(f"{getattr(one, name):.6g}" for name in RANGES),
@@ -247,25 +230,18 @@ def _rows(database: Database, ridged: bool) -> list[list[str]]:
             *(f"{mu:.6f}" for mu in (*curve, *linear)),
             f"{error:.5g}",
         ]
-        for one, curve, linear, error in zip(
-            database.textures, database.friction, database.linear, found, strict=True
-        )
+        for one, curve, linear, error in rows
     ]
 
 
 def _write_references(folder: Path, done: Mapping[tuple[str, bool], Answer]) -> None:
-    """The model's curves of the reference textures."""
+    """The model's curves of the reference textures, NaN where a run has not converged."""
     rows: list[list[str]] = []
     length, steps = Touch().length, steps_over(Touch().length)
     for ridged in (False, True):
+        found = [done[name, ridged].outputs if (name, ridged) in done else {} for name in REFERENCES]
         for i in range(steps):
-            values = [_value(done.get((name, ridged)), i) for name in REFERENCES]
+            values = np.array([outputs.get(f"mu{i:02d}") for outputs in found], dtype=float)
             x = length * (i + 1) / steps
             rows.append([f"{x:.6g}", str(int(ridged)), *(f"{mu:.6f}" for mu in values)])
     write_text(folder / CURVES, csv_text([["x", "ridged", *REFERENCES], *rows]))
-
-
-def _value(answer: Answer | None, step: int) -> float:
-    """The friction at a step, NaN where the run has not converged."""
-    value = None if answer is None else answer.outputs.get(f"mu{step:02d}")
-    return float("nan") if value is None else float(value)

@@ -28,16 +28,7 @@ from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
 from evfem.electrostatics.signalfile import Playback
 from evfem.electrostatics.signals import Amplifier, VoltageProfile
-from evfem.estimate.rendering import (
-    NOISE,
-    ApparentFriction,
-    Comparison,
-    Recording,
-    Signal,
-    compare,
-    exact,
-    voltage_for,
-)
+from evfem.estimate import rendering
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of
 from evfem.simulation.spectrum import amplitudes
 from evfem.surface.surfaces import Display
@@ -79,15 +70,13 @@ class Device(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Rendering:
-    """The voltage for a friction curve, what the display makes of it, and how good that is.
-
-    `felt` (n,) is the friction on the display at the curve's positions, `lost` (n,) where it is not
-    the wish; errors are shares as at the head of this file, `bands` rows (low Hz, high Hz, error,
-    share of the wish's power). An error is NaN where there is nothing to be compared with.
+    """The voltage for a friction curve, the friction `felt` (n,) on the display, `lost` (n,) where that is
+    not the wish, errors as at the head of this file (NaN if there is nothing to be compared with), and
+    `bands`: rows (low Hz, high Hz, error, share of the wish's power).
     """
 
     curve: FrictionCurve
-    signal: Signal
+    signal: rendering.Signal
     felt: Floats
     lost: Floats
     force_error: float
@@ -109,26 +98,30 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
     (0.33, 0.25)
     """
     load = np.full(curve.x.shape, touch.load)
-    wish = ApparentFriction(curve.x, load, np.maximum(curve.friction, 0.0) * load)
-    signal = voltage_for(wish, device.encoding, amplifier=device.amplifier, speed=touch.speed)
+    wish = rendering.ApparentFriction(curve.x, load, np.maximum(curve.friction, 0.0) * load)
+    signal = rendering.voltage_for(wish, device.encoding, amplifier=device.amplifier, speed=touch.speed)
     felt = np.asarray(device.encoding.tangential_force(load, signal.profile(curve.x))) / load
     return _compared(curve, signal, felt, touch.speed)
 
 
-def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) -> Rendering:
-    """Comparison of the `felt` friction (n,) with the target."""
+def _compared(curve: FrictionCurve, signal: rendering.Signal, felt: Floats, speed: float) -> Rendering:
     frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
     _, given = spectrum_of(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
+    bands = []
+    for low, high in pairwise(BANDS):
+        inside = (frequency > low) & (frequency <= high)
+        share = float(np.sum(wanted[inside] ** 2) / max(np.sum(wanted**2), 1e-300))
+        bands.append((low, high, _relative(given[inside], wanted[inside]), share))
     return Rendering(
         curve=curve,
         signal=signal,
         felt=felt,
-        lost=np.abs(felt - curve.friction) > 10.0 * NOISE * np.abs(curve.friction).max(),
+        lost=np.abs(felt - curve.friction) > 10.0 * rendering.NOISE * np.abs(curve.friction).max(),
         force_error=_relative(felt, curve.friction),
         change_error=_relative(felt - felt.mean(), change),
         spectrum_error=_relative(given, wanted),
-        bands=tuple(_band(low, high, frequency, wanted, given) for low, high in pairwise(BANDS)),
+        bands=tuple(bands),
     )
 
 
@@ -144,14 +137,6 @@ def spectrum_of(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floa
     return np.arange(1.0, amplitude.size + 1.0) * speed / float(x[-1] - x[0]), amplitude
 
 
-def _band(
-    low: float, high: float, frequency: Floats, wanted: Floats, given: Floats
-) -> tuple[float, float, float, float]:
-    inside = (frequency > low) & (frequency <= high)
-    share = float(np.sum(wanted[inside] ** 2) / max(np.sum(wanted**2), 1e-300))
-    return low, high, _relative(given[inside], wanted[inside]), share
-
-
 def playback(profile: VoltageProfile, touch: Touch, device: Device) -> Playback:
     """What a file of the voltage needs: as full scale the next power of ten times 1, 2 or 5."""
     largest = max(float(np.max(np.abs(profile.voltage))), 1.0)
@@ -163,9 +148,7 @@ def playback(profile: VoltageProfile, touch: Touch, device: Device) -> Playback:
 
 @dataclass(frozen=True, eq=False)
 class ExactCurve:
-    """The coupled model's own voltage (n,) in V over x (n,) mm, and the `friction` (n,) on the
-    display with it.
-    """
+    """The coupled model's own voltage (n,) in V over x (n,) mm, and the `friction` (n,) with it."""
 
     x: Floats
     voltage: Floats
@@ -176,7 +159,7 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
     """Friction of the coupled model under its own voltage, compared as by `render`."""
     felt = np.interp(curve.x, found.x, found.friction)
     voltage = np.interp(curve.x, found.x, found.voltage)
-    signal = Signal(
+    signal = rendering.Signal(
         profile=VoltageProfile(found.x, found.voltage),
         share_not_renderable=float(np.mean(curve.friction < device.friction)),
         largest=float(found.voltage.max()),
@@ -187,13 +170,10 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
     return _compared(curve, signal, felt, touch.speed)
 
 
-def exact_voltage(reference: Recording, device: Device) -> tuple[ExactCurve, Comparison]:
-    """The display's voltage that gives the same friction force as a recorded slide of `touch_scene`
-    over a texture, step by step (`rendering.exact`), from where the texture begins, and how the forces
-    compare. Takes another run of the model.
-    """
+def exact_voltage(reference: rendering.Recording, device: Device) -> tuple[ExactCurve, rendering.Comparison]:
+    """The voltage that gives a recorded slide's force in each step (`rendering.exact`), and how well."""
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
-    result = exact(reference, display, FORCE_LAWS[device.law](), largest).result
+    result = rendering.exact(reference, display, FORCE_LAWS[device.law](), largest).result
     felt, voltage = friction_of(result), result.voltage[result.motion_index == 2]
-    return ExactCurve(felt.x, voltage, felt.friction), compare(reference.result, result)
+    return ExactCurve(felt.x, voltage, felt.friction), rendering.compare(reference.result, result)

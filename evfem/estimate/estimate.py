@@ -38,7 +38,6 @@ TRIED, ENOUGH, BESIDE = 300, 0.9, 0.125
 MUCH = 0.5
 #: relative distance from the speed of the database that is said
 OTHER_SPEED = 0.05
-MODEL = "the model has no such limit"
 
 
 @dataclass(frozen=True)
@@ -54,12 +53,6 @@ class Reduced:
     in_quadrature: float
     x0: float
     explain: float
-
-    def height(self, x: Floats) -> Floats:
-        """The two harmonics (mm) at x (mm), without the mean of the texture."""
-        turn = 2.0 * np.pi / self.wavelength * (x - self.x0)
-        second = self.in_phase * np.sin(2.0 * turn) + self.in_quadrature * np.cos(2.0 * turn)
-        return np.asarray(self.amplitude * (np.sin(turn) + second))
 
 
 def reduced(texture: Texture) -> Reduced:
@@ -117,20 +110,13 @@ def _harmonics(x: Floats, height: Floats, wavelength: float) -> Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """An estimated friction curve, and what is to be said of it (`notes`, none where all is well).
-
-    `curve.error` is the root mean square error of the points of the database nearby, left out in
-    turn; it knows nothing of what the notes say.
+    """An estimated friction curve, and what is to be said of it (`notes`, none where all is well), of which
+    `curve.error` knows nothing: the rms error of the points of the database nearby, left out in turn.
     """
 
     curve: FrictionCurve
     notes: tuple[str, ...]
     reduced: Reduced | None = None
-
-    @property
-    def trusted(self) -> bool:
-        """Whether nothing speaks against it."""
-        return not self.notes
 
 
 def estimate(texture: Texture, touch: Touch) -> Estimate:
@@ -151,20 +137,19 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
     x, mu, missing = _friction(texture, touch, near, response)
     notes = _notes(wanted, found, touch)
     if near.slope * error > MUCH * np.ptp(mu):
-        notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
+        notes.append("the error of the estimate is more than half of the range that it shows")
     if missing:
-        notes = (*notes, f"no equilibrium was found on {missing:.0%} of the slide: {MODEL}")
+        notes.append(f"no equilibrium was found on {missing:.0%} of the slide")
     if not database.estimator.holds(place):
-        notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
-    return Estimate(FrictionCurve(x, mu, "estimate", near.slope * error), notes, found)
+        notes.append("the texture is outside the hull of the database's points")
+    curve = FrictionCurve(x, mu, "estimate", near.slope * error)
+    return Estimate(curve, tuple(f"{note}: the model has no such limit" for note in notes), found)
 
 
 def _friction(
     texture: Texture, touch: Touch, near: Parametric, response: Floats
 ) -> tuple[Floats, Floats, float]:
-    """x (n,) in mm, the corrected friction (n,) there, and the share of it that was not found and is
-    interpolated.
-    """
+    """x (n,) in mm, the corrected friction (n,), and the share that was not found and is interpolated."""
     x, linear, period = linear_friction(texture, replace(touch, friction=near.friction, load=near.load))
     found = np.isfinite(linear)
     if not found.all():
@@ -175,9 +160,7 @@ def _friction(
 
 
 def known_error(name: str, ridged: bool) -> float:
-    """What an estimate of a reference texture of heights is off by at the usual touch: root mean
-    square, as a share of the range of the model's curve.
-    """
+    """Rms error of the estimate of a reference texture, as a share of the range of the model's curve."""
     x, friction = reference_curves(ridged)[choice("texture", name, tuple(REFERENCES))]
     curve = estimate(reference(name), Touch(ridged=ridged)).curve
     wrong = np.interp(x, curve.x, curve.friction) - friction
@@ -185,9 +168,7 @@ def known_error(name: str, ridged: bool) -> float:
 
 
 def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, float]:
-    """x (n,) in mm, the friction (n,) there of a pad that yields linearly, NaN where it is not
-    found, and after how many mm it repeats: the texture's period, or a little more than the slide.
-    """
+    """x (n,) in mm, the friction of a pad that yields linearly, NaN where not found, and its period in mm."""
     period = min(texture.period or np.inf, touch.length + 2.0 * BESIDE)
     steps = int(np.ceil(period * steps_over(touch.length) / touch.length))
     x = np.linspace(-BESIDE, period - BESIDE, steps, endpoint=False)
@@ -196,17 +177,16 @@ def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, flo
         return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
 
 
-def _notes(wanted: Parametric, found: Reduced, touch: Touch) -> tuple[str, ...]:
+def _notes(wanted: Parametric, found: Reduced, touch: Touch) -> list[str]:
     notes = [
-        f"{name.replace('_', ' ')} {getattr(wanted, name):.3g} is outside the database, "
-        f"{low:g} to {high:g}: {MODEL}"
+        f"{name.replace('_', ' ')} {getattr(wanted, name):.3g} is outside the database, {low:g} to {high:g}"
         for name, (low, high) in wanted.beyond().items()
     ]
     if found.explain < ENOUGH:
         notes.append(
             f"two harmonics of {found.wavelength:.3g} mm hold {found.explain:.0%} of the heights' variance, "
-            f"the rest is not corrected: {MODEL}"
+            "the rest is not corrected"
         )
     if abs(touch.speed / SPEED - 1.0) > OTHER_SPEED:
-        notes.append(f"the corrections were made at {SPEED:g} mm/s: {MODEL}")
-    return tuple(notes)
+        notes.append(f"the corrections were made at {SPEED:g} mm/s")
+    return notes

@@ -30,9 +30,7 @@ FIRST_SCALE, FIRST_SMOOTHING, MOST_TRIES = 2.0, 0.1, 600
 
 @dataclass(frozen=True, eq=False)
 class Estimator:
-    """Estimates responses (M,) at places in the box from points (N, 6) and their responses (N, M);
-    `scale` (6,) stretches the axes.
-    """
+    """Responses (M,) at places from those (N, M) of points (N, 6); `scale` (6,) stretches the axes."""
 
     points: Floats
     responses: Floats
@@ -50,9 +48,7 @@ class Estimator:
         return np.asarray(weight / weight.sum())
 
     def holds(self, place: Floats) -> bool:
-        """Whether a place is inside the hull of the points: a mean of them with weights that are not
-        negative.
-        """
+        """Whether a place is inside the hull of the points: a mean with weights that are not negative."""
         from scipy.optimize import linprog
 
         equations = np.concatenate([self.points.T, np.ones((1, len(self.points)))])
@@ -63,14 +59,8 @@ class Estimator:
     def _surface(self) -> Any:
         from scipy.interpolate import RBFInterpolator
 
-        return RBFInterpolator(
-            self.points * self.scale,
-            self.responses,
-            kernel="gaussian",
-            epsilon=np.sqrt(0.5),
-            smoothing=self.smoothing,
-            degree=1,
-        )
+        kernel: Any = {"kernel": "gaussian", "epsilon": np.sqrt(0.5), "degree": 1}
+        return RBFInterpolator(self.points * self.scale, self.responses, smoothing=self.smoothing, **kernel)
 
     def left_out(self) -> Floats:
         """Leave-one-out prediction of each point's response, (N, M)."""
@@ -80,11 +70,6 @@ class Estimator:
         """The same without point i."""
         points, responses = np.delete(self.points, i, 0), np.delete(self.responses, i, 0)
         return Estimator(points, responses, self.scale, self.smoothing)
-
-
-def _mean_error(errors: Floats, weights: Floats) -> float:
-    """Mean size of weighted errors (N, M), each of which counts as 1 where it is larger."""
-    return float(np.mean(np.minimum(np.sqrt(np.sum((weights * errors) ** 2, axis=1)), 1.0)))
 
 
 def best_kernel(points: Floats, responses: Floats, weights: Floats) -> tuple[Floats, float]:
@@ -99,7 +84,8 @@ def best_kernel(points: Floats, responses: Floats, weights: Floats) -> tuple[Flo
         square = np.sum((stretched[:, None] - stretched[None]) ** 2, axis=2)
         matrix = np.exp(-0.5 * square) + np.exp(logarithms[-1]) * np.eye(len(points))
         inverse = np.linalg.inv(matrix)
-        return _mean_error(inverse @ rest / np.diag(inverse)[:, None], weights)
+        sizes = np.linalg.norm(weights * (inverse @ rest) / np.diag(inverse)[:, None], axis=1)
+        return float(np.mean(np.minimum(sizes, 1.0)))
 
     begin = np.append(np.full(points.shape[1], np.log(FIRST_SCALE)), np.log(FIRST_SMOOTHING))
     found = minimize(error, begin, method="Nelder-Mead", options={"maxfev": MOST_TRIES})

@@ -76,22 +76,16 @@ class Parametric(Checked):
 
     def beyond(self) -> dict[str, tuple[float, float]]:
         """Parameters outside the database, with what it has: {} where it has all of them."""
-        slack = 1e-9
-        return {
-            name: (low, high)
-            for name, (low, high, _) in RANGES.items()
-            if not low - slack <= getattr(self, name) <= high + slack
-        }
+        ends = {name: (low - 1e-9, high + 1e-9) for name, (low, high, _) in RANGES.items()}
+        wrong = [name for name, (low, high) in ends.items() if not low <= getattr(self, name) <= high]
+        return {name: RANGES[name][:2] for name in wrong}
 
     def point(self) -> Floats:
         """Its place (6,) in the database, 0 to 1 along each axis where it is inside."""
-        return np.array([_share(getattr(self, name), *RANGES[name]) for name in RANGES])
-
-
-def _share(value: float, low: float, high: float, logarithmic: bool) -> float:
-    if logarithmic:
-        value, low, high = np.log(value), np.log(low), np.log(high)
-    return (value - low) / (high - low)
+        ends = np.array([(getattr(self, name), low, high) for name, (low, high, _) in RANGES.items()]).T
+        logarithmic = [logarithmic for _, _, logarithmic in RANGES.values()]
+        ends[:, logarithmic] = np.log(ends[:, logarithmic])
+        return (ends[0] - ends[1]) / (ends[2] - ends[1])
 
 
 def at(point: Floats, ridged: bool) -> Parametric:
@@ -111,17 +105,15 @@ def scene(texture: Parametric) -> Scene:
     """Viscous sliding of the coarse pad over the texture at a held load: a second slide of one
     period in `SAMPLES` steps, after a first one over whole periods until everything slips.
     """
-    periods = np.ceil(SLIP_PER_FORCE * texture.friction * texture.load / texture.wavelength)
-    slides = [(float(periods) * texture.wavelength, STEPS_BEFORE), (texture.wavelength, SAMPLES)]
+    periods = float(np.ceil(SLIP_PER_FORCE * texture.friction * texture.load / texture.wavelength))
+    slides = [(periods * texture.wavelength, STEPS_BEFORE), (texture.wavelength, SAMPLES)]
     return sliding(texture.surface(), texture, slides, name="texture")
 
 
 def sliding(
     surface: Any, finger: Any, slides: list[tuple[float, int]], speed: float = SPEED, **more: Any
 ) -> Scene:
-    """The coarse pad, viscous, is pressed to the `load` of a `ridged` or smooth finger and slid at that load:
-    lengths in mm and steps.
-    """
+    """The coarse viscous pad is pressed to a `finger`'s `load` and slid at it: lengths in mm and steps."""
     return Scene(
         FingerPad(resolution="coarse", ridges=finger.ridged, viscosity=VISCOSITY),
         surface,

@@ -43,9 +43,8 @@ MARGIN = 14
 
 @dataclass(frozen=True, eq=False)
 class PressedPad:
-    """n nodes of a pad under a `load` (N/mm): their `x` and `y` (n,) where nothing has moved,
-    relative to the bone (mm). Forces F (2 n,), y components first, move them by `base` (2 n,)
-    + `compliance` (2 n, 2 n) F; `force` (2 n,) are those on a flat surface.
+    """n nodes of a pad under a `load` (N/mm), at `x`, `y` (n,) relative to the bone (mm) if unmoved. Forces F
+    (2 n,), y first, move them by `base` + `compliance` F; `force` are those on a flat surface.
     """
 
     x: Floats
@@ -68,10 +67,7 @@ class Remembered:
     compliance: Any
 
     def at(self, load: float, friction: float) -> PressedPad:
-        """The pad under a load (N/mm) and a friction, those of its nodes that touch or nearly do.
-
-        Both are within `LOADS` and `FRICTIONS`.
-        """
+        """The pad under a load (N/mm) and friction within those stored: nodes that touch or nearly do."""
         weight = np.outer(_hats(np.log(LOADS), np.log(load)), _hats(FRICTIONS, friction)).ravel()
         n = len(self.points)
         force = weight @ self.force
@@ -101,9 +97,8 @@ def shipped_pad(ridged: bool) -> Remembered:
 def read(path: Path, ridged: bool) -> Remembered:
     """The pad of one finger in a file that `write` wrote."""
     arrays = load_arrays(path, "pads", FORMAT)
-    points, moved, force, packed = (
-        arrays[f"{name}_{int(ridged)}"] for name in ("points", "moved", "force", "triangle")
-    )
+    names = ("points", "moved", "force", "triangle")
+    points, moved, force, packed = (arrays[f"{name}_{int(ridged)}"] for name in names)
     size = moved.shape[1]
     upper = np.triu_indices(size)
     compliance = np.zeros((len(moved), size, size), dtype=np.float32)
@@ -131,9 +126,7 @@ def write(path: Path, pads: Mapping[bool, Remembered]) -> None:
 
 
 def remember(ridged: bool) -> Remembered:
-    """Run the model on a flat surface at `LOADS` and `FRICTIONS` until the whole contact slips, and keep
-    what is stored of it.
-    """
+    """Run the model on a flat surface at `LOADS` and `FRICTIONS` until all slips; what is stored of it."""
     cases = itertools.product(LOADS.tolist(), FRICTIONS.tolist())
     runs = [_slid(Parametric(friction=mu, load=load, ridged=ridged)) for load, mu in cases]
     mesh, pad = runs[0].model.mesh, runs[0].model.pad

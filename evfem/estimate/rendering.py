@@ -34,10 +34,7 @@ NOISE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A scene, its result, and the position (mm) of the first step in which no touching node sticks.
-
-    `full_slip` is None if some node sticks in every step of the slides.
-    """
+    """A scene, its result, and the position (mm) of the first step without a sticking node, or None."""
 
     scene: Scene
     result: Result
@@ -45,9 +42,7 @@ class Recording:
 
     @property
     def peak_voltage(self) -> Array:
-        """Peak (V) of the waveform in every step, `result.voltage` being its effective value: that
-        of the scene's drive, or of a sine.
-        """
+        """Peak (V) of the waveform in every step, whose effective value is `result.voltage`."""
         return np.asarray((self.scene.drive or Drive()).peak(self.result.voltage))
 
 
@@ -91,7 +86,6 @@ class ApparentFriction:
             raise InputError("normal_force", lowest, "an applied force above zero all along the slide")
 
     def __repr__(self) -> str:
-        """Its size and range."""
         x, mu = self.position, self.friction
         span = f"{len(x)} positions, {plus(x[0]):.4g} to {plus(x[-1]):.4g} mm"
         return f"ApparentFriction({span}, friction {plus(mu.min()):.4g} to {plus(mu.max()):.4g})"
@@ -110,14 +104,9 @@ class ApparentFriction:
 
 
 def apparent_friction(result: Result) -> ApparentFriction:
-    """Applied forces over the slide of `result`, the state just before its first step included.
-
-    Raises InputError unless all slides go towards +x and follow each other.
-    """
+    """Applied forces over the slides towards +x, the state just before them included; else InputError."""
     rows = _slide_rows(result)
-    first = rows[0]
-    if first > 0:
-        rows = np.concatenate([[first - 1], rows])
+    rows = np.arange(max(rows[0] - 1, 0), rows[-1] + 1)
     x = result.position[rows]
     if np.any(np.diff(x) <= 0.0):
         raise InputError("slide", "positions that do not grow from step to step", "a slide towards +x")
@@ -216,10 +205,8 @@ def replay(
     voltage: VoltageProfile | FollowForce,
     drive: Drive | None = None,
 ) -> Recording:
-    """The reference's finger, motion and solver on a display under a voltage.
-
-    As in the paper the finger is pressed to the load that the reference had at the end of its
-    press, and slid in the same steps. A `drive` makes the effective voltage alternate.
+    """The reference's finger, motion and solver on a display under a voltage, alternating by a `drive`: as in
+    the paper, pressed to the load that the reference had after its press, and slid in the same steps.
     """
     motion = list(reference.scene.motion)
     first = next((i for i, part in enumerate(motion) if part.course.distance), 0)
@@ -243,8 +230,8 @@ def exact(
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as its
     equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
     attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
-    was. The voltage found, an effective one, is in `result.voltage`, the peak of the `drive`'s waveform in
-    `peak_voltage`; `Comparison.unmet` says where the wish was out of reach.
+    was. The voltage found, an effective one, is in `result.voltage`, the `drive`'s peak in `peak_voltage`;
+    `Comparison.unmet` says where the wish was out of reach.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
@@ -270,7 +257,6 @@ class Comparison:
     voltage_difference: float
 
     def __repr__(self) -> str:
-        """Quality of the rendering."""
         good = f"pearson {self.pearson:.4g}, relative L2 error {self.relative_l2:.4g}"
         most = f"at most {self.largest_error:.4g} N/mm and {self.voltage_difference:.4g} V apart"
         return f"Comparison({len(self.position)} positions: {good}, {most})"
@@ -286,11 +272,7 @@ class Comparison:
 
 
 def compare(reference: Result, rendered: Result) -> Comparison:
-    """Pearson's r and relative L2 error ||F - F_ref|| / ||F_ref|| of `applied_tangential_force`.
-
-    At equal positions, over all steps of the slide from its first one. Raises InputError if the
-    slides differ.
-    """
+    """Pearson's r and relative L2 error of `applied_tangential_force` over equal slides; else InputError."""
     rows, others = _slide_rows(reference), _slide_rows(rendered)
     x, y = reference.position[rows], rendered.position[others]
     if x.shape != y.shape or not np.allclose(x, y, rtol=0.0, atol=1e-9):
@@ -307,11 +289,6 @@ def compare(reference: Result, rendered: Result) -> Comparison:
 
 
 def pearson(one: Array, other: Array) -> float:
-    """Pearson's correlation coefficient of two series; nan if one of them is constant.
-
-    >>> round(pearson(np.array([1.0, 2.0, 3.0]), np.array([2.0, 5.0, 6.0])), 4)
-    0.9608
-    """
-    a, b = one - np.mean(one), other - np.mean(other)
-    size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return float(np.clip(a @ b / size, -1.0, 1.0)) if size > 0.0 else float("nan")
+    """Pearson's correlation coefficient of two series; nan if one of them is constant."""
+    both_change = np.ptp(one) > 0.0 and np.ptp(other) > 0.0
+    return float(np.corrcoef(one, other)[0, 1]) if both_change else float("nan")

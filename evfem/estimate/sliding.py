@@ -22,7 +22,7 @@ deforms far from what it does on a flat surface, stands in the database (`correc
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -40,17 +40,9 @@ LAG = 1.0 - NU * (1.0 - 2.0 * NU) / (1.0 - NU)
 RUN_IN = 12
 
 
-class Ground(Protocol):
-    """A rigid profile: its height (mm) and slope at x (mm)."""
-
-    def height(self, x: Floats) -> Floats: ...
-
-    def slope(self, x: Floats) -> Floats: ...
-
-
-def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, speed: float) -> Floats:
-    """The apparent friction (n,) at positions (n,) of the bone (mm), at an even spacing, for a speed
-    (mm/s), NaN where the pad is not found. `RUN_IN` steps go before.
+def slid(pad: PressedPad, ground: Any, friction: float, positions: Floats, speed: float) -> Floats:
+    """The friction (n,) at even positions (n,) of the bone (mm) and a speed (mm/s), NaN where not found;
+    `ground` has `height` (mm) and `slope` at x (mm).
     """
     step = float(positions[1] - positions[0])
     lag = LAG * VISCOSITY * speed / step
@@ -97,9 +89,7 @@ def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, sp
 def _balance(
     compliance: Floats, gap: Floats, slope: Floats, ways: Floats, touching: Any, load: float
 ) -> tuple[Floats, float]:
-    """Forces (2 n,) along `ways` (2 n,) on the nodes that touch, and the bone's height, that close
-    the `gap` (n,) of these nodes and carry the load.
-    """
+    """Forces (2 n,) along `ways` on touching nodes, and the bone's height: gaps close under the load."""
     n = gap.size
     on = np.flatnonzero(touching)
     m = on.size

@@ -14,6 +14,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, between, yes_or_no
+from evfem.common.tables import csv_text
 from evfem.errors import InputError
 from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, sliding
 from evfem.scene.scene import Output, Scene
@@ -43,22 +44,20 @@ class Touch(Checked):
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Apparent friction F_t / F_n (n,) over the position (n,) mm, x = 0 where the texture begins.
-
-    `source` says where it is from; `error` is its band (half width), None where it is not known.
-    """
+    """Friction (n,) over x (n,) mm from the texture's begin, its `source`, and if known its +- `error`."""
 
     x: Floats
     friction: Floats
     source: str
     error: float | None = None
 
+    def rows(self) -> str:
+        """Content of its `.csv`."""
+        return csv_text([["x", "friction"], *zip(self.x.tolist(), self.friction.tolist(), strict=True)])
+
 
 def touch_scene(texture: Texture, touch: Touch, *, every: int = 0) -> Scene:
-    """The scene of a slide over the texture; `every`: fields of every so many steps are kept.
-
-    The bone passes x = 0 when the second slide begins.
-    """
+    """The scene of a slide over the texture, x = 0 where the second slide begins; `every` as in `Output`."""
     before = max(SLIP_PER_FORCE * touch.friction * touch.load, 0.5)
     slides = [(before, STEPS_BEFORE), (touch.length, steps_over(touch.length))]
     output = Output(every=every) if every else Output()
@@ -88,10 +87,7 @@ def _file_name(name: str) -> str:
 
 
 def from_texture(result: Result) -> Result:
-    """A slide of `touch_scene` for pictures: its frames stand where the texture's x is that of the curve.
-
-    The surface below them is then that of their gaps.
-    """
+    """A slide of `touch_scene` for pictures: its frames stand where the texture's x is that of the curve."""
     before = _run_in(result)
     frames = [
         replace(one, position=one.position - before, displacement=one.displacement - [before, 0.0])

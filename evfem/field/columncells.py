@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -53,16 +53,6 @@ def _products() -> Floats:
 
 
 _PRODUCTS = _products()
-
-
-class Lowest(Protocol):
-    """What joins the equations of the lowest row instead of a given potential there."""
-
-    def matrix(self) -> tuple[Any, Any]:
-        """Diagonal (L,) and off-diagonal (L - 1,)."""
-
-    def load(self) -> Any:
-        """Right-hand side (L,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +109,7 @@ class Cells:
             self._part(result, a)[...] -= product
         return result
 
-    def potential(self, strips: Lowest | None, floating: bool) -> Any:
+    def potential(self, strips: Any | None, floating: bool) -> Any:
         """Potential (L, rows): 1 on the lowest curve (or strips), 0 on the highest; `floating`: no charge."""
         given = np.zeros((2, self.lines, self.per_line))  # for the electrodes, and for 1 on the highest curve
         given[1, :, -1] = 1.0
@@ -136,25 +126,7 @@ class Cells:
         charges = [np.sum(self.load(one)[:, -1]) for one in phi]
         return phi[0] - charges[0] / charges[1] * phi[1]
 
-    def factor(self) -> Any:
-        """Cholesky factor (width, unknowns) of the matrix of potentials given on both curves."""
-        from scipy.linalg import cholesky_banded
-
-        band = self._band(None, [0, self.per_line - 1])
-        return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-
-    def corrected(self, phi: Floats, factor: Floats) -> Floats:
-        """Potential (L, rows) from the `factor` of nearly these cells, by two steps: of second order."""
-        from scipy.linalg import cho_solve_banded
-
-        for _ in range(2):
-            missing = self.load(phi)
-            missing[:, [0, -1]] = 0.0
-            step = cho_solve_banded((factor, True), missing.ravel(), check_finite=False)
-            phi = phi + step.reshape(phi.shape)
-        return phi
-
-    def _band(self, strips: Lowest | None, held: list[int]) -> Any:
+    def _band(self, strips: Any | None, held: list[int]) -> Any:
         """The matrix as a lower band, (width, unknowns); the rows `held` of every line drop out."""
         width = self.per_line + 3
         band = np.zeros((width, self.lines, self.per_line), dtype=self.matrices.dtype)

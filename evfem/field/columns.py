@@ -46,14 +46,6 @@ class Capacitance:
 
 
 @dataclass(frozen=True, eq=False)
-class Nearby:
-    """Start for outlines close to a solved one: its potential `phi` (L, rows) and its matrix's factor."""
-
-    phi: Floats
-    factor: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class Columns:
     """Layers of relative permittivity `eps_r` (n,), upwards; rows at the `shares[l]` of the height."""
 
@@ -66,14 +58,12 @@ class Columns:
         levels: Floats,
         electrodes: Floats | None = None,
         floating: bool = False,
-        near: Nearby | None = None,
     ) -> Capacitance:
         """Solve between curves of heights `levels` (n + 1, L) at the lines `x` (L,) in mm.
 
         `electrodes` (K, 3) are pieces of the lowest curve, from and to in mm and their voltage over U;
         between them nothing crosses it. Without, all of it is one electrode. The highest curve is at
-        0, or, `floating`, at the potential at which it has no charge. From what is `near` the potential
-        is exact to the second order in what has moved, and takes half of the time.
+        0, or, `floating`, at the potential at which it has no charge.
 
         >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
         >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
@@ -81,7 +71,7 @@ class Columns:
         (10.0, -100.0)
         """
         cells, strips = self.cells(x, levels, electrodes)
-        phi = cells.potential(strips, floating) if near is None else cells.corrected(near.phi, near.factor)
+        phi = cells.potential(strips, floating)
         found = cells.squares(phi)
         value = cells.energy(found)
         by_x = cells.by_x(found, np.ones_like(cells.share), np.zeros_like(cells.rise))
@@ -92,11 +82,6 @@ class Columns:
             by_level[1] += THIN * by_level[0]
             by_level[0] *= 1.0 - THIN
         return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, cells.heights())
-
-    def nearby(self, x: Floats, levels: Floats) -> Nearby:
-        """Start values for close outlines, under one electrode and a grounded finger."""
-        cells, _ = self.cells(x, levels, None)
-        return Nearby(cells.potential(None, False), cells.factor())
 
     def cells(self, x: Floats, levels: Floats, electrodes: Floats | None) -> tuple[Cells, Strips | None]:
         """The cells, and what stands for the lowest ones on electrodes that end."""

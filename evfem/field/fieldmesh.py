@@ -81,12 +81,6 @@ class FieldMesh:
             local[:, k] = share, min(1.0, (y[k] - low[row]) / (high[row] - low[row]))
         return order[found], local
 
-    def moved(self, distance: float) -> FieldMesh:
-        """The same cells with the body `distance` (mm) higher."""
-        points = self.points + distance * np.stack([np.zeros_like(self.lift), self.lift])
-        return FieldMesh(points, self.line, self.row, self.cells, self.in_slab, self.lift, self.shape,
-                         self.periodic)  # fmt: skip
-
 
 def fractions(low: float, high: float, growth: float) -> Floats:
     """Rows of a block as shares of its height, with rows of the given shares at its two ends."""

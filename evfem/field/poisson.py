@@ -30,7 +30,7 @@ import scipy.sparse as sparse
 from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import eps_0
 from evfem.field.fieldmesh import FieldMesh
-from evfem.tensor import ddot, dot, identity
+from evfem.tensor import dot, identity
 
 #: polynomial order of the elements
 ORDER = 3
@@ -42,10 +42,10 @@ def poisson(u: Any, v: Any, w: Any) -> Any:
 
 
 def virtual_work(w: Any) -> Any:
-    """-T : grad V of the potential `w.phi` and the velocity of the mesh `w.x_velocity`, `w.y_velocity`."""
+    """-T : grad V of the potential `w.phi` where the mesh moves up with the velocity `w.lift`."""
     E = -w.phi.grad
     T = w.eps * (E[:, None] * E[None] - 0.5 * dot(E, E) * identity(2, E.ndim - 1))
-    return -ddot(T, np.stack([w.x_velocity.grad, w.y_velocity.grad]))
+    return -dot(T[1], w.lift.grad)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +65,17 @@ class Potential:
         """Capacitance in F per m of depth, numerically N/V^2."""
         return float(eps_0 * self.phi @ (self.space.stiffness @ self.phi))
 
-    def force(self, lift: Floats | None = None, direction: int = 1) -> float:
-        """Force in N/mm at 1 V along y (`direction` 0: x) on what moves with `lift`, by default the body."""
-        return self.space.force(self.phi, self.space.mesh.lift if lift is None else lift, direction)
+    @property
+    def force(self) -> float:
+        """Force in N/mm at 1 V along y on the body, which moves with the mesh's `lift`."""
+        import skfem
+
+        space = self.space
+        values = {
+            "phi": space.basis.interpolate(self.phi),
+            "lift": space.vertices.interpolate(space.mesh.lift),
+        }
+        return float(eps_0 * skfem.Functional(virtual_work).assemble(space.basis, eps=space.eps, **values))
 
     def values(self, x: Floats, y: Floats) -> Floats:
         """Potential (...) at places (...) in mm."""
@@ -101,14 +109,12 @@ class Potential:
 class Space:
     """Elements on a field's mesh, assembled."""
 
-    def __init__(self, mesh: FieldMesh, eps_r: float, order: int = ORDER) -> None:
+    def __init__(self, mesh: FieldMesh, eps_r: float) -> None:
         import skfem
 
-        self.mesh, self.order = mesh, order
+        self.mesh = mesh
         grid = skfem.MeshQuad(mesh.points, mesh.cells, sort_t=False, validate=False)
-        element = skfem.ElementQuad2() if order == 2 else skfem.ElementQuadP(order)
-        rule = {"intorder": 2 * order}
-        self.basis = skfem.CellBasis(grid, element, **rule)
+        self.basis = skfem.CellBasis(grid, skfem.ElementQuadP(ORDER), intorder=2 * ORDER)
         self.vertices = self.basis.with_element(skfem.ElementQuad1())
         points = self.basis.X.shape[1]
         self.eps = np.repeat(1.0 + (eps_r - 1.0) * mesh.in_slab, points).reshape(-1, points)
@@ -119,16 +125,6 @@ class Space:
         import skfem
 
         return skfem.BilinearForm(poisson).assemble(self.basis, eps=self.eps).tocsr()
-
-    def force(self, phi: Floats, lift: Floats, direction: int) -> float:
-        """`virtual_work` of the velocity `lift` of the vertices along an axis, in N/mm."""
-        import skfem
-
-        along, still = self.vertices.interpolate(lift), self.vertices.interpolate(0.0 * lift)
-        velocity = (along, still) if direction == 0 else (still, along)
-        values = {"phi": self.basis.interpolate(phi), "eps": self.eps}
-        moving = {"x_velocity": velocity[0], "y_velocity": velocity[1]}
-        return float(eps_0 * skfem.Functional(virtual_work).assemble(self.basis, **values, **moving))
 
     def solve(self) -> Floats:
         """Potential that is 0 on the body and 1 on the electrode."""
@@ -161,8 +157,6 @@ class Space:
         body = self.basis.get_dofs(facets[~(electrode | paired)]).all()
         plate = self.basis.get_dofs(facets[electrode]).all()
         phi[self.basis.nodal_dofs[0, np.unique(grid.facets[:, facets[electrode]])]] = 1.0
-        if self.order == 2:
-            phi[plate] = 1.0
         return phi, np.union1d(body, plate), master
 
     def _join(self, master: Ints, left: Ints, right: Ints) -> None:

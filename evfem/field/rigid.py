@@ -123,7 +123,7 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
             f"field: a capacitance of {capacitance:.6g} F/mm is not between its bounds {bounds[0]:.6g} and "
             f"{bounds[1]:.6g}; try an outline whose points are less unevenly spaced"
         )
-    force = -(voltage**2) * solved.force()
+    force = -(voltage**2) * solved.force
     return FieldSolution(capacitance, force, bounds, voltage, thickness, solved)
 
 

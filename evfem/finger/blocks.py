@@ -13,26 +13,15 @@ template of `evfem.finger.lattice` in the plane of that direction and r, swept a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.finger.lattice import MIDDLE
+from evfem.finger.lattice import quads
 from evfem.mesh.mesh import Mesh, raised
 
 #: parameters of the cells' corners count as the same if they agree to this many digits
 DIGITS = 9
-#: corners (u in thirds of the merged column, r) of the template's four cells
-TEMPLATE = np.array(
-    [
-        [(1, 0), (2, 0), (2, MIDDLE), (1, MIDDLE)],
-        [(0, 0), (1, 0), (1, MIDDLE), (0, 1)],
-        [(2, 0), (3, 0), (3, 1), (2, MIDDLE)],
-        [(1, MIDDLE), (2, MIDDLE), (3, 1), (0, 1)],
-    ]
-)
-PLAIN = np.array([[(0, 0), (1, 0), (1, 1), (0, 1)]])
 
 
 def block(columns: tuple[int, int], rows: int, merging: Sequence[Sequence[int]], order: int) -> Mesh:
@@ -60,18 +49,12 @@ def _row(columns: tuple[int, int], r: int, merging: Sequence[Sequence[int]]) -> 
     if all(merged):
         raise ValueError("a row merges columns of one direction alone")
     across = 1 if merged[1] else 0
-    quads = _quads(below[across], r, merged[across])
+    starts = np.arange(below[across]) / below[across]
+    cells = quads(starts, np.full_like(starts, 1.0 / below[across]), r, merged[across])
     count = below[1 - across]
-    swept = np.empty((len(quads), count, 8, 3))
-    swept[..., across] = np.tile(quads[..., 0], 2)[:, None]
-    swept[..., 2] = np.tile(quads[..., 1], 2)[:, None]
+    swept = np.empty((len(cells), count, 8, 3))
+    swept[..., across] = np.tile(cells[..., 0], 2)[:, None]
+    swept[..., 2] = np.tile(cells[..., 1], 2)[:, None]
     place = np.arange(count)[:, None] + np.repeat([0, 1], 4)
     swept[..., 1 - across] = place / count
     return swept.reshape(-1, 8, 3)
-
-
-def _quads(count: int, r: int, merged: bool) -> Floats:
-    """Corners (K, 4, 2) of the cells of a row in one direction and r; `count` columns below it."""
-    shape = TEMPLATE / [3.0, 1.0] if merged else PLAIN
-    cells = np.array([[(i + u, r + s) for u, s in cell] for i, cell in product(range(count), shape)])
-    return cells / [count, 1.0]

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import check_fields, instance, one_of, set_frozen, truth
+from evfem.common.checks import between, check_fields, instance, one_of, set_frozen, truth
 from evfem.common.views import short
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import NAIL, thickness_of
@@ -29,8 +29,6 @@ from evfem.finger.sizes import (
     Electrical,
     LayeredFinger,
     Materials,
-    NailThickness,
-    NailWidth,
     Relaxation,
     Skin,
     Viscosity,
@@ -39,6 +37,7 @@ from evfem.finger.sizes import (
     check_cells,
     check_profile,
     check_skin,
+    thickness_range,
 )
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
@@ -130,8 +129,8 @@ class FingerPad(LayeredFinger):
         {"allowed": "the path of a csv file with the header x,height or x,y", "type": _SCAN, "file": True},
         "ridges as they were scanned",
     ] = None
-    nail_thickness: NailThickness = thickness_of("nail")
-    nail_width: NailWidth = 11.0
+    nail_thickness: Annotated[float, thickness_range("nail"), "of the nail"] = thickness_of("nail")
+    nail_width: Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"] = 11.0
     beside = (NAIL,)
 
     def __post_init__(self) -> None:

@@ -14,16 +14,25 @@ transition row merges three columns into one:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evfem.common.arrays import Floats, Ints
-from evfem.mesh.mesh import Mesh, raised
 
-#: How far down a transition row (from 0 to 1) the nodes p1, p2 lie.
+#: how far down a transition row (from 0 to 1) the nodes p1, p2 lie
 MIDDLE = 0.5
+#: corners (u as a share of the merged column, r) of a transition's four cells, and of another row's only one
+TEMPLATE = np.array(
+    [
+        [(1 / 3, 0), (2 / 3, 0), (2 / 3, MIDDLE), (1 / 3, MIDDLE)],
+        [(0, 0), (1 / 3, 0), (1 / 3, MIDDLE), (0, 1)],
+        [(2 / 3, 0), (1, 0), (1, 1), (2 / 3, MIDDLE)],
+        [(1 / 3, MIDDLE), (2 / 3, MIDDLE), (1, 1), (0, 1)],
+    ]
+)
+PLAIN = np.array([[(0, 0), (1, 0), (1, 1), (0, 1)]])
+#: parts of a base column that all nodes of linear cells stand at
+UNITS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,76 +57,31 @@ def ring(splits: Ints, rows: int, transitions: tuple[int, ...], order: int) -> L
     >>> len(mesh.u), np.bincount(mesh.row).tolist()
     (28, [8, 10, 4])
     """
-    tops = [3 ** (len(transitions) - sum(t < line for t in transitions)) for line in range(rows + 1)]
-    lines, nodes = [], 0
-    for top in tops:
-        split = np.minimum(splits, top)
-        lines.append(_Line(split, nodes))
-        nodes += lines[-1].size
-    blocks, extra = [], [np.empty((0, 2))]
-    for r, (upper, lower) in enumerate(pairwise(lines)):
-        if upper.size == lower.size:
-            blocks.append(_plain(upper, lower))
-            continue
-        block, new = _transition(upper, lower, nodes)
-        nodes += len(new)
-        blocks.append(block)
-        extra.append(np.column_stack([new, np.full(len(new), r + MIDDLE)]))
-    on_lines = [np.column_stack([line.u, np.full(line.size, float(r))]) for r, line in enumerate(lines)]
-    cells = np.vstack([cells for cells, _ in blocks])
-    row = np.repeat(np.arange(rows), [len(cells) for cells, _ in blocks])
-    column = np.concatenate([column for _, column in blocks])
-    return _closed(np.vstack(on_lines + extra), cells, row, column, order)
+    cells, column = [], []
+    for r in range(rows):
+        above, below = (np.minimum(splits, 3 ** sum(t >= line for t in transitions)) for line in (r, r + 1))
+        own = np.repeat(np.arange(len(splits)), below)
+        part = np.arange(len(own)) - np.repeat(np.cumsum(below) - below, below)
+        width = UNITS // below[own]
+        for chosen, merged in ((above == below, False), (above > below, True)):
+            here = chosen[own]
+            corners = quads((UNITS * own + width * part)[here], width[here], r, merged)
+            cells.append(corners)
+            column.append(np.repeat(own[here], len(corners) // max(here.sum(), 1)))
+    nodes = np.concatenate(cells)
+    if order == 2:
+        middles = 0.5 * (nodes + np.roll(nodes, -1, axis=1))
+        nodes = np.concatenate([nodes, middles, nodes.mean(axis=1, keepdims=True)], axis=1)
+    u, r_of = nodes[..., 0] % (UNITS * len(splits)), nodes[..., 1]
+    (r_of, u), number = np.unique(np.stack([r_of.ravel(), u.ravel()]), axis=1, return_inverse=True)
+    row = np.repeat(np.repeat(np.arange(rows), 2), [len(corners) for corners in cells])
+    return Lattice(u / UNITS, r_of, number.reshape(nodes.shape[:2]), row, np.concatenate(column))
 
 
-class _Line:
-    """The nodes of one line of the open ring: `u`, and the number of the first node of each base column."""
-
-    def __init__(self, split: Ints, start: int) -> None:
-        column = np.repeat(np.arange(len(split)), split)
-        first = np.concatenate([[0], np.cumsum(split)])
-        part = np.arange(len(column)) - first[column]
-        self.split, self.column, self.part = split, column, part
-        self.start, self.first = start, start + first
-        self.u = np.append(column + part / split[column], float(len(split)))
-        self.size = len(self.u)
-
-
-def _plain(upper: _Line, lower: _Line) -> tuple[Ints, Ints]:
-    o, i = upper.start + np.arange(upper.size - 1), lower.start + np.arange(lower.size - 1)
-    return np.column_stack([o, o + 1, i + 1, i]), upper.column
-
-
-def _transition(upper: _Line, lower: _Line, nodes: int) -> tuple[tuple[Ints, Ints], Floats]:
-    ratio = (upper.split // lower.split)[lower.column]
-    o = upper.first[lower.column] + ratio * lower.part
-    i = lower.start + np.arange(len(o))
-    merged = ratio == 3
-    plain = np.column_stack([o, o + 1, i + 1, i])[~merged]
-    o, i = o[merged], i[merged]
-    p = nodes + 2 * np.arange(len(o))
-    new = upper.u[np.column_stack([o + 1, o + 2]) - upper.start].ravel()
-    templates = [
-        (o + 1, o + 2, p + 1, p),
-        (o, o + 1, p, i),
-        (o + 2, o + 3, i + 1, p + 1),
-        (p, p + 1, i + 1, i),
-    ]
-    cells = np.vstack([plain, *(np.column_stack(t) for t in templates)])
-    column = np.concatenate([lower.column[~merged], np.tile(lower.column[merged], 4)])
-    return (cells, column), new
-
-
-def _closed(parameters: Floats, cells: Ints, row: Ints, column: Ints, order: int) -> Lattice:
-    """Raise to the order and join the two ends of the ring."""
-    mesh = Mesh(parameters, cells, "quad", row, {})
-    mesh = raised(mesh) if order == 2 else mesh
-    u, r = mesh.points.T
-    last = np.flatnonzero(u == u.max())
-    first = np.flatnonzero(u == 0.0)
-    target = np.arange(len(u))
-    target[last[np.argsort(r[last])]] = first[np.argsort(r[first])]
-    keep: NDArray[np.bool_] = np.ones(len(u), dtype=bool)
-    keep[last] = False
-    number = np.cumsum(keep) - 1
-    return Lattice(u[keep], r[keep], number[target[mesh.cells]], row, column)
+def quads(start: Floats | Ints, width: Floats | Ints, r: int, merged: bool) -> Floats:
+    """Corners (K, 4, 2) of the cells of row r below columns (C,) that begin at `start`; three columns above
+    each if they are `merged`.
+    """
+    shape = TEMPLATE if merged else PLAIN
+    u = start[:, None, None] + width[:, None, None] * shape[..., 0]
+    return np.stack([u, np.broadcast_to(r + shape[..., 1], u.shape)], axis=-1).reshape(-1, 4, 2)

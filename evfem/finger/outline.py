@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,3 +96,21 @@ def quintic(s: Floats) -> Floats:
     """
     s = np.clip(s, 0.0, 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
+def in_layers(
+    foot: Floats, normal: Floats, depth: Floats, level: Floats, to_bone: Callable[[Floats], Floats]
+) -> Floats:
+    """Points (N, d) at levels (N,) counted in layers: 0 the surface, 1 below the outermost ...
+
+    Surface and interfaces lie at depths (layers, N) below the feet (N, d) of the normals; from the last one
+    straight lines lead `to_bone`.
+    """
+    innermost, index = len(depth) - 1, np.arange(len(level))
+    layer = np.minimum(level.astype(int), innermost)
+    part = (level - layer)[:, None]
+    upper, lower = (depth[np.minimum(one, innermost), index][:, None] for one in (layer, layer + 1))
+    skin = foot - ((1.0 - part) * upper + part * lower) * normal
+    inside = foot - depth[innermost][:, None] * normal
+    deep = inside + part * (to_bone(inside) - inside)
+    return np.where((layer == innermost)[:, None], deep, skin)

@@ -16,7 +16,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.finger.lattice import Lattice, ring
 from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
-from evfem.finger.outline import Ellipse, Ridges
+from evfem.finger.outline import Ellipse, Ridges, in_layers
 from evfem.finger.scan import ScannedRidges
 from evfem.mesh.mesh import Mesh
 
@@ -95,15 +95,7 @@ class Section:
     def _points(self, lattice: Lattice, columns: Columns, depth: Floats) -> Floats:
         foot, normal, interfaces = columns.at(lattice.u)
         level = np.interp(lattice.r, np.arange(len(depth)), depth)
-        innermost = len(self.layers) - 1
-        layer = np.minimum(level.astype(int), innermost)
-        part = level - layer
-        index = np.arange(len(part))
-        upper, lower = interfaces[layer, index], interfaces[np.minimum(layer + 1, innermost), index]
-        skin = foot - ((1.0 - part) * upper + part * lower)[:, None] * normal
-        inside = foot - interfaces[innermost][:, None] * normal
-        deep = inside + part[:, None] * (self.bone.towards(inside) - inside)
-        return np.where((layer == innermost)[:, None], deep, skin)
+        return in_layers(foot, normal, interfaces, level, self.bone.towards)
 
     def _named(self, points: Floats, lattice: Lattice, columns: Columns, rows: list[int], order: int) -> Mesh:
         numbers = {layer.name: layer.number for layer in (*self.layers, NAIL)}

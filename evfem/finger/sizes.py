@@ -27,41 +27,15 @@ STEEPEST, STEEPEST_FLAT, CLEARANCE = 4.88, 3.5, 0.3
 _PART = {"of": "of the pitch"}
 
 
-def _thickness(name: str) -> dict[str, Any]:
+def thickness_range(name: str) -> dict[str, Any]:
+    """Rule of a layer's thickness."""
     (found,) = (layer.thickness for layer in (*LAYERS, NAIL) if layer.name == name and layer.thickness)
     return between(found.lowest, found.highest, "mm")
 
 
-Width = Annotated[float, between(12.0, 24.0, "mm"), "full width of the cross-section"]
-Height = Annotated[float, between(9.0, 20.0, "mm"), "full height of the cross-section"]
-RidgeHeight = Annotated[float, between(0.02, 0.4, "mm"), "depth of the grooves; crests lie on the ellipse"]
-RidgeWidth = Annotated[float, between(0.3, 0.8, "mm"), "the pitch, from crest to crest"]
-RidgeExponent = Annotated[
-    float, between(2.0, 16.0), "depth = height t^exponent, t = 0 at a crest, 1 in a groove"
-]
-RidgePhase = Annotated[float, between(-1.0, 1.0, "pitches"), "0: a crest in the middle, 0.5: a groove"]
-RidgeCrest = Annotated[
-    float, between(0.0, 0.9, "pitches", **_PART), "flat part of a crest; 0: rounded ridges"
-]
-RidgeGroove = Annotated[
-    float, between(0.0, 0.5, "pitches", **_PART), "flat part of a groove, with flat crests"
-]
 CELLS = "an even whole number from 4 to 96"
-CellsPerRidge = Annotated[
-    int | None,
-    whole(96, 4, CELLS),
-    "distances of nodes from crest to crest (half as many quadratic cells); without it by resolution",
-]
-StratumCorneum = Annotated[float, _thickness("stratum_corneum"), "at a crest"]
-Epidermis = Annotated[float, _thickness("epidermis"), "of the living epidermis"]
-Dermis = Annotated[float, _thickness("dermis"), "of the dermis"]
-BoneWidth = Annotated[float, between(2.0, 12.0, "mm"), "full width of the bone"]
-BoneHeight = Annotated[float, between(2.0, 10.0, "mm"), "full height of the bone"]
-BoneOffset = Annotated[float, between(-1.0, 3.0, "mm"), "centre of the bone above that of the finger"]
 Viscosity = Annotated[float, between(0.0, 1e3, "s"), "relaxation time of materials without their own"]
 Relaxation = Annotated[Pairs, BRANCHES, "Maxwell branches of materials without their own"]
-NailThickness = Annotated[float, _thickness("nail"), "of the nail"]
-NailWidth = Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"]
 Materials = Annotated[
     Mapping[str, Material],
     {"allowed": "a table [finger.materials.NAME]", "kinds": lambda: LAWS, "tag": "law"},
@@ -100,24 +74,44 @@ WITH_WIDTH = (
 class LayeredFinger:
     """A parametric finger: outline, ridges, layers and bone, with materials."""
 
-    width: Width = 16.68
-    height: Height = 12.79
+    width: Annotated[float, between(12.0, 24.0, "mm"), "full width of the cross-section"] = 16.68
+    height: Annotated[float, between(9.0, 20.0, "mm"), "full height of the cross-section"] = 12.79
     ridges: Any = True
-    ridge_height: RidgeHeight = 0.15
-    ridge_width: RidgeWidth = 0.50
-    ridge_exponent: RidgeExponent = 7.0
-    ridge_phase: RidgePhase = 0.0
-    ridge_crest: RidgeCrest = 0.0
-    ridge_groove: RidgeGroove = 0.0
+    ridge_height: Annotated[
+        float, between(0.02, 0.4, "mm"), "depth of the grooves; crests lie on the ellipse"
+    ] = 0.15
+    ridge_width: Annotated[float, between(0.3, 0.8, "mm"), "the pitch, from crest to crest"] = 0.50
+    ridge_exponent: Annotated[
+        float, between(2.0, 16.0), "depth = height t^exponent, t = 0 at a crest, 1 in a groove"
+    ] = 7.0
+    ridge_phase: Annotated[
+        float, between(-1.0, 1.0, "pitches"), "0: a crest in the middle, 0.5: a groove"
+    ] = 0.0
+    ridge_crest: Annotated[
+        float, between(0.0, 0.9, "pitches", **_PART), "flat part of a crest; 0: rounded ridges"
+    ] = 0.0
+    ridge_groove: Annotated[
+        float, between(0.0, 0.5, "pitches", **_PART), "flat part of a groove, with flat crests"
+    ] = 0.0
     # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
-    stratum_corneum_thickness: StratumCorneum = thickness_of("stratum_corneum")
-    epidermis_thickness: Epidermis = thickness_of("epidermis")
-    dermis_thickness: Dermis = thickness_of("dermis")
-    bone_width: BoneWidth = 6.0
-    bone_height: BoneHeight = 5.0
-    bone_offset: BoneOffset = 1.0
+    stratum_corneum_thickness: Annotated[float, thickness_range("stratum_corneum"), "at a crest"] = (
+        thickness_of("stratum_corneum")
+    )
+    epidermis_thickness: Annotated[float, thickness_range("epidermis"), "of the living epidermis"] = (
+        thickness_of("epidermis")
+    )
+    dermis_thickness: Annotated[float, thickness_range("dermis"), "of the dermis"] = thickness_of("dermis")
+    bone_width: Annotated[float, between(2.0, 12.0, "mm"), "full width of the bone"] = 6.0
+    bone_height: Annotated[float, between(2.0, 10.0, "mm"), "full height of the bone"] = 5.0
+    bone_offset: Annotated[float, between(-1.0, 3.0, "mm"), "centre of the bone above that of the finger"] = (
+        1.0
+    )
     resolution: str = "medium"
-    cells_per_ridge: CellsPerRidge = None
+    cells_per_ridge: Annotated[
+        int | None,
+        whole(96, 4, CELLS),
+        "distances of nodes from crest to crest (half as many quadratic cells); without it by resolution",
+    ] = None
     materials: Materials = field(default_factory=dict)
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0

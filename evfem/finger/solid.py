@@ -32,6 +32,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.finger.blocks import DIGITS, block
 from evfem.finger.fingerprint import faded
 from evfem.finger.layers import TissueLayer
+from evfem.finger.outline import in_layers
 from evfem.mesh.hexahedron import MIRRORED
 from evfem.mesh.mesh import Mesh
 
@@ -168,16 +169,9 @@ class Solid:
     def _points(self, unit: Floats, level: Floats) -> Floats:
         """Points (N, 3) at levels counted in layers: 0 the surface, 1 below the outermost ..."""
         foot, normal = self.outer.point(unit), self.outer.normal(unit)
-        innermost = len(self.layers) - 1
-        depths = np.concatenate([[0.0], np.cumsum(self.thickness)])
-        layer = np.minimum(level.astype(int), innermost)
-        part = level - layer
-        upper, lower = depths[layer], depths[np.minimum(layer + 1, innermost)]
-        upper = np.where(layer == 0, self._relief(unit, foot), upper)
-        skin = foot - ((1.0 - part) * upper + part * lower)[:, None] * normal
-        inside = foot - depths[-1] * normal
-        deep = inside + part[:, None] * (self.bone.point(unit) - inside)
-        return np.where((layer == innermost)[:, None], deep, skin)
+        deeper = (np.full(len(unit), depth) for depth in np.cumsum(self.thickness))
+        depth = np.array([self._relief(unit, foot), *deeper])
+        return in_layers(foot, normal, depth, level, lambda _: self.bone.point(unit))
 
     def _relief(self, unit: Floats, foot: Floats) -> Floats:
         """Depth (N,) of the surface below the smooth ellipsoid."""

@@ -14,11 +14,13 @@ from itertools import product
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.mesh.hexahedron import PLACES as HEXAHEDRON
 from evfem.mesh.mesh import Mesh, interface_of
 
-#: corners, middles of the edges and centre of a face, in the order of its nodes; the same of an edge
+#: corners, middles of the edges and centre of a face, in the order of its nodes
 PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)], dtype=float)
-LINE = np.array([[-1.0], [1.0], [0.0]])
+#: the same of an edge, and of a hexahedron, by dimensions
+NODES = {1: np.array([[-1.0], [1.0], [0.0]]), 2: PLACES, 3: HEXAHEDRON.astype(float)}
 #: starts of the search for the nearest place of a face, so many each way; the nearest that are tried; most
 #: iterations, and the change of a place that ends them
 STARTS, TRIED, ITERATIONS, CLOSE = 5, 8, 30, 1e-9
@@ -31,27 +33,23 @@ Shape = Callable[[Floats], tuple[Floats, Floats]]
 
 
 def shape_functions(nodes: int, places: Floats) -> tuple[Floats, Floats]:
-    """Values (..., m) and derivatives (..., m, d) at places (..., d) of the m = 4 or 9 shape functions
-    of a face (d = 2), or 2 or 3 of an edge (d = 1).
+    """Values (..., m) and derivatives (..., m, d) at places (..., d) of the m shape functions of an edge (2
+    or 3), a quad (4 or 9) or a hexahedron (8 or 27).
 
     >>> value, slope = shape_functions(9, PLACES)
     >>> bool(np.allclose(value, np.eye(9))), bool(np.allclose(slope.sum(axis=1), 0.0))
     (True, True)
     """
-    corners = PLACES if places.shape[-1] == 2 else LINE
-
-    def along(t: Floats, at: Floats) -> tuple[Floats, Floats]:
-        if nodes in (2, 4):
-            return 0.5 * (1.0 + t * at), 0.5 * at + 0.0 * t
+    t, at = places[..., None], NODES[places.shape[-1]][:nodes].T
+    if nodes == 2 ** len(at):
+        value, slope = 0.5 * (1.0 + t * at), 0.5 * at + 0.0 * t
+    else:
         middle = at == 0.0
         value = np.where(middle, 1.0 - t**2, 0.5 * t * (t + at))
-        return value, np.where(middle, -2.0 * t, t + 0.5 * at)
-
-    (a, da), *other = (along(places[..., i, None], corner) for i, corner in enumerate(corners[:nodes].T))
-    if not other:
-        return a, da[..., None]
-    ((b, db),) = other
-    return a * b, np.stack([da * b, a * db], axis=-1)
+        slope = np.where(middle, -2.0 * t, t + 0.5 * at)
+    along = np.eye(len(at), dtype=bool)[..., None]
+    factors = np.where(along, slope[..., None, :, :], value[..., None, :, :])
+    return value.prod(axis=-2), np.swapaxes(factors.prod(axis=-2), -1, -2)
 
 
 def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
@@ -116,8 +114,7 @@ def crossings(mesh: Mesh, region: str | None, level: Floats) -> list[Floats]:
     """Heights, from below, at which the boundary of a region (None: of all tissue) is crossed by vertical
     lines at x (and z), level (P, d - 1).
     """
-    sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
-    _, number = mesh.edges if mesh.dim == 2 else mesh.faces
+    sides, (_, number) = mesh.cell_sides, mesh.sides
     if region is not None:
         inside = mesh.region == mesh.region_names[region]
         sides, number = sides[inside], number[inside]

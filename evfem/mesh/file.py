@@ -268,7 +268,7 @@ def _write_msh(mesh: Mesh, path: Path) -> None:
 
 def _all_facets(mesh: Mesh, name: str) -> Ints:
     """The outer edges or faces of a set."""
-    facets = mesh.edges_of(name) if mesh.dim == 2 else mesh.faces_of(name)
+    facets = mesh.sides_of(name)
     lost = np.setdiff1d(mesh.node_sets[name], facets)
     if len(lost):
         facet = "edge" if mesh.dim == 2 else "face"

@@ -9,20 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
-from evfem.mesh.hexahedron import EDGES, FACES, face_nodes
+from evfem.mesh.hexahedron import EDGES, face_nodes
 
 
 class CellKind(NamedTuple):
-    """A kind of cell: dimension, numbers of corners and nodes, order.
-
-    The local edges of a triangle or quad are (corner i, corner i+1[, mid-node i]).
-    """
+    """A kind of cell: dimension, numbers of corners and nodes, order."""
 
     dimension: int
     corners: int
@@ -113,71 +110,62 @@ class Mesh:
         given = np.asarray(points, dtype=float)
         if self.dim != 2 or given.ndim != 2 or given.shape[1] != 2:
             raise InputError("points", f"shape {given.shape} in {self.dim} dimensions", "(k, 2) in the plane")
-        around = self.points[self.cell_edges[..., [0, 2, 1] if self.order == 2 else [0, 1]]]
+        around = self.points[self.cell_sides[..., [0, 2, 1] if self.order == 2 else [0, 1]]]
         low, high = around.min(axis=(1, 2)), around.max(axis=(1, 2))
         edges = np.stack([around[:, :, :-1], around[:, :, 1:]], axis=3).reshape(len(around), -1, 2, 2)
-        return np.array([_cell_around(point, edges, low, high) for point in given], dtype=int)
+        edges = np.take_along_axis(edges, edges[..., 1:].argsort(axis=2), axis=2)  # the lower end first
+        found = np.full(len(given), -1)
+        for i, (x, y) in enumerate(given):
+            near = np.flatnonzero(((low <= given[i]) & (given[i] <= high)).all(axis=1))
+            (x0, y0), (x1, y1) = np.moveaxis(edges[near], (2, 3), (0, 1))
+            passed = (y0 <= y) & (y < y1)
+            share = np.divide(y - y0, y1 - y0, out=np.zeros_like(y0), where=passed)
+            inside = near[(passed & (x < x0 + share * (x1 - x0))).sum(axis=1) % 2 == 1]
+            found[i] = inside[0] if inside.size else -1
+        return found
 
-    @cached_property
-    def outer_edges(self) -> Ints:
-        """Edges of one cell only, (K, 2) or (K, 3): start, end[, middle], the body on the left."""
-        _, of_cell = self.edges
-        alone = np.bincount(of_cell.ravel())[of_cell] == 1
-        return self.cell_edges[alone]
+    # -- sides: edges in the plane, faces in space
 
     @property
-    def cell_edges(self) -> Ints:
-        """The edges of each cell, (E, corners, 2) or (E, corners, 3): start, end[, middle],
-        counter- clockwise.
+    def local_sides(self) -> Ints:
+        """Local nodes (m, k) of a cell's m sides: start, end[, middle] of the edges of a triangle or quad,
+        counter-clockwise; the faces of a hexahedron as quads or quad9s that are seen so from outside.
         """
-        m = self.corners
-        i = np.arange(m)
-        columns = [i, (i + 1) % m] + ([m + i] if self.order == 2 else [])
-        return self.cells[:, np.array(columns).T]
+        if self.dim == 3:
+            return face_nodes(self.order)
+        i, m = np.arange(self.corners), self.corners
+        return np.array([i, (i + 1) % m, m + i][: self.order + 1]).T
+
+    @property
+    def cell_sides(self) -> Ints:
+        """The nodes of the sides of each cell, (E, m, k)."""
+        return self.cells[:, self.local_sides]
 
     @cached_property
-    def edges(self) -> tuple[Ints, Ints]:
-        """All edges once, (K, 2) corner nodes in rising order, and the edges of each cell, (E, corners)."""
-        ends = np.sort(self.cell_edges[..., :2], axis=2).reshape(-1, 2)
-        code, inverse = np.unique(ends[:, 0] * len(self.points) + ends[:, 1], return_inverse=True)
-        return np.column_stack(np.divmod(code, len(self.points))), inverse.reshape(-1, self.corners)
+    def sides(self) -> tuple[Ints, Ints]:
+        """All sides once, (K, 2 or 4) corner nodes in rising order, and the sides of each cell, (E, m)."""
+        return once(self.cell_sides[..., : 2 * self.dim - 2])
 
-    def edges_of(self, name: str) -> Ints:
-        """Outer edges all of whose nodes are in the set `name`, same columns as `outer_edges`."""
-        return self._within(self.outer_edges, name)
+    @cached_property
+    def is_outer(self) -> Any:
+        """Which sides of each cell belong to no other one, (E, m) bool."""
+        _, of_cell = self.sides
+        return np.bincount(of_cell.ravel())[of_cell] == 1
 
-    def _within(self, facets: Ints, name: str) -> Ints:
+    @property
+    def outer_sides(self) -> Ints:
+        """Sides of one cell only, (K, k), the body on the left of edges, the normals of faces outwards."""
+        return self.cell_sides[self.is_outer]
+
+    def in_set(self, name: str) -> Any:
+        """Which sides of each cell are outer ones all of whose nodes are in the set `name`, (E, m) bool."""
         inside = np.zeros(len(self.points), dtype=bool)
         inside[self.node_sets[name]] = True
-        return facets[inside[facets].all(axis=1)]
+        return self.is_outer & inside[self.cell_sides].all(axis=2)
 
-    # -- in space
-    # ----------------------------------------------------------------------------------------------------
-
-    @property
-    def cell_faces(self) -> Ints:
-        """The faces of each hexahedron, (E, 6, 4) or (E, 6, 9): quads or quad9s that are seen
-        counter-clockwise from outside.
-        """
-        return self.cells[:, face_nodes(self.order)]
-
-    @cached_property
-    def faces(self) -> tuple[Ints, Ints]:
-        """All faces of hexahedra once, (K, 4) corner nodes in rising order, and the faces of each
-        cell, (E, 6).
-        """
-        return once(self.cells[:, FACES])
-
-    @cached_property
-    def outer_faces(self) -> Ints:
-        """Faces of one cell only, (K, 4) or (K, 9), their normals outwards."""
-        _, of_cell = self.faces
-        alone = np.bincount(of_cell.ravel())[of_cell] == 1
-        return self.cell_faces[alone]
-
-    def faces_of(self, name: str) -> Ints:
-        """Outer faces all of whose nodes are in the set `name`, same columns as `outer_faces`."""
-        return self._within(self.outer_faces, name)
+    def sides_of(self, name: str) -> Ints:
+        """Outer sides all of whose nodes are in the set `name`, same columns as `outer_sides`."""
+        return self.cell_sides[self.in_set(name)]
 
 
 def once(parts: Ints) -> tuple[Ints, Ints]:
@@ -206,40 +194,24 @@ def raised(mesh: Mesh) -> Mesh:
     """
     if mesh.order == 2:
         return mesh
+    (sides, of_cell), first = mesh.sides, len(mesh.points)
+    new = [(sides, of_cell)]  # corners of what gets a node in its middle, numbers of that in each cell
     if mesh.dim == 3:
-        return _raised_hexahedra(mesh)
-    edges, of_cell = mesh.edges
-    first = len(mesh.points)
-    points = [mesh.points, mesh.points[edges].mean(axis=1)]
-    columns = [mesh.cells, first + of_cell]
-    if mesh.corners == 4:
-        points.append(mesh.points[mesh.cells].mean(axis=1))
-        columns.append(first + len(edges) + np.arange(len(mesh.cells))[:, None])
-    outer = np.bincount(of_cell.ravel(), minlength=len(edges)) == 1
-    sets = {name: _with_middles(nodes, edges, outer, first) for name, nodes in mesh.node_sets.items()}
-    kind = "quad9" if mesh.corners == 4 else "triangle6"
-    return Mesh(np.vstack(points), np.hstack(columns), kind, mesh.region, mesh.region_names, sets)
-
-
-def _raised_hexahedra(mesh: Mesh) -> Mesh:
-    """The same in space: new nodes in the middles of edges, faces and cells."""
-    edges, edges_of_cell = once(mesh.cells[:, EDGES])
-    faces, faces_of_cell = mesh.faces
-    starts = len(mesh.points) + np.cumsum([0, len(edges), len(faces)])
-    points = [mesh.points] + [mesh.points[part].mean(axis=1) for part in (edges, faces, mesh.cells)]
-    columns = [mesh.cells, starts[0] + edges_of_cell, starts[1] + faces_of_cell]
-    columns.append(starts[2] + np.arange(len(mesh.cells))[:, None])
-    solid = Mesh(np.vstack(points), np.hstack(columns), "hexahedron27", mesh.region, mesh.region_names)
-    outer = solid.outer_faces
-    for name, nodes in mesh.node_sets.items():
-        whole = np.isin(outer[:, :4], nodes).all(axis=1)
-        solid = replace(solid, node_sets={**solid.node_sets, name: np.union1d(nodes, outer[whole])})
-    return solid
-
-
-def _with_middles(nodes: Ints, edges: Ints, outer: np.ndarray, first: int) -> Ints:
-    both = np.isin(edges, nodes).all(axis=1) & outer
-    return np.union1d(nodes, first + np.flatnonzero(both))
+        new.insert(0, once(mesh.cells[:, EDGES]))
+    if mesh.corners > 3:
+        new.append((mesh.cells, np.arange(len(mesh.cells))[:, None]))
+    points, columns = [mesh.points], [mesh.cells]
+    for parts, number in new:
+        points.append(mesh.points[parts].mean(axis=1))
+        columns.append(first + number)
+        first += len(parts)
+    kind = {3: "triangle6", 4: "quad9", 8: "hexahedron27"}[mesh.corners]
+    fine = Mesh(np.vstack(points), np.hstack(columns), kind, mesh.region, mesh.region_names)
+    outer = fine.cell_sides[mesh.is_outer]
+    corners = outer[:, : 2 * mesh.dim - 2]
+    sets = {name: np.union1d(nodes, outer[np.isin(corners, nodes).all(axis=1)])
+            for name, nodes in mesh.node_sets.items()}  # fmt: skip
+    return replace(fine, node_sets=sets)
 
 
 def interface_of(mesh: Mesh, region: str) -> Ints:
@@ -247,28 +219,10 @@ def interface_of(mesh: Mesh, region: str) -> Ints:
     if region not in mesh.region_names:
         raise InputError("region", quoted(region), " | ".join(mesh.region_names))
     inside = mesh.region == mesh.region_names[region]
-    sides, of_cell = mesh.edges if mesh.dim == 2 else mesh.faces
+    sides, of_cell = mesh.sides
     own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(sides)) for cells in (inside, ~inside))
     shared = (own > 0) & (other > 0)
-    of_cells = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
-    interface = of_cells[inside][shared[of_cell[inside]]]
+    interface = mesh.cell_sides[inside][shared[of_cell[inside]]]
     if not len(interface):
         raise InputError("region", quoted(region), "a region that has another one below it")
     return interface
-
-
-def _cell_around(point: Floats, edges: Floats, low: Floats, high: Floats) -> int:
-    """The cell whose edges (E, n, 2 ends, 2) go round a point, -1 for none; `low` and `high` (E, 2)
-    are the corners of a box around each.
-    """
-    near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
-    ends = edges[near]
-    rising = (ends[:, :, 0, 1] <= ends[:, :, 1, 1])[..., None]
-    (x0, y0), (x1, y1) = (
-        np.moveaxis(np.where(rising, ends[:, :, i], ends[:, :, 1 - i]), -1, 0) for i in (0, 1)
-    )
-    passed = (y0 <= point[1]) & (point[1] < y1)
-    share = np.divide(point[1] - y0, y1 - y0, out=np.zeros_like(y0), where=passed)
-    crossings = np.sum(passed & (point[0] < x0 + share * (x1 - x0)), axis=1)
-    inside = near[crossings % 2 == 1]
-    return int(inside[0]) if inside.size else -1

@@ -12,15 +12,16 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh import solids
-from evfem.mesh.hexahedron import PLACES
-from evfem.mesh.mesh import CELLS, KINDS, Mesh
-from evfem.mesh.solids import Refuse, some, turned
+from evfem.mesh.faces import NODES, shape_functions
+from evfem.mesh.hexahedron import EDGES
+from evfem.mesh.mesh import CELLS, KINDS, Mesh, once
+from evfem.mesh.solids import Refuse, listed, some, turned
 
 #: Extent of a finger's outline in mm: other numbers mean other units.
 SMALLEST, LARGEST = 1.0, 200.0
 #: Two nodes closer than this part of the outline's extent are the same place.
 SAME_PLACE = 1e-7
-#: Pairs of edges looked at for crossings: 4,000 edges of the outline, one of them as long as the finger.
+#: Pairs of nodes or edges near each other: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
 
 
@@ -38,16 +39,11 @@ def check(mesh: Mesh, source: str = "mesh") -> Mesh:
     _arrays(mesh, refuse)
     _extent(mesh, refuse)
     _nodes(mesh, refuse)
-    if mesh.dim == 3:
-        mesh = solids.oriented(mesh, refuse)
-        _shapes(mesh, refuse)
-        solids.connection(mesh, refuse)
-        solids.surface(mesh, refuse)
-    else:
-        mesh = _oriented(mesh, refuse)
-        _shapes(mesh, refuse)
-        _connection(mesh, refuse)
-        _outline(mesh, refuse)
+    oriented, surface = (_oriented, _outline) if mesh.dim == 2 else (solids.oriented, solids.surface)
+    mesh = oriented(mesh, refuse)
+    _shapes(mesh, refuse)
+    _connection(mesh, refuse)
+    surface(mesh, refuse)
     _names(mesh, refuse)
     return solids.with_sets(mesh, refuse)
 
@@ -83,19 +79,13 @@ def _nodes(mesh: Mesh, refuse: Refuse) -> None:
     if len(unused):
         refuse(f"{len(unused)} nodes that no cell uses (node {some(unused)})", "only nodes of cells")
     radius = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
-    # first by boxes, for of many nodes in one place there would be too many pairs
-    box = np.floor((mesh.points - mesh.points.min(axis=0)) / (0.5 * radius)).astype(np.int64)
-    order = np.lexsort(box.T)
-    same = np.flatnonzero((np.diff(box[order], axis=0) == 0).all(axis=1))
-    pairs: Ints | None = np.stack([order[same], order[same + 1]], axis=1)
-    if not same.size:
-        pairs = _pairs_within(mesh.points, radius)
+    pairs = _pairs_within(mesh.points, radius)
+    apart = "one node per place: merge double nodes, or the parts come loose"
     if pairs is None:
-        refuse("too many nodes in one line", "nodes of cells that fill an area")
+        refuse("too many nodes in the same place", apart)
     elif len(pairs):
         first, second = pairs[0]
-        fault = f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})"
-        refuse(fault, "one node per place: merge double nodes, or the parts come loose")
+        refuse(f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})", apart)
 
 
 def _oriented(mesh: Mesh, refuse: Refuse) -> Mesh:
@@ -119,46 +109,52 @@ def _shapes(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _connection(mesh: Mesh, refuse: Refuse) -> None:
-    edges, of_cell = mesh.edges
-    cells_of_edge = np.bincount(of_cell.ravel())
-    if (cells_of_edge > 2).any():
-        a, b = edges[np.argmax(cells_of_edge > 2)]
-        refuse(f"more than two cells on the edge of nodes {a} and {b}", "cells that do not overlap")
-    along = mesh.cell_edges[..., 0] < mesh.cell_edges[..., 1]
-    turns = np.bincount(of_cell.ravel(), weights=np.where(along, 1.0, -1.0).ravel())
-    folded = (cells_of_edge == 2) & (turns != 0.0)
+    """Refuse cells that overlap, neighbours with different mid-nodes, and separate parts."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    (sides, of_cell), apart = mesh.sides, "cells that do not overlap"
+    side, sharing = ("edge", "their common edge") if mesh.dim == 2 else ("face", "a common edge or face")
+    cells_of_side = np.bincount(of_cell.ravel())
+    if (cells_of_side > 2).any():
+        nodes = listed(sides[np.argmax(cells_of_side > 2)])
+        refuse(f"more than two cells on the {side} of nodes {nodes}", apart)
+    turns = np.bincount(of_cell.ravel(), _turns(mesh.cell_sides[..., : sides.shape[1]]).ravel())
+    folded = (cells_of_side == 2) & (turns != 0.0)
     if folded.any():
-        a, b = edges[np.argmax(folded)]
-        refuse(f"two cells on the same side of the edge of nodes {a} and {b}", "cells that do not overlap")
+        nodes = listed(sides[np.argmax(folded)])
+        refuse(f"two cells on the same side of the {side} of nodes {nodes}", apart)
     if mesh.order == 2:
-        middles = mesh.cells[:, mesh.corners : 2 * mesh.corners]
-        if len(np.unique(middles)) != len(edges):
-            refuse(
-                "neighbouring cells with different mid-nodes on their common edge", "one mid-node per edge"
-            )
-    parts = _parts(of_cell, len(edges))
+        middles = [(sides, mesh.cell_sides[..., -1])]
+        if mesh.dim == 3:
+            middles.append((once(mesh.cells[:, EDGES])[0], mesh.cells[:, 8:20]))
+        if any(len(np.unique(nodes)) != len(parts) for parts, nodes in middles):
+            fault = f"neighbouring cells with different mid-nodes on {sharing}"
+            refuse(fault, "one mid-node per edge" + (" and face" if mesh.dim == 3 else ""))
+    cell, ones = np.repeat(np.arange(len(of_cell)), of_cell.shape[1]), np.ones(of_cell.size, dtype=np.int8)
+    table = coo_array((ones, (cell, of_cell.ravel())), shape=(len(of_cell), len(sides))).tocsr()
+    parts, _ = connected_components(table @ table.T, directed=False)
     if parts > 1:
-        refuse(f"{parts} separate parts", "one body, its cells joined by common edges")
+        refuse(f"{parts} separate parts", f"one body, its cells joined by common {side}s")
 
 
-def _parts(of_cell: Ints, edges: int) -> int:
-    """Number of connected parts, from the edges (E, corners) of each cell, by smallest neighbours."""
-    part = np.arange(len(of_cell))
-    while True:
-        smallest = np.full(edges, len(of_cell))
-        np.minimum.at(smallest, of_cell, part[:, None])
-        found = smallest[of_cell].min(axis=1)
-        if np.array_equal(found, part):
-            return len(np.unique(part))
-        np.minimum.at(part, part.copy(), found)
-        part = part[part]
+def _turns(corners: Ints) -> Floats:
+    """1 or -1 (E, m): which way round the corners (E, m, 2 or 4) go from the one with the lowest number."""
+    count = corners.shape[2]
+    first = corners.argmin(axis=2)
+    if count == 2:
+        return 1.0 - 2.0 * first
+    after, before = (
+        np.take_along_axis(corners, (first[..., None] + way) % count, axis=2)[..., 0] for way in (1, -1)
+    )
+    return np.where(after < before, 1.0, -1.0)
 
 
 def _outline(mesh: Mesh, refuse: Refuse) -> None:
     """The outline must not cross or touch itself: else cells overlap, or nodes hang on another
     cell's edge.
     """
-    edges = mesh.outer_edges
+    edges = mesh.outer_sides
     if not len(edges):
         refuse("no outline", "a body with an outline")
     if mesh.order == 2:
@@ -191,19 +187,14 @@ def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
 
 
 def _pairs_within(points: Floats, reach: float) -> Ints | None:
-    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None where more than `MOST_PAIRS` would
-    have to be looked at: those that are near along an oblique line, which no row of a mesh follows.
-    """
-    direction = np.sqrt([2.0, 3.0, 5.0])[: points.shape[1]]
-    along = points @ (direction / np.linalg.norm(direction))
-    order = np.argsort(along)
-    following = np.searchsorted(along[order], along[order] + reach, side="right") - np.arange(len(order)) - 1
-    if following.sum() > MOST_PAIRS:
+    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None of more than `MOST_PAIRS`."""
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(points)
+    if tree.count_neighbors(tree, reach) > 2 * MOST_PAIRS:
         return None
-    first = np.repeat(np.arange(len(order)), following)
-    second = np.arange(first.size) - np.repeat(np.cumsum(following) - following, following) + first + 1
-    pairs = np.stack([order[first], order[second]], axis=1)
-    return pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
+    pairs: Ints = tree.query_pairs(reach, output_type="ndarray")
+    return pairs[np.lexsort(pairs.T[::-1])]
 
 
 def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -224,8 +215,7 @@ def _names(mesh: Mesh, refuse: Refuse) -> None:
             refuse(fault, "sets of nodes `pad` and `bone`, or [finger.boundaries] with their names")
 
 
-#: Corner, mid-edge and middle nodes of a quad in -1..1, and of a triangle in 0..1, in VTK order.
-SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0))
+#: corners and mid-nodes of a triangle in 0..1
 TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
 
 
@@ -242,53 +232,21 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
     >>> scaled_jacobian(square).tolist()
     [1.0]
     """
-    x = mesh.points[mesh.cells]
-    if mesh.corners == 8:
-        return _scaled_jacobian_of_hexahedra(x, mesh.order)
-    slopes_at = _square_slopes if mesh.corners == 4 else _triangle_slopes
+    x, nodes = mesh.points[mesh.cells], mesh.cells.shape[1]
+    if mesh.corners == 3:
+        slopes = np.array([_triangle_slopes(place, mesh.order) for place in TRIANGLE[:nodes]])
+    else:
+        slopes = np.swapaxes(shape_functions(nodes, NODES[mesh.dim][:nodes])[1], 1, 2)
     smallest = np.full(len(x), np.inf)
-    for place in (SQUARE if mesh.corners == 4 else TRIANGLE)[: mesh.cells.shape[1]]:
-        t = slopes_at(place, mesh.order) @ x
-        det = t[:, 0, 0] * t[:, 1, 1] - t[:, 0, 1] * t[:, 1, 0]
-        first, second = np.hypot(t[:, 0, 0], t[:, 0, 1]), np.hypot(t[:, 1, 0], t[:, 1, 1])
-        lengths = first * second
+    for slope in slopes:
+        t = slope @ x
+        length = np.linalg.norm(t, axis=2)
+        lengths = length.prod(axis=1)
         if mesh.corners == 3:
-            third = np.hypot(*(t[:, 1] - t[:, 0]).T)
-            lengths = np.maximum(lengths, third * np.maximum(first, second)) * np.sqrt(0.75)
-        smallest = np.minimum(smallest, det / np.maximum(lengths, 1e-300))
-    return smallest
-
-
-def _scaled_jacobian_of_hexahedra(x: Floats, order: int) -> Floats:
-    smallest = np.full(len(x), np.inf)
-    for place in PLACES[: x.shape[1]]:
-        t = _cube_slopes(place, order) @ x
-        lengths = np.linalg.norm(t, axis=2).prod(axis=1)
+            third = np.linalg.norm(t[:, 1] - t[:, 0], axis=1)
+            lengths = np.maximum(lengths, third * length.max(axis=1)) * np.sqrt(0.75)
         smallest = np.minimum(smallest, np.linalg.det(t) / np.maximum(lengths, 1e-300))
     return smallest
-
-
-def _cube_slopes(place: Ints, order: int) -> Floats:
-    """Derivatives (3, nodes) of a hexahedron's shape functions at a place."""
-    (f, df), (g, dg), (h, dh) = (_line(float(s), order) for s in place)
-    i, j, k = (PLACES[: (order + 1) ** 3].T + 1) // (3 - order)
-    return np.array([df[i] * g[j] * h[k], f[i] * dg[j] * h[k], f[i] * g[j] * dh[k]])
-
-
-def _square_slopes(place: tuple[float, float], order: int) -> Floats:
-    """Derivatives (2, nodes) of a quad's shape functions at a place."""
-    (f, df), (g, dg) = (_line(s, order) for s in place)
-    i, j = (np.array(SQUARE[: (order + 1) ** 2]).T + 1) // (3 - order)
-    return np.array([df[i] * g[j], f[i] * dg[j]])
-
-
-def _line(s: float, order: int) -> tuple[Floats, Floats]:
-    """Shape functions of a line at s, in rising order of their nodes, and their derivatives."""
-    if order == 1:
-        return np.array([1.0 - s, 1.0 + s]) / 2.0, np.array([-0.5, 0.5])
-    return np.array([s * (s - 1.0) / 2.0, 1.0 - s * s, s * (s + 1.0) / 2.0]), np.array(
-        [s - 0.5, -2.0 * s, s + 0.5]
-    )
 
 
 def _triangle_slopes(place: tuple[float, float], order: int) -> Floats:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.mesh.hexahedron import EDGES, MIRRORED, face_nodes
-from evfem.mesh.mesh import Mesh, once
+from evfem.mesh.hexahedron import MIRRORED, face_nodes
+from evfem.mesh.mesh import Mesh
 
 Refuse = Callable[[str, str], None]  # (fault, what is allowed): raises InputError
 #: a node lies on a face if it is nearer to it than this part of the face's size
@@ -52,45 +52,8 @@ def turned(mesh: Mesh, size: Floats, order: Any, refuse: Refuse) -> Mesh:
     return replace(mesh, cells=np.where(size[:, None] < 0.0, mesh.cells[:, order], mesh.cells))
 
 
-def connection(mesh: Mesh, refuse: Refuse) -> None:
-    """Refuse cells that overlap, neighbours with different mid-nodes, and separate parts."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    faces, of_cell = mesh.faces
-    cells_of_face = np.bincount(of_cell.ravel())
-    if (cells_of_face > 2).any():
-        nodes = _listed(faces[np.argmax(cells_of_face > 2)])
-        refuse(f"more than two cells on the face of nodes {nodes}", "cells that do not overlap")
-    turns = np.bincount(of_cell.ravel(), weights=_turns(mesh.cell_faces[..., :4]).ravel())
-    folded = (cells_of_face == 2) & (turns != 0.0)
-    if folded.any():
-        nodes = _listed(faces[np.argmax(folded)])
-        refuse(f"two cells on the same side of the face of nodes {nodes}", "cells that do not overlap")
-    if mesh.order == 2:
-        edges, _ = once(mesh.cells[:, EDGES])
-        middles, centres = np.unique(mesh.cells[:, 8:20]), np.unique(mesh.cells[:, 20:26])
-        if len(middles) != len(edges) or len(centres) != len(faces):
-            fault = "neighbouring cells with different mid-nodes on a common edge or face"
-            refuse(fault, "one mid-node per edge and face")
-    cell = np.repeat(np.arange(len(of_cell), dtype=np.int32), 6)
-    face = of_cell.ravel().astype(np.int32)
-    ones = np.ones(of_cell.size, dtype=np.int8)
-    table = coo_array((ones, (cell, face)), shape=(len(of_cell), len(faces))).tocsr()
-    parts, _ = connected_components(table @ table.T, directed=False)
-    if parts > 1:
-        refuse(f"{parts} separate parts", "one body, its cells joined by common faces")
-
-
-def _turns(corners: Ints) -> Floats:
-    """1 or -1 (E, 6): which way round the corners (E, 6, 4) go from the one with the lowest number."""
-    first = corners.argmin(axis=2)[..., None]
-    after = np.take_along_axis(corners, (first + 1) % 4, axis=2)
-    before = np.take_along_axis(corners, (first + 3) % 4, axis=2)
-    return np.where(after < before, 1.0, -1.0)[..., 0]
-
-
-def _listed(nodes: Ints) -> str:
+def listed(nodes: Ints) -> str:
+    """Numbers in a sentence."""
     return ", ".join(map(str, nodes[:-1])) + f" and {nodes[-1]}"
 
 
@@ -98,7 +61,7 @@ def surface(mesh: Mesh, refuse: Refuse) -> None:
     """Refuse a surface that touches itself: nodes on a face of a cell that has them not."""
     from scipy.spatial import cKDTree
 
-    faces = mesh.outer_faces
+    faces = mesh.outer_sides
     if not len(faces):
         refuse("no outer face", "a body with a surface")
     corner = mesh.points[faces[:, :4]]
@@ -116,7 +79,7 @@ def surface(mesh: Mesh, refuse: Refuse) -> None:
         on |= _on_triangle(mesh.points[node], triangle, ON_FACE * size[face])
     if on.any():
         first = np.argmax(on)
-        nodes_of_face = _listed(faces[face[first], :4])
+        nodes_of_face = listed(faces[face[first], :4])
         fault = f"a surface that touches itself: node {node[first]} on the face of nodes {nodes_of_face}"
         refuse(fault, "cells that do not overlap, and no node on another cell's face")
 
@@ -138,7 +101,7 @@ def with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
     least, words = (2, "two") if plane else (3, "three")
     if bone < least:
         refuse(f"a bone of {bone} nodes", f"a bone of at least {words} nodes, so that the finger cannot turn")
-    pad = np.unique(mesh.edges_of("pad") if plane else mesh.faces_of("pad")).astype(np.int64)
+    pad = np.unique(mesh.sides_of("pad")).astype(np.int64)
     if not len(pad):
         part, parts = ("an edge of the outline", "edges") if plane else ("a face of the surface", "faces")
         refuse(f"a pad without {part}", f"a pad of whole {parts}: all their nodes in `pad`")

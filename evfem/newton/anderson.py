@@ -29,7 +29,7 @@ MIXED = ("u", "contact_force", "bone", "pressure", "given", "strain")
 
 
 class Anderson:
-    """Remembers a step's last iterations under one map: changes of steps and images, and products."""
+    """Remembers a step's last iterations under one map: changes of steps and images."""
 
     def __init__(self) -> None:
         self.reset()
@@ -38,7 +38,6 @@ class Anderson:
         """Forget the iterations: the map has changed."""
         self._last: tuple[Floats, Floats] | None = None
         self._changes: list[tuple[Floats, Floats]] = []
-        self._products = np.zeros((0, 0))
 
     def next_iterate(self, before: State, after: State) -> State:
         """A better iterate than `after`, the image of `before`; `after` itself while the map is unknown."""
@@ -49,24 +48,10 @@ class Anderson:
         last, self._last = self._last, (step, image)
         if last is None:
             return after
-        self._remember(step - last[0], image - last[1])
-        right = [change @ step for change, _ in self._changes]
-        shares = np.linalg.lstsq(self._products, right, rcond=1e-12)[0]
-        image = image.copy()
-        for share, (_, change) in zip(shares, self._changes, strict=True):
-            image -= share * change
-        return _state(after, image)
-
-    def _remember(self, step: Floats, image: Floats) -> None:
-        """Keep these changes, and drop what is older than `ANDERSON_DEPTH` iterations."""
-        self._changes = [*self._changes, (step, image)][-ANDERSON_DEPTH:]
-        kept = len(self._changes)
-        products = np.empty((kept, kept))
-        products[:-1, :-1] = self._products[
-            len(self._products) + 1 - kept :, len(self._products) + 1 - kept :
-        ]
-        products[-1] = products[:, -1] = [step @ change for change, _ in self._changes]
-        self._products = products
+        self._changes = [*self._changes, (step - last[0], image - last[1])][-ANDERSON_DEPTH:]
+        steps, images = (np.stack(each) for each in zip(*self._changes, strict=True))
+        theta = np.linalg.lstsq(steps @ steps.T, steps @ step, rcond=1e-12)[0]
+        return _state(after, image - theta @ images)
 
 
 def _vector(state: State) -> Floats:
@@ -76,11 +61,11 @@ def _vector(state: State) -> Floats:
 
 
 def _state(state: State, vector: Floats) -> State:
-    parts: list[Any] = []
-    end = 0
-    for part in (getattr(state, name) for name in MIXED):
-        begin, end = end, end + part.size
-        parts.append(vector[begin:end].reshape(part.shape))
-    squared = max(np.copysign(1.0, state.voltage) * vector[-1], 0.0)
+    parts = [getattr(state, name) for name in MIXED]
+    *mixed, (signed,) = np.split(vector, np.cumsum([part.size for part in parts]))
+    changed: dict[str, Any] = {
+        n: one.reshape(part.shape) for n, one, part in zip(MIXED, mixed, parts, strict=True)
+    }
+    squared = max(np.copysign(1.0, state.voltage) * signed, 0.0)
     voltage = float(np.copysign(KILOVOLT * np.sqrt(squared), state.voltage))
-    return replace(state, **dict(zip(MIXED, parts, strict=True)), voltage=voltage)
+    return replace(state, **changed, voltage=voltage)

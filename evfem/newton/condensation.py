@@ -23,12 +23,13 @@ from contextvars import ContextVar
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
 
 #: environment variable that tells pypardiso where the library is
@@ -39,18 +40,6 @@ PERTURBED = 13
 
 class Singular(ArithmeticError):
     """The matrix of the interior unknowns cannot be factorised."""
-
-
-class Condensation(Protocol):
-    """A factorised matrix: its Schur complement on the kept unknowns, and solves in two halves."""
-
-    schur: Floats
-
-    def forward(self, b: Floats) -> tuple[Floats, Floats]:
-        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side (m,))."""
-
-    def backward(self, state: Floats, kept: Floats) -> Floats:
-        """Solution (n,) once the kept unknowns (m,) are known."""
 
 
 @cache
@@ -79,18 +68,21 @@ def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> Floats:
 
 
 class Pardiso:
-    """Condensation by MKL PARDISO (pypardiso's handle): one symbolic analysis, many factorisations."""
+    """Condensation by MKL PARDISO (pypardiso's handle): one symbolic analysis, many factorisations. Factors
+    of `single` precision give way to double ones where they fail or are not accurate.
+    """
 
-    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
+    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         self.pattern, self.kept = pattern, kept
+        self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
         library = pardiso_library()
         library.libmkl.MKL_Set_Num_Threads(threads)
         self._call_pardiso = library._mkl_pardiso
         self._mark = np.zeros(pattern.size, dtype=np.int32)
         # PARDISO numbers the Schur complement in ascending order of the unknowns
         self._order = np.argsort(kept)
-        self.schur = np.zeros((kept.size, kept.size))
-        self._values = np.zeros(0)
+        self.schur: Any = np.zeros((0, 0))
+        self._values: Any = np.zeros(0)
         self._start(2)
 
     def _start(self, mtype: int) -> None:
@@ -99,7 +91,8 @@ class Pardiso:
         self._iparm = np.zeros(64, dtype=np.int32)
         # user values; METIS; no refinement; pivots below 1e-13 are perturbed (and counted); C indices; dense
         # Schur complement kept for solves
-        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 34: 1, 35: 2}.items():
+        single = int(self.real is np.float32)
+        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 27: single, 34: 1, 35: 2}.items():
             self._iparm[index] = value
         self._mark[:] = 0
         self._mark[self.kept] = 1
@@ -135,37 +128,62 @@ class Pardiso:
     def factorise(self, upper: Floats) -> None:
         """Factorise new values; raises `Singular` if even the indefinite factorisation fails."""
         shift = shift_of_kept(self.pattern, self.kept, upper)
-        self._values = upper.copy()
-        self._values[self.pattern.diagonal[self.kept]] += shift
-        for mtype in (self.mtype, -2):
-            if mtype != self.mtype:
+        kinds: list[tuple[int, Any]] = [(2, np.float32), (2, np.float64), (-2, np.float64)]
+        for mtype, real in kinds[kinds.index((self.mtype, self.real)) :]:
+            if (mtype, real) != (self.mtype, self.real):
                 self.close()
+                self.real = real
                 self._start(mtype)
-            S, b = np.zeros(self.schur.shape), np.zeros(self.pattern.size)
+            self._values, self.schur = upper.astype(real), np.zeros((0, 0))
+            self._values[self.pattern.diagonal[self.kept]] += shift
+            S, b = np.zeros(2 * (self.kept.size,), real), np.zeros(self.pattern.size, real)
             self._open = True
             error = 0 if self._analysed else self._call(11, b, S)
             error = error or self._call(22, b, S)
             self._analysed = error == 0
-            if error == 0 and self._iparm[PERTURBED] == 0 and np.isfinite(S).all():
-                self.schur = np.empty(S.shape)
-                self.schur[np.ix_(self._order, self._order)] = S
+            if error == 0 and self._iparm[PERTURBED] == 0 and np.isfinite(S).all() and self._accurate():
+                place = np.argsort(self._order)
+                self.schur = S[np.ix_(place, place)]
                 self.schur[np.diag_indices_from(S)] -= shift
                 return
         raise Singular(f"PARDISO error {error}, {self._iparm[PERTURBED]} perturbed pivots")
 
+    def _accurate(self) -> bool:
+        """Whether factors of single precision give how equal forces move the interior, which is softest."""
+        if self.real is np.float64:
+            return True
+        pattern, inner = self.pattern, np.ones(self.pattern.size)
+        inner[self.kept] = 0.0
+        A = sparse.csr_matrix((self._values, pattern.indices, pattern.indptr), 2 * (pattern.size,))
+
+        def moved(b: Floats) -> Floats:
+            return self.backward(self.forward(b)[0], np.zeros(self.kept.size))
+
+        x = moved(inner)
+        rest = inner * (1.0 - A @ x - A.T @ x + self._values[pattern.diagonal] * x)
+        return bool(np.abs(moved(rest)).max() <= ACCURATE * np.abs(x).max())
+
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
-        y = self._solve(331, np.ascontiguousarray(b))
-        g = y[self.kept]
+        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side (m,))."""
+        # the entries of the kept unknowns go past the factor: the bone's reaction, in single precision,
+        # would have a rounding larger than the forces that are left
+        interior = b.astype(self.real)
+        interior[self.kept] = 0.0
+        y = self._solve(331, interior)
+        g = b[self.kept] + y[self.kept]
         if self.mtype == -2:
             y = self._solve(332, y)
         return y, g
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
-        given = state.copy()
+        """Solution (n,) once the kept unknowns (m,) are known."""
+        given = state.astype(self.real)
         given[self.kept] = kept
-        return self._solve(333, given)
+        x = self._solve(333, given).astype(float)
+        x[self.kept] = kept
+        return x
 
-    def _solve(self, phase: int, b: Floats) -> Floats:
+    def _solve(self, phase: int, b: Any) -> Any:
         x = np.zeros_like(b)
         self._call(phase, b, x)
         return x
@@ -240,6 +258,8 @@ class SuperLU:
         return state + self._solve(b)
 
 
+#: a factorised matrix: its Schur complement, and solves in two halves
+Condensation = Pardiso | SuperLU
 #: whether the sparse solver is the one that is not chosen by itself
 _OTHER = ContextVar("_OTHER", default=False)
 
@@ -262,7 +282,8 @@ def _has_pardiso() -> bool:
     return True
 
 
-def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso | SuperLU:
-    """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
-    kind = Pardiso if _has_pardiso() and not _OTHER.get() else SuperLU
-    return kind(pattern, kept, threads)
+def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
+    """PARDISO where evfem[fast] is installed, else SuperLU, which has no factors of `single` precision."""
+    if _has_pardiso() and not _OTHER.get():
+        return Pardiso(pattern, kept, threads, single)
+    return SuperLU(pattern, kept, threads)

@@ -16,8 +16,7 @@ control             known                        unknown                       e
 ==================  ===========================  ============================  ====================
 
 Without charges between the layers attraction is proportional to the squared voltage, so that this unknown
-enters linearly. A control of one's own (a spring behind the bone, a prescribed charge) is a class with the
-methods of `HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
+enters linearly. `docs/howto/extend.md` builds a control of one's own.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ from evfem.newton.state import State, StepFailed
 
 #: a voltage (V) that is none
 TINY = 1e-300
-#: a given speed that changes by this share of the larger one jumps
+#: a given speed that changes by this fraction of the larger one jumps
 JUMP = 0.25
 #: why no voltage makes a gap (mm)
 TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
@@ -63,10 +62,6 @@ class HeightControl:
         """The extra unknown, the bone's travel from `height` in mm, or nothing."""
         return ()
 
-    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
-        """The control at `fraction` of the way to another one of its kind."""
-        return end
-
 
 @dataclass(frozen=True)
 class Indentation(HeightControl):
@@ -76,10 +71,6 @@ class Indentation(HeightControl):
 
     def known(self, height: float) -> float:
         return self.height
-
-    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
-        assert isinstance(end, Indentation)
-        return Indentation(self.height + fraction * (end.height - self.height))
 
 
 @dataclass(frozen=True)
@@ -95,31 +86,18 @@ class Force(HeightControl):
     def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
         return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
 
-    def towards(self, end: HeightControl, fraction: float) -> Force:
-        if isinstance(end, Unsupported):
-            return self
-        assert isinstance(end, Force)
-        return Force(self.force + fraction * (end.force - self.force))
-
 
 class Unsupported(Indentation):
     """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
     begins; touched on the way, by a crest or by tissue that recovers, it gives way (`Equilibrium.step`).
-
-    >>> Unsupported(0.3).towards(Force(0.0), 0.5)
-    Force(force=0.0)
     """
-
-    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
-        return end
 
 
 @dataclass(frozen=True)
 class VoltageProblem:
-    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state
-    for the backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim),
-    `pushed`; of a number with a gradient (P, dim) by positions, `measured`, the condensed row and its gain by
-    the residual and by forces with such a state; the present state of the `pad`.
+    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state for the
+    backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim), `pushed`;
+    of a number with a gradient (P, dim), `measured`, the condensed row and its gains; the state of the `pad`.
     """
 
     squared: float
@@ -179,9 +157,7 @@ class VoltageControl:
         return ()
 
     def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
-        """Whether the equation, or its bound, holds for a bone that moves along the display by `travel`
-        (d,).
-        """
+        """Whether the equation, or its bound, holds for a bone that moves along the display by (d,)."""
         return True
 
     def fallback(self, old: State, found: State | None) -> VoltageControl | None:
@@ -201,8 +177,7 @@ class GivenVoltage(VoltageControl):
 
 class ConstrainedVoltage(VoltageControl):
     """The voltage is an unknown, and a quantity of the state has a prescribed value: one more equation,
-    linear in voltage and displacements. It is regular where a prescribed voltage has no equilibrium: the
-    attraction under a given charge does not grow as the gap closes.
+    linear in voltage and displacements, regular where a prescribed voltage has no equilibrium.
     """
 
     free = True
@@ -283,15 +258,14 @@ class GivenGap(ConstrainedVoltage):
 
 @dataclass
 class FollowFriction(VoltageControl):
-    """The voltage, from 0 to `voltage` (V), makes the bone's force along a `way` in the plane of the display,
-    x or x and z of a unit vector, `force` (N/mm).
-
-    Friction of a pad that sticks hardly depends on the voltage, which then stays as it was.
+    """The voltage, from 0 to `voltage` (V), makes the bone's force along a `direction`, x[, z] of a unit
+    vector, `force` (N/mm). Friction of a pad that sticks hardly depends on the voltage, which then stays as
+    it was.
     """
 
     force: float
     voltage: float
-    way: tuple[float, ...] = (1.0,)
+    direction: tuple[float, ...] = (1.0,)
     _mode: str = field(default=UNKNOWN, repr=False, compare=False)
     follows = True
 
@@ -307,14 +281,14 @@ class FollowFriction(VoltageControl):
         return self._lacks(reaction) if self.free else 0.0
 
     def _lacks(self, reaction: Floats) -> float:
-        return float(self.force - reaction[::2] @ np.array(self.way))
+        return float(self.force - reaction[::2] @ np.array(self.direction))
 
     def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
         if not self.free:
             return VoltageStep(problem.solve(step))
         unit, push = problem.unit()
         along = np.zeros(step.bone.size)
-        along[::2] = self.way
+        along[::2] = self.direction
         unknown = ExtraUnknown(push, 0, self.force, along=along)
         found = problem.solve(replace(step, unknowns=(*step.unknowns, unknown)))
         most, change = (self.voltage / KILOVOLT) ** 2, float(found.extra[-1])
@@ -328,7 +302,7 @@ class FollowFriction(VoltageControl):
         """At a bound the force may miss `force` in its direction; else the voltage is unknown again."""
         if self.free:
             return True
-        forward = float(np.sign(travel @ np.array(self.way))) or 1.0
+        forward = float(np.sign(travel @ np.array(self.direction))) or 1.0
         lacking = forward * self._lacks(reaction)
         if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
             self._mode = UNKNOWN
@@ -348,9 +322,8 @@ def sticks(state: State) -> bool:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds,
-    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x and z are then those of
-    the drive, and the bone's unknowns.
+    """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds, in three
+    dimensions z (mm), and the `hand` between drive and bone: x and z are then those of the drive.
     """
 
     x: float
@@ -401,9 +374,7 @@ class Target:
         return bool((self.bone(bone) == bone).all())
 
     def going_on(self, old: State, bone: int) -> State:
-        """`old` as the next part counts it: anew where a given speed jumps on the way to here, that of node
-        `bone` or of the drive.
-        """
+        """`old` as the next part counts it: anew where the given speed of node `bone` or drive jumps."""
         if old.seconds == 0.0 or self.duration == 0.0:
             return old
         before, now = old.rates[0][bone].tolist(), ((self.bone(old.bone) - old.bone) / self.duration).tolist()

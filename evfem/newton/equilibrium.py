@@ -27,6 +27,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
+from evfem.contact.charging import Charged
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
@@ -71,7 +72,7 @@ class Equilibrium:
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
             given=NO_BED if self.interface.bed is None else zero,
-            strain=NO_BED if self.interface.bed is None else zero,
+            strain=NO_BED if self.interface.bed is None else np.zeros((nodes, dim - 1, dim)),
             rates=np.zeros_like(self.body.body.rates(still)),
         )
         attraction = self.attraction_at(state, state, voltage)
@@ -90,6 +91,12 @@ class Equilibrium:
         if adhesive is None:
             return np.zeros_like(state.contact_force)
         return PadState.of(adhesive, self.interface, state, state.touching).forces(strength)
+
+    def charged(self, state: State, *, kept: bool = True) -> Charged:
+        """The electric state in `state`: with its charges, or with those that flow up to the step's end."""
+        assert self.attraction is not None
+        position, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        return self.attraction.charged(position, state.voltage, pressing, state.charges if kept else None)
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""
@@ -110,9 +117,8 @@ class Equilibrium:
         return self._given_way(old, held, frozen, found) if found.touching.any() else found
 
     def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
-        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`.
-
-        Without mass every height above is an equilibrium too: its lowest node then just does not touch.
+        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`: of all
+        heights above, which are equilibria too, the one where its lowest node just does not touch.
         """
         lifted = self._followed(old, replace(target, height=Force(0.0)), frozen, touched)
         gap = float(self.interface.surface_at(lifted).gap.min())

@@ -21,20 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    CANDIDATE_GROWTH,
-    CANDIDATE_ROUNDS,
-    KILOVOLT,
-    LARGEST_BONE_INCREMENT,
-    REACH,
-    SHORTEST_FRACTION,
-    SMALLEST_FORCE,
-    SMALLEST_J,
-    TURNED,
-)
+from evfem.common import constants
+from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
-from evfem.contact.condensed import CandidatesBed, ExtraUnknown, LinearContactStep, StepSolution
+from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.electrostatics.signals import PadState
@@ -77,13 +67,11 @@ class FactorisedBody:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.size, self.pad = body.space.size, interface.pad
         self.linearisation = Linearisation(body, interface, attraction, limits)
-        self.pressure = Pressure(body.tissue, self.linearisation)
-        self.record = self.linearisation.record
-        longest = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
+        self.pressure, self.record = Pressure(body.tissue, self.linearisation), self.linearisation.record
+        longest = constants.LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
-        self._renewed = False
-        self._scaled_down = False
+        self._renewed = self._scaled_down = False
 
     # -- a step begins
 
@@ -92,11 +80,10 @@ class FactorisedBody:
         self.linearisation.begin(old, frozen)
         state = replace(self._first_guess(start, target), pressure=self.pressure.begin(start.u))
         travel = abs(target.bone(old.bone)[1] - old.bone[1])
-        self.linearisation.choose_candidates(state, REACH * travel)
+        self.linearisation.choose_candidates(state, constants.REACH * travel)
         self.linearisation.start_clock(old, target.duration)
         self._anderson.reset()
-        self._renewed = False
-        self._scaled_down = False
+        self._renewed = self._scaled_down = False
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
@@ -113,11 +100,11 @@ class FactorisedBody:
         last, ahead = state.last_increment[node], target.increment(state.bone)
         axis = int(np.argmax(np.abs(ahead)))
         # where the bone turns off, its last increment along the new way is rounding of either sign
-        if ahead[axis] * last[axis] <= TURNED * ahead[axis] ** 2:
+        if ahead[axis] * last[axis] <= constants.TURNED * ahead[axis] ** 2:
             return state
         fraction = min(float(ahead[axis] / last[axis]), self.limits.strategy.reach)
         u = state.u + fraction * state.last_increment
-        if not self.body.tissue.smallest_J(u) > SMALLEST_J:
+        if not self.body.tissue.smallest_J(u) > constants.SMALLEST_J:
             return state
         return replace(state, u=u, bone=u[node].copy())
 
@@ -147,7 +134,7 @@ class FactorisedBody:
         """The largest of the out-of-balance forces (n,), relative to the reaction in them."""
         reaction = forces[self.body.bone]
         rounding = self._rounding(state) / self.limits.tolerance
-        largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
+        largest = max(np.abs(reaction).max(), constants.SMALLEST_FORCE, rounding)
         dim = state.bone.size
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
@@ -190,9 +177,15 @@ class FactorisedBody:
     def _mixed(self, state: State, after: State, target: Target) -> State:
         """Anderson's combination of `after` with iterates before; `after` if too far. Prescribed: exact."""
         mixed = self._anderson.next_iterate(state, after)
-        if mixed is not after and self._goes_too_far(state, mixed, target):
-            self._anderson.reset()
-            return after
+        if mixed is not after:
+            travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
+            # it may turn cells inside out, or take away a bone that nothing holds
+            if (
+                travel > self.travel.longest
+                or not self.body.tissue.smallest_J(mixed.u) > constants.SMALLEST_J
+            ):
+                self._anderson.reset()
+                return after
         bone = after.bone.copy()
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.voltage.free else after.voltage
@@ -200,22 +193,17 @@ class FactorisedBody:
             bone[::2] = mixed.bone[::2]
         return replace(mixed, bone=bone, voltage=voltage)
 
-    def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
-        """Whether a combination turns cells inside out, or takes away a bone that nothing holds."""
-        travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
-        return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J
-
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
         """The next iterate; nodes that sank in become candidates, many of them start the way again."""
         if not self.interface.follows:
             return after
-        for _ in range(CANDIDATE_ROUNDS):
+        for _ in range(constants.CANDIDATE_ROUNDS):
             known = self.linearisation.candidates.size
             gap = self.interface.shallowest_penetration(after)
             if gap is None:
                 break
             self.add_candidates(after, gap)
-            if self.linearisation.candidates.size < CANDIDATE_GROWTH * known:
+            if self.linearisation.candidates.size < constants.CANDIDATE_GROWTH * known:
                 break
             self.linearisation.factorise(state)
             self._anderson.reset()
@@ -241,36 +229,23 @@ class FactorisedBody:
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
-        linearisation = self.linearisation
+        linearisation, tangent = self.linearisation, self.linearisation.tangent
+        height = target.height.unknowns(tangent, float(state.bone[1]))
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
-        if rough is not None:
-            known = replace(known, roughness=rough.of(c))
+        known = known if rough is None else replace(known, roughness=rough.of(c))
+        # as exact as the iterate is worth, where contact takes many solves
+        inner = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
         return LinearContactStep(
-            body=linearisation.tangent,
+            body=tangent,
             candidates=known,
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
-            unknowns=self._unknowns(state, target),
-            bed=self._bed(state, c),
+            unknowns=height if target.hand is None else (*height, *target.hand.unknowns(tangent, state.bone)),
+            bed=None if self.interface.bed is None else self.interface.bed_of(state, c),
+            tolerance=max(constants.ROUNDING, inner),
         )
-
-    def _bed(self, state: State, c: Ints) -> CandidatesBed | None:
-        """The elastic surface below the candidates c, if there is one."""
-        if self.interface.bed is None:
-            return None
-        below = self.interface.below(state)
-        pulled = (below.given(state.attraction) - state.given)[c]
-        return CandidatesBed(below.among(c), pulled.ravel())
-
-    def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
-        """Travels of the bone that are not given: first along y, then along x[, z]."""
-        tangent = self.linearisation.tangent
-        height = target.height.unknowns(tangent, float(state.bone[1]))
-        if target.hand is None:
-            return height
-        return (*height, *target.hand.unknowns(tangent, state.bone))
 
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
@@ -296,7 +271,7 @@ class FactorisedBody:
             still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
             return row, still, own
 
-        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(pad.unit)
+        squared, unit = (state.voltage / constants.KILOVOLT) ** 2, lambda: pushed(pad.unit)
         return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
@@ -319,8 +294,8 @@ class FactorisedBody:
         return after if update.contact.given is None else self._sunk(state, after, update)
 
     def _sunk(self, state: State, after: State, update: Update) -> State:
-        """The iterate `after` with what the elastic surface below gives way by under its forces: below the
-        candidates that of the linear step, which knows how the attraction changed.
+        """The iterate `after` with what the elastic surface gives way by: below the candidates that of the
+        linear step, which knows how the attraction changed.
         """
         below = self.interface.below(state)
         force = self.interface.contact_forces(replace(after, u=state.u)) + state.attraction
@@ -332,9 +307,9 @@ class FactorisedBody:
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:
         """Largest fraction 1, 1/2, 1/4 ... of an update that keeps every sampled volume."""
         fraction = 1.0
-        while not self.body.tissue.smallest_J(u + fraction * delta) > SMALLEST_J:
+        while not self.body.tissue.smallest_J(u + fraction * delta) > constants.SMALLEST_J:
             fraction *= 0.5
-            if fraction < SHORTEST_FRACTION:
+            if fraction < constants.SHORTEST_FRACTION:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
 
@@ -357,10 +332,9 @@ class FactorisedBody:
     # -- a step ends
 
     def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
-        """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by
-        the tangent at hand and by the one there, else None: iterations may converge to such a state from
-        afar. Not tested for tissue in time, in three dimensions, and for the attraction, whose instability
-        the iterations show; a tangent of the tissue that is not positive definite is not detected.
+        """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by the
+        tangent at hand and by the one there, else None: iterations may come to such a state from afar. Not
+        tested in time, in three dimensions, and for the attraction, whose instability the iterations show.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
@@ -387,9 +361,8 @@ class FactorisedBody:
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity, its increment and what branches keep of it."""
-        velocity, increment = self.body.velocity(state.u), state.u - old.u
+        velocity, increment, rates = self.body.velocity(state.u), state.u - old.u, self.body.rates(state.u)
         state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
-        rates = self.body.rates(state.u)
         seconds = self.body.beginning[1] if rates.size else 0.0
         return replace(state, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
 
@@ -399,7 +372,7 @@ class FactorisedBody:
 
     def discard(self) -> None:
         """Drop the factorisation, so that the next step starts from a fresh one."""
-        self.linearisation.discard()
+        self.linearisation.factor = None
 
     def findings(self, state: State, balance: Balance) -> str:
         """The largest out-of-balance forces, the state of contact and the smallest volume ratio."""
@@ -411,11 +384,11 @@ class FactorisedBody:
         duration = 0.0 if dynamics is None else dynamics.step
         return Reusable(linearisation.candidates, linearisation.reusable, duration)
 
-    def resume(self, state: State, carried: Reusable) -> None:
+    def resume(self, carried: Reusable) -> None:
         """Make the factorisation again that the interrupted run had at hand."""
         self.linearisation.candidates = carried.candidates
         if (at := carried.tangent_point) is not None:
-            self.pressure.check(at.pressure)
-            self.linearisation.restore(state, at)
+            self.pressure.check(at.state.pressure)
+            self.linearisation.restore(at)
         if self.body.dynamics is not None:
             self.body.dynamics.step = carried.duration

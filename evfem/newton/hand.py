@@ -8,14 +8,12 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
           - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
 
 by backward Euler; beside tissue with mass by its differences of second order
-(`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts
-and the bone comes to rest. In three dimensions the same holds along z, with the same spring, damper and
-mass. The motion prescribes the bone's height.
+(`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts. In
+three dimensions the same holds along z. The motion prescribes the bone's height.
 
-Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
-100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
-kg, and the cut-off frequency of the friction, that of a first-order system, by 13.8 Hz
-(`Hand.of_finger`). In the plane all three are per mm of depth.
+Values for a finger (`Hand.of_finger`): Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid
+with 20 to 100 mm/s. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5 kg, and the
+cut-off frequency of the friction by 13.8 Hz. In the plane all three are per mm of depth.
 """
 
 from __future__ import annotations
@@ -55,12 +53,9 @@ class Hand:
 
     @classmethod
     def of_finger(cls, speed: float, depth: float = 10.0) -> Hand:
-        """The hand of a finger that slides with `speed` (mm/s) and is `depth` mm deep. Spring and mass are
-        proportional to the speed; the source gives no offset.
-
-        The damper is our reading: a spring k and a damper c are a first-order system whose cut-off
-        frequency is k / (2 pi c), so it is the same at every speed. InputError for a speed or a depth
-        that is not above 0.
+        """The hand of a finger that slides with `speed` (mm/s) and is `depth` mm deep; InputError where one
+        is not above 0. Spring and mass are proportional to the speed. The damper is our reading: with the
+        spring it is a first-order system, whose cut-off frequency is k / (2 pi c).
 
         >>> hand = Hand.of_finger(20.0)
         >>> round(hand.stiffness, 9), round(hand.mass, 12), round(hand.damping, 9)
@@ -99,18 +94,14 @@ class Hand:
 
 
 def at_rest(dim: int) -> Floats:
-    """Along x[, z], (6, d), at the beginning of a run: the drive's place (mm), the bone's velocity (mm/s),
-    the drive's force (N/mm), and mean rates of the drive's place, the bone's and its velocity over the part
-    before.
-    """
+    """What `State.hand` is at the beginning of a run: `HandControl.settled` says of what."""
     return np.zeros((6, dim - 1))
 
 
 @dataclass(frozen=True)
 class HandControl:
     """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), its
-    velocity (mm/s), and their mean rates over the part before, which the step's `difference` may count, (d,)
-    each.
+    velocity (mm/s), and their mean rates over the part before, for the step's `difference`.
     """
 
     hand: Hand
@@ -167,9 +158,7 @@ class HandControl:
         return np.asarray(self.force(x) - reaction[::2])
 
     def unbalanced(self, x: Any, reaction: Floats) -> float:
-        """The largest force `missing` beyond rounding, not negative: each of the four places rounds by
-        itself.
-        """
+        """The largest force `missing` beyond the rounding of the four places, not negative."""
         largest = max(float(np.max(np.abs(place))) for place in (x, self.drive, *self.before[:2]))
         rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
         return max(float(np.abs(self.missing(x, reaction)).max()) - rounding, 0.0)
@@ -184,7 +173,9 @@ class HandControl:
         return tuple(found)
 
     def settled(self, state: State) -> State:
-        """The accepted state with what the hand keeps."""
+        """The accepted state with what the hand keeps along x[, z], (6, d): the drive's place (mm), the
+        bone's velocity (mm/s), the drive's force (N/mm), mean rates of both places and that velocity.
+        """
         x = state.bone[::2]
         ends = np.stack([self.drive, x, self.velocity(x)])
         changes = ends - self.before

@@ -16,17 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    CHANGES,
-    NEIGHBOURS,
-    PIN_OFFSET,
-    SHORT_RAMP,
-    SHORTEST_LENGTH,
-    SMALLEST_FORCE,
-)
 from evfem.contact.bed import Bed, Yielding
-from evfem.contact.condensed import COMPONENTS, Candidates
+from evfem.contact.condensed import COMPONENTS, Candidates, CandidatesBed
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.contact.slipping import OscillatingNodes
 from evfem.newton.state import State
@@ -38,25 +31,22 @@ from evfem.surface.ways import Steps
 
 
 class FrictionJumps:
-    """Nodes that a jump of the friction coefficient holds during a step; `place` (P, d) is nan for free ones.
+    """Nodes that a jump of the friction coefficient, along x and in space along z, holds during a step from
+    the places `begin` (P, d); `place` (P, d) is nan for free ones.
 
     A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
-    to the higher limit. At the jump the coefficient has no single value, and iterates alternate between its
-    two sides. Such a node is fixed where its way crosses the jump, `PIN_OFFSET` inside the rougher side,
-    where it sticks with the higher coefficient, and is released below the lower limit. A node that began the
-    step on the rougher side is not held.
+    to the higher limit; iterates alternate between its two sides. Such a node is fixed where its way crosses
+    the jump, `PIN_OFFSET` inside the rougher side, where it sticks with the higher coefficient, and is
+    released below the lower limit. A node that began the step on the rougher side is not held.
     """
 
     def __init__(self, steps: Sequence[Steps], begin: Floats) -> None:
-        """The jumps along x, and in space along z; where the nodes begin (P, d)."""
         self.steps = steps
         self.begin(begin)
 
     def begin(self, place: Floats) -> None:
         """Starts a step with the nodes at these places (P, d) in mm, none held."""
-        self.place = np.full(place.shape, np.nan)
-        self.lower = np.zeros(len(place))
-        self._begin = place
+        self.place, self.lower, self._begin = np.full(place.shape, np.nan), np.zeros(len(place)), place
         self._side = [self._sides(steps, place) for steps in self.steps]
         self._changes = np.zeros((len(self.steps), len(place)), dtype=np.int64)
         self._released = np.zeros(len(place), dtype=bool)
@@ -81,19 +71,19 @@ class FrictionJumps:
             side = self._sides(steps, place)
             moved = touching & (side != self._side[number]) & ~self._released
             self._changes[number] += moved
-            new = np.flatnonzero(moved & (self._changes[number] >= CHANGES) & ~self.held)
+            new = np.flatnonzero(moved & (self._changes[number] >= constants.CHANGES) & ~self.held)
             self._hold(steps, new, np.maximum(side, self._side[number])[new] - 1, place)
             self._side[number] = side
 
     def _hold(self, steps: Steps, new: Ints, which: Ints, place: Floats) -> None:
         """Holds nodes `new` (k,) that come to the jumps `which` (k,) from their smoother side."""
         begin, axis = self._begin[new], steps.axis
-        way = place[new] - begin
-        whole = np.where(way[:, axis] == 0.0, 1.0, way[:, axis])
-        crossed = begin + way * ((steps.place[which] - begin[:, axis]) / whole)[:, None]
+        moved = place[new] - begin
+        whole = np.where(moved[:, axis] == 0.0, 1.0, moved[:, axis])
+        crossed = begin + moved * ((steps.place[which] - begin[:, axis]) / whole)[:, None]
         across = crossed[:, 1 - axis] if crossed.shape[1] > 1 else np.zeros(new.size)
         before, behind = steps.sides(which, across)
-        inside = np.where(behind > before, PIN_OFFSET, -PIN_OFFSET)
+        inside = np.where(behind > before, constants.PIN_OFFSET, -constants.PIN_OFFSET)
         crossed[:, axis] = steps.place[which] + inside
         from_smoother = (steps.place[which] - begin[:, axis]) * inside > 0.0
         new = new[from_smoother]
@@ -111,22 +101,15 @@ class FrictionJumps:
         return bool(loose.any())
 
 
-#: from a voltage (V) to `Attraction.restored`
-Restored = Callable[[float], tuple[Floats, Floats] | None]
-
-
-def nothing_restored(voltage: float) -> None:
-    """From an attraction without a core."""
-
-
 class Interface:
-    """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh.
+    """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh; `restored`, from
+    a voltage (V) to `Attraction.restored`.
 
-    Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where each
-    has three unknowns in a dense compliance, the candidates follow the contact: those that are far by now
-    are dropped.
+    Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where the
+    dense compliance is large, the candidates follow the contact: those that are far by now are dropped.
     """
 
+    restored: Callable[[float], tuple[Floats, Floats] | None] = staticmethod(lambda voltage: None)
     _surfaces: tuple[tuple[Floats, Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
@@ -136,16 +119,16 @@ class Interface:
         self.follows = self.dim == 3
         self.length = pad.spacing(self.points)
         self._down = pad.facing(self.points)
-        self.jumps = FrictionJumps(surface.friction_steps(SHORT_RAMP * self.length), self.points[:, ::2])
-        elastic, least = getattr(surface, "elastic", None), SHORTEST_LENGTH * self.length
-        self.bed: Bed | None = None
-        if elastic is not None and isinstance(pad, Pad):  # a Skin's is refused
-            self.bed = Bed(elastic, pad, self.length, least)
+        self.jumps = FrictionJumps(
+            surface.friction_steps(constants.SHORT_RAMP * self.length), self.points[:, ::2]
+        )
+        elastic = getattr(surface, "elastic", None)
+        self._least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
+        self.bed = None if elastic is None else Bed(elastic, pad, self.length, self._least)
         self.law: FrictionLaw | None = None
-        self.restored: Restored = nothing_restored
         self._oscillating = OscillatingNodes(pad.nodes.size)
         self.duration = 0.0
-        self.neighbourhood = NEIGHBOURS * self.length
+        self.neighbourhood = constants.NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
@@ -166,14 +149,14 @@ class Interface:
         return self.places(state)[:, ::2]
 
     def surface_at(self, state: State) -> SurfaceState:
-        """The surface below the pad nodes, kept for the last two states, which many ask for."""
+        """The surface below the pad nodes, kept for the last two states."""
         for u, given, found in self._surfaces:
             if u is state.u and given is state.given:
                 return found
         found = surface_state(self.surface, self.places(state))
         if self.bed is not None:
-            shortened, sunk = state.strain.T
-            found = replace(found, slope=(found.slope - sunk[:, None]) / (1.0 - shortened)[:, None])
+            slope = np.linalg.solve(self._kept(state), (found.slope - state.strain[:, :, 1])[:, :, None])
+            found = replace(found, slope=np.asarray(slope[:, :, 0]))
         self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
 
@@ -183,24 +166,33 @@ class Interface:
         position = self.positions(state.u)
         return self.bed.below(self.places(state), surface_state(self.surface, position).gap)
 
+    def bed_of(self, state: State, c: Ints) -> CandidatesBed:
+        """The same below the candidates c."""
+        below = self.below(state)
+        return CandidatesBed(below.among(c), (below.given(state.attraction) - state.given)[c].ravel())
+
     def tilted(self, state: State, force: Floats) -> Floats:
         """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
         if self.bed is None:
             return force
-        (shortened, sunk), (along, up) = state.strain.T, force.T
-        return np.stack([(along + sunk * up) / (1.0 - shortened), up], axis=1)
+        found, pushed = force.copy(), force[:, ::2] + state.strain[:, :, 1] * force[:, 1:2]
+        found[:, ::2] = np.linalg.solve(self._kept(state), pushed[:, :, None])[:, :, 0]
+        return found
 
     def untilted(self, state: State, force: Floats) -> Floats:
         """The same attraction as above a surface that has not sunk, whose work is that of the field."""
         if self.bed is None:
             return force
-        (shortened, sunk), (along, up) = state.strain.T, force.T
-        return np.stack([along * (1.0 - shortened) - sunk * up, up], axis=1)
+        found, along = force.copy(), np.einsum("pkj,pj->pk", self._kept(state), force[:, ::2])
+        found[:, ::2] = along - state.strain[:, :, 1] * force[:, 1:2]
+        return found
+
+    def _kept(self, state: State) -> Floats:
+        """How long lengths on an elastic surface along x[, z] are for what they were, (P, d, d)."""
+        return np.asarray(np.eye(self.dim - 1) - state.strain[:, :, ::2])
 
     def unyielded(self, state: State, force: Floats) -> float:
-        """By how much, over the tolerances' lengths, what an elastic surface gives way by misses what the
-        forces on the nodes (P, 2) ask for; 0 of a rigid one.
-        """
+        """By how much, relative, an elastic surface misses what forces on the nodes (P, 2) sink it by."""
         if self.bed is None:
             return 0.0
         below = self.below(state)
@@ -221,8 +213,8 @@ class Interface:
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes (P, dim - 1) in mm, along the surface's tangents."""
-        way = self.on_display(state) - self.jumps.at(self.on_display(old))
-        return np.asarray(np.einsum("paj,pj->pa", self.surface_at(state).travel, way))
+        moved = self.on_display(state) - self.jumps.at(self.on_display(old))
+        return np.asarray(np.einsum("paj,pj->pa", self.surface_at(state).travel, moved))
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
@@ -246,15 +238,13 @@ class Interface:
         return known if self.law is None else self._obeying(self.law, known, old, state, c)
 
     def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
-        """The candidates c under a law of friction other than Coulomb's.
-
-        Where the interface yields by C, a node that slips under F(s) and is displaced by dx slips by ds = dx
-        - C dF: with K = dF/ds friction grows by K dx / (1 + K C). The contact problem has the part of F
-        that does not grow with dx; with it, slip and yielding are (1 + K C) times as large.
+        """The candidates c under a law of friction other than Coulomb's. Where the interface yields by C, a
+        node that slips under F(s), dF/ds = K, and moves by dx slips by ds = dx - C dF: friction grows by K dx
+        / (1 + K C). With the part of F that does not grow, slip and yielding are (1 + K C) times as large.
         """
         give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
-        way = sizes(known.slip + give[:, None] * known.force[:, 1:])
-        slip = np.where(known.status >= FORWARD, way, 0.0)
+        size = sizes(known.slip + give[:, None] * known.force[:, 1:])
+        slip = np.where(known.status >= FORWARD, size, 0.0)
         moving = self.slipping(old, state, c, known.friction, slip)
         found = self._oscillating.linearised(law, moving, c, known.status, shear)
         if self.dim == 3:  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
@@ -289,14 +279,13 @@ class Interface:
         found = self.restored(state.voltage)
         if found is None:
             return np.zeros(len(self.points))
-        share = self.tributary(state)
-        pressure = np.maximum(state.contact_force[:, 0], 0.0) / share
-        return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
+        length = self.tributary(state)
+        pressure = np.maximum(state.contact_force[:, 0], 0.0) / length
+        return np.where(state.touching, with_core(pressure, *found) * length, 0.0)
 
     def tributary_of(self, position: Floats) -> Floats:
         """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
-        least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
-        return np.maximum(self.pad.tributary(position), least)
+        return np.maximum(self.pad.tributary(position), self._least)
 
     def tributary(self, state: State) -> Floats:
         """Tributary lengths or areas (P,) in a state."""
@@ -306,8 +295,7 @@ class Interface:
         """Tributary lengths or areas (P,) at places (P, d) between two states; in space the mean of both."""
         if self.dim == 2:
             return self.tributary_of(place)
-        old, new = part
-        return 0.5 * (self.tributary(old) + self.tributary(new))
+        return np.asarray(0.5 * sum(map(self.tributary, part)))
 
     def age(self, old: State) -> Floats:
         """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
@@ -315,40 +303,35 @@ class Interface:
 
     def aged(self, old: State, state: State) -> State:
         """The accepted state, with contact times if a law of friction is given."""
-        if self.law is None:
-            return state
-        return replace(state, age=self.age(old))
+        return state if self.law is None else replace(state, age=self.age(old))
 
     def resistance(self, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats) -> Floats:
-        """Largest shear forces of the pad nodes (P,) at places (P, d) under contact forces (P,), slipping by
-        (P,).
-        """
+        """Largest shear forces of the pad nodes (P,) at places (P, d), pressed and slipping by (P,)."""
         old, new = part
-        nodes = np.arange(len(place))
-        mu = self.friction(old, nodes, place)
+        mu = self.friction(old, nodes := np.arange(len(place)), place)
         if self.law is None:
             return np.asarray(mu * normal)
         nodal = self.slipping(old, new, nodes, mu, slip)
         return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
 
-    def limit(self, old: State, state: State, place: Floats, way: Floats) -> Floats:
-        """Bounds of friction (P,) in N/mm of the pad nodes of `state` at places (P, d), slipping by `way`
-        (P,).
-        """
-        nodes = np.arange(len(place))
-        mu = self.friction(old, nodes, place)
+    def limit(self, old: State, state: State, place: Floats, slip: Floats) -> Floats:
+        """Bounds of friction (P,) in N/mm of the pad nodes at places (P, d), slipping by (P,)."""
+        mu = self.friction(old, nodes := np.arange(len(place)), place)
+        return self._bound(old, state, nodes, mu, slip)
+
+    def _bound(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
+        """The same of some nodes (k,) with the coefficients mu (k,), slipping by (k,)."""
         if self.law is None:
-            return np.asarray(mu * state.contact_force[:, 0])
-        return self.slipping(old, state, nodes, mu, way).bound(self.law)
+            return np.asarray(mu * state.contact_force[nodes, 0])
+        return self.slipping(old, state, nodes, mu, slip).bound(self.law)
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
         return np.zeros_like(old.contact_force)
 
     def friction(self, old: State, nodes: Ints, place: Floats) -> Floats:
-        """Friction coefficient of these pad nodes (k,) at the places (k, d) in mm; `old` is the
-        last accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask
-        for it here; `FrictionJumps` alone takes the coefficients on both sides of a jump from the surface.
+        """Friction coefficient of these pad nodes (k,) at the places (k, d) in mm after the state `old`: the
+        one that contact problem and acceptance ask for.
         """
         return np.broadcast_to(np.asarray(self.surface.friction_at(place), dtype=float), len(place))
 
@@ -368,20 +351,20 @@ class Interface:
         pinned = self.friction(old, nodes, self.jumps.at(place))
         here, slips = self.friction(old, nodes, place), state.status >= FORWARD
         yielded = sizes(place - self.jumps.at(place)) > self.tolerance * self.length
-        beyond = sizes(state.contact_force[:, 1:]) > self._resting_limit(old, state, here) + self._weak(state)
+        resting = self._bound(old, state, nodes, here, np.zeros(nodes.size))
+        beyond = sizes(state.contact_force[:, 1:]) > resting + self._weak(state)
         return self.jumps.held & (pinned != here) & (slips | (yielded & beyond))
 
     def _weak(self, state: State) -> float:
         """Forces (N/mm) below which a law of contact or friction holds."""
-        return self.tolerance * max(float(np.abs(state.contact_force).max()), SMALLEST_FORCE)
+        return self.tolerance * max(float(np.abs(state.contact_force).max()), constants.SMALLEST_FORCE)
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
         place, surface = self.on_display(state), self.surface_at(state)
-        short = self.tolerance * self.length
-        active = state.status != OPEN
-        weak = self._weak(state)
-        lower = self._resting_limit(old, state, self.jumps.lower)
+        short, weak, active = self.tolerance * self.length, self._weak(state), state.status != OPEN
+        every, resting = np.arange(len(place)), np.zeros(len(place))
+        lower = self._bound(old, state, every, self.jumps.lower, resting)
         if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
         if self.jumps.let_go(self._strayed(old, state, place)):
@@ -390,25 +373,17 @@ class Interface:
         compliance = self.compliance(old)[active]
         slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
         status, nodes = state.status[active], np.flatnonzero(active)
-        way, size = sizes(slip), sizes(shear)
-        limit = (mu := self.friction(old, nodes, self.jumps.at(place)[active])) * normal
-        if self.law is not None:
-            moving = np.where(status == STICK, 0.0, way)
-            limit = self.slipping(old, state, nodes, mu, moving).bound(self.law)
-        sticks = (way <= short) & (size <= limit + weak)
+        slid, size = sizes(slip), sizes(shear)
+        mu = self.friction(old, nodes, self.jumps.at(place)[active])
+        limit = self._bound(old, state, nodes, mu, np.where(status == STICK, 0.0, slid))
+        sticks = (slid <= short) & (size <= limit + weak)
         # a slip is known to `short`, and its direction accordingly
-        against = sizes(shear + (limit / np.maximum(way, 1e-300))[:, None] * slip)
-        astray = np.where(way > short, against - limit * short / np.maximum(way, short), 0.0)
+        against = sizes(shear + (limit / np.maximum(slid, 1e-300))[:, None] * slip)
+        astray = np.where(slid > short, against - limit * short / np.maximum(slid, short), 0.0)
         slips = (limit == 0.0) | ((np.abs(size - limit) <= weak) & (astray <= weak))
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & np.where(status == STICK, sticks, slips)).all())
-
-    def _resting_limit(self, old: State, state: State, mu: Floats) -> Floats:
-        """Shear forces (P,) that hold pad nodes with the coefficients mu (P,)."""
-        if self.law is None:
-            return np.asarray(mu * state.contact_force[:, 0])
-        return self.slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
 
 
 class PenaltyInterface(Interface):
@@ -425,9 +400,9 @@ def slipped(interface: Interface, old: State, new: State) -> Floats:
     """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left;
     along the mean of the surface's tangents.
     """
-    way = interface.on_display(new) - interface.on_display(old)
+    moved = interface.on_display(new) - interface.on_display(old)
     travel = 0.5 * (interface.surface_at(old).travel + interface.surface_at(new).travel)
-    slip = np.einsum("paj,pj->pa", travel, way)
+    slip = np.einsum("paj,pj->pa", travel, moved)
     status = np.where(new.touching | (old.status == STICK), new.status, old.status)
     # a node may stick at a jump of friction that it has slipped up to
     carried = (status == STICK) & (sizes(slip) > interface.tolerance * interface.length)

@@ -20,22 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    FAR,
-    FIRST_CANDIDATES,
-    LEFT_OVER,
-    LONGER,
-    SHORTER,
-    SLOW,
-    SMALLEST_STIFFENING,
-    SPARE,
-    STABLE,
-    STALLED,
-    STEEP,
-    STEEP_IN_SPACE,
-    SUBTRACTED,
-)
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
@@ -44,7 +30,6 @@ from evfem.newton.interface import Interface
 from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import surface_state
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import Past
 
 
 def no_progress(residuals: list[float], same: bool) -> bool:
@@ -62,15 +47,15 @@ def no_progress(residuals: list[float], same: bool) -> bool:
 def limited_gain(gain: Floats) -> Floats:
     """Gains of the attraction per contact force (P,), limited for the tangent.
 
-    The net force of a contact force of 1 is 1 - gain. At a gain of 1 the node's equilibrium has a fold;
-    above, the force grows by itself until the rough faces are close. Iterations shall leave such a point,
-    and converge to one below 1 with its own tangent: above `STABLE` the tangent has abs(1 - gain), limited
-    to the range from `LEFT_OVER` to 1 - `STABLE`.
+    At a gain of 1 the node's equilibrium has a fold; above, the force grows by itself until the rough faces
+    are close. Iterations shall leave such a point, and converge to one below 1 with its own tangent: above
+    `STABLE` the tangent has abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
 
     >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
     [0.5, 0.95, 0.99, 0.95, 0.9]
     """
-    return np.where(gain > STABLE, 1.0 - np.clip(np.abs(1.0 - gain), LEFT_OVER, 1.0 - STABLE), gain)
+    left = np.clip(np.abs(1.0 - gain), constants.LEFT_OVER, 1.0 - constants.STABLE)
+    return np.where(gain > constants.STABLE, 1.0 - left, gain)
 
 
 class Linearisation:
@@ -85,9 +70,9 @@ class Linearisation:
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
         depth = float(np.ptp(body.space.mesh.points[:, 1]))
         self.softest = min(law.shear_modulus for law, _ in body.tissue.groups) / depth
-        self.steep = STEEP * self.softest
+        self.steep = constants.STEEP * self.softest
         height = self.interface.points[:, 1]
-        self._deep = height - height.min() <= FAR * limits.deepest
+        self._deep = height - height.min() <= constants.FAR * limits.deepest
         self.factor: Any = None
         self.tangent: Any = None
         self.stiffest = 0.0
@@ -103,8 +88,7 @@ class Linearisation:
     def begin(self, old: State, frozen: bool) -> None:
         """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
         self.touching, self.frozen = old.status != OPEN, frozen
-        self._lets_go = True
-        self._outdated = self.fringes
+        self._lets_go, self._outdated = True, self.fringes
         if self.fringes:
             self.fringes, self._made_at = False, None
 
@@ -115,9 +99,8 @@ class Linearisation:
         if dynamics is None:
             return
         if self._made_at is not None:
-            self._outdated |= (
-                not SHORTER * self._made_at.duration <= duration <= LONGER * self._made_at.duration
-            )
+            made_for = self._made_at.duration
+            self._outdated |= not constants.SHORTER * made_for <= duration <= constants.LONGER * made_for
         dynamics.begin(old.u, old.velocity, duration, old.inner, old.past)
 
     def choose_candidates(self, state: State, reach: float) -> None:
@@ -126,7 +109,8 @@ class Linearisation:
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
-            self._follow(state, gap, weakening > STEEP_IN_SPACE * self.softest * self.pad.tributary(position))
+            least = constants.STEEP_IN_SPACE * self.softest
+            self._follow(state, gap, weakening > least * self.pad.tributary(position))
             return
         steep, near = self.steep * self.pad.tributary(position), (gap <= reach) | (state.status != OPEN)
         needed = self.pad.free & (near | (weakening > steep))
@@ -135,8 +119,8 @@ class Linearisation:
         if needed[self.candidates].sum() == needed.sum():
             return
         # gap below which `SPARE` times as many nodes lie: a new choice costs an analysis of the matrix
-        enough = np.sort(gap)[min(int(SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
-        wider = (gap <= max(enough, self.interface.neighbourhood)) | (SPARE * weakening > steep)
+        enough = np.sort(gap)[min(int(constants.SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
+        wider = (gap <= max(enough, self.interface.neighbourhood)) | (constants.SPARE * weakening > steep)
         wider = self.pad.free & (wider | self._deep) | needed
         self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
         self.factor = None
@@ -146,17 +130,13 @@ class Linearisation:
         needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
         if self.candidates.size and needed[self.candidates].sum() == needed.sum():
             return
-        count = max(SPARE * needed.sum(), FIRST_CANDIDATES * self.pad.free.sum())
+        count = max(constants.SPARE * needed.sum(), constants.FIRST_CANDIDATES * self.pad.free.sum())
         enough = np.sort(gap)[min(int(count), int(self.pad.free.sum()) - 1)]
         chosen = np.flatnonzero(self.pad.free & (gap <= enough) | needed)
         self.candidates = chosen if self._lets_go else np.union1d(self.candidates, chosen)
         self.factor, self._lets_go = None, False
 
     # -- factorisation
-
-    def discard(self) -> None:
-        """Drops the factorisation: the next iteration makes a new one."""
-        self.factor = None
 
     def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
         """Factorises if there is none, iterations stall, or a new one saves time; returns whether it did."""
@@ -176,17 +156,22 @@ class Linearisation:
 
     def _has_fringes(self, state: State) -> bool:
         """Whether the attraction at `state` has a stiffness of its own beside that of columns."""
-        has = self.attraction is not None and self.attraction.has_fringes
-        return has and state.voltage != 0.0 and not self.frozen
+        return state.voltage != 0.0 and (acting := self._acting(state)) is not None and acting.has_fringes
+
+    def _acting(self, state: State) -> Attraction | None:
+        """The attraction if it follows the gap at `state`, else None."""
+        acts = self.attraction is not None and not self.frozen and self.attraction.acts(state.voltage)
+        return self.attraction if acts else None
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
-        self._outdated, self._drag_rate = False, self.body.drag_rate
+        self._outdated, self._drag_rate, self.tangent = False, self.body.drag_rate, None
         if self.factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             # static condensation keeps candidates and bone
             kept = np.concatenate([unknowns, self.body.bone])
-            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
+            single = kept.size >= constants.LARGE_SCHUR
+            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, single)
             self.record.backend = type(self.factor).__name__
         pressure = state.pressure if state.pressure.size else None
         upper = self.body.tangent(state.u, pressure)
@@ -199,15 +184,12 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        begin, seconds, inner, past = self.body.beginning
-        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
-        more = (past.rates, past.seconds, state.given, state.strain)
-        self._made_at = TangentPoint(*at, state.status, state.pressure, inner, *more)
+        self._made_at = TangentPoint(state, self.touching, self.frozen, *self.body.beginning)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
         """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
-        most = SUBTRACTED * self.softest * self.pad.tributary(self.interface.places(state))
+        most = constants.SUBTRACTED * self.softest * self.pad.tributary(self.interface.places(state))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
         weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
@@ -216,27 +198,25 @@ class Linearisation:
 
     def made_at(self, state: State) -> bool:
         """Whether the factorisation is that of `state`."""
-        return self._made_at is not None and self._made_at.u is state.u
+        return self._made_at is not None and self._made_at.state.u is state.u
 
     @property
     def reusable(self) -> TangentPoint | None:
         """Point of the factorisation that the next step may use; none with the field's own stiffness."""
         return None if self.factor is None or self.fringes else self._made_at
 
-    def restore(self, state: State, at: TangentPoint) -> None:
-        """Repeats the factorisation made at `at` by the run that is resumed from `state`."""
-        self.touching, self.frozen = at.touching, at.frozen
+    def restore(self, at: TangentPoint) -> None:
+        """Repeats the factorisation that the run that is resumed made at `at`."""
+        self.touching, self.frozen = at.touched, at.frozen
         if self.body.dynamics is not None:
-            still, past = np.zeros_like(at.begin), Past(at.seconds, at.rates)
-            self.body.dynamics.begin(at.begin, still, at.duration, at.inner, past)
-        there = replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure)
-        self.factorise(replace(there, given=at.given, strain=at.strain))
+            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner, at.past)
+        self.factorise(at.state)
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:
             return False
         before, now = history[-2:]
-        if now > STALLED or now > SLOW * before:
+        if now > constants.STALLED or now > constants.SLOW * before:
             return True
         # iterations left at the last rate of convergence, against the strategy's patience
         tolerance = self.limits.tolerance
@@ -248,38 +228,31 @@ class Linearisation:
 
     def negative_stiffness(self, state: State) -> Floats:
         """Negative stiffness of the attraction of every pad node, (P,) in N/mm per mm."""
-        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
+        if (attraction := self._acting(state)) is None:
             return np.zeros(self.pad.nodes.size)
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
-        return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
+        return attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
 
     def gain_on_closing(self, state: State) -> Floats:
         """Increase of the attraction of every pad node when its gap closes, (P,) in N/mm."""
-        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
+        if (attraction := self._acting(state)) is None:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
         # gaps now, and with every node in contact
         places = [self.interface.resting(s) for s in (state, everywhere)]
         at = (state.voltage, self.touching, state.contact_force[:, 0])
-        now, closed = (self.attraction.column_forces(place, *at)[:, 1] for place in places)
-        return np.asarray(self.attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
+        now, closed = (attraction.column_law.forces(place, *at)[:, 1] for place in places)
+        return np.asarray(attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
-        """Derivatives of the attraction of every pad node by its contact force, where rough faces come
-        closer under it, along normal and tangent: on a slope a vertical force has a tangential component.
-        None for smooth faces.
+        """Derivatives of the attraction of every pad node by its contact force, along normal and tangent,
+        where rough faces come closer under it; None for smooth faces.
         """
-        attraction = self.attraction
-        if (
-            attraction is None
-            or attraction.roughness is None
-            or self.frozen
-            or not attraction.acts(state.voltage)
-        ):
+        if (attraction := self._acting(state)) is None or attraction.roughness is None:
             return None
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         unpressed, pressed = (
-            attraction.column_forces(place, state.voltage, self.touching, each)[:, 1]
+            attraction.column_law.forces(place, state.voltage, self.touching, each)[:, 1]
             for each in (None, pressing)
         )
         factor = attraction.tangent_factor(place, state.voltage, self.touching, pressing)
@@ -291,28 +264,26 @@ class Linearisation:
             along[:, 0] = surface.stretch
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)[:, None] * along
         # the full tangential gain could close a node on a slope by more than the limited normal gain holds
-        gain[:, 1:] = np.where(gain[:, :1] > STABLE, 0.0, gain[:, 1:])
+        gain[:, 1:] = np.where(gain[:, :1] > constants.STABLE, 0.0, gain[:, 1:])
         gain[:, 0] = limited_gain(gain[:, 0])
         return Roughness(gain, lost[:, None] * along, pressing)
 
     def _coupling(self, state: State) -> Floats | None:
-        """The attraction's stiffness on the candidates but for the weakening with a node's own
-        gap, which belongs to the contact problem: what is left are changes of tributary lengths.
-        None without attraction, or where they are faint: a symmetric compliance takes a third of
-        the time. None with charges too, so that a factorisation does not depend on the step.
+        """The attraction's stiffness on the candidates but for the weakening with a node's own gap: what is
+        left are changes of tributary lengths. None where they are faint, as a symmetric compliance takes a
+        third of the time, and with charges, so that a factorisation does not depend on the step.
         """
-        if self.attraction is None or self.frozen or self.attraction.charging:
-            return None
-        if not self.attraction.acts(state.voltage):
+        if (attraction := self._acting(state)) is None or attraction.charging:
             return None
         position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
         pressing = state.contact_force[:, 0]
-        whole = self.attraction.stiffness(position, state.voltage, self.touching, pressing)
         if self.fringes:
             from evfem.contact.fullfield import FieldAttraction
 
-            assert isinstance(self.attraction, FieldAttraction)
-            whole = self.attraction.fringe_stiffness(position, state.voltage, pressing)
+            assert isinstance(attraction, FieldAttraction)
+            whole = attraction.fringe_stiffness(position, state.voltage, pressing)
+        else:
+            whole = attraction.stiffness(position, state.voltage, self.touching, pressing)
         unknowns = (dim * c[:, None] + np.arange(dim)).ravel()
         rows = whole[unknowns]
         inner = np.asarray(rows[:, unknowns].toarray())
@@ -323,8 +294,8 @@ class Linearisation:
             inner[index, dim * (index // dim) + a] += beyond
         normal = surface_state(self.interface.surface, position[c]).axes[:, 0, COMPONENTS[:dim]]
         own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
-        # weakening with a node's own gap belongs to the contact problem: not twice
+        # that belongs to the contact problem: not twice
         blocks = inner.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own
         stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
-        return inner if stiffened.max() > SMALLEST_STIFFENING else None
+        return inner if stiffened.max() > constants.SMALLEST_STIFFENING else None

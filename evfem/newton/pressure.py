@@ -54,14 +54,14 @@ class Pressure:
     def further_forces(self, state: State, misfit: Floats) -> Floats | None:
         """Forces (N, 2) of the misfit along the older tangent's volume less the present one's, or None."""
         at = self.linearisation.reusable
-        if not self.active or at is None or at.u is state.u:
+        if not self.active or at is None or at.state.u is state.u:
             return None
-        return self.tissue.pressure_forces(at.u, misfit) - self.tissue.pressure_forces(state.u, misfit)
+        return self.tissue.pressure_forces(at.state.u, misfit) - self.tissue.pressure_forces(state.u, misfit)
 
     def after(self, state: State, misfit: Floats, du: Floats, fraction: float) -> Floats:
         """The next pressure, after the fraction of an increment du (N, 2) of the displacements."""
         at = self.linearisation.reusable
         if not self.active or at is None:
             return state.pressure
-        change: Floats = misfit + self.tissue.pressure_change(at.u, du)
+        change: Floats = misfit + self.tissue.pressure_change(at.state.u, du)
         return state.pressure + fraction * change

@@ -28,8 +28,8 @@ NO_CHARGES: Floats = np.zeros((2, 0))
 
 class StepFailed(ArithmeticError):
     """An equilibrium was not found: its `residuals`, the `reason`, `findings` of the last iterate;
-    `unstable`: the tangent was not positive definite. Of a step that was given up, `last` is its first
-    state and its target, `released` whether the body was released there.
+    `unstable`: the tangent was not positive definite. Of a step given up: its first state and target, `last`,
+    `released`.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
@@ -59,8 +59,8 @@ class State:
     resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
     (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
     `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface
-    adds to the places of the pad's nodes relative to it is `given` (P, 2) in mm, its derivative along x
-    `strain` (P, 2).
+    adds to the places of the pad's nodes relative to it is `given` (P, dim) in mm, its derivatives along x[,
+    z] `strain` (P, d, dim).
     """
 
     u: Floats
@@ -95,32 +95,23 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Point of a tangent: displacements u (N, dim), voltage, pad nodes that touched (P,) when the step began,
-    whether the attraction was frozen, the displacements at the beginning of the time step (N, dim) and its
-    seconds, the pad nodes' statuses (P,), the pressure (E, Q) if that is an unknown, the branches' inner
-    variables when the step began, and mean rates and seconds of the part before.
+    """Where a tangent was made: at an iterate, with the pad nodes that `touched` (P,) when the step began, a
+    `frozen` attraction or not, and of the time step the displacements (N, dim) that it began with, its
+    seconds, what branches had kept, and the part before (`Body.beginning`).
     """
 
-    u: Floats
-    voltage: float
-    touching: Any
+    state: State
+    touched: Any
     frozen: bool
     begin: Floats
     duration: float
-    status: Ints
-    pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
-    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
-    rates: Floats = field(default_factory=lambda: NO_RATES)
-    seconds: float = 0.0
-    given: Floats = field(default_factory=lambda: NO_BED)
-    strain: Floats = field(default_factory=lambda: NO_BED)
+    inner: Floats
+    past: Past
 
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """Data that the next step reuses: contact candidates (numbers of pad nodes), the point of the
-    factorisation if there is one, and the last time step (s).
-    """
+    """What the next step reuses: candidates (pad nodes), point of the factorisation, time step (s)."""
 
     candidates: Ints
     tangent_point: TangentPoint | None
@@ -150,9 +141,8 @@ class Record:
 
 @dataclass(frozen=True)
 class MixedBalance:
-    """Residual of the mixed displacement-pressure problem (`evfem.newton.pressure`): the forces (n,)
-    as the older tangent takes them, the largest of them relative to the reaction, and the pressure of
-    the laws less the iterate's (E, Q) in MPa.
+    """Residual of the mixed problem (`evfem.newton.pressure`): the forces (n,) as the older tangent takes
+    them, the largest relative to the reaction, and the pressure of the laws less the iterate's (E, Q) in MPa.
     """
 
     forces: Floats
@@ -162,8 +152,8 @@ class MixedBalance:
 
 @dataclass(frozen=True)
 class Balance:
-    """Residual of an iterate: out-of-balance forces (n,) of the reduced unknowns in N/mm, the largest
-    relative to the reaction, the attraction (P, 2), and the mixed problem's residual if it is solved.
+    """Residual of an iterate: out-of-balance forces (n,) in N/mm, the largest relative to the reaction, the
+    attraction (P, 2), and the mixed problem's residual if it is solved.
     """
 
     forces: Floats
@@ -183,26 +173,19 @@ class Balance:
 
 def findings(body: Body, state: State, balance: Balance) -> str:
     """Largest out-of-balance forces and their current places, the contact, the smallest volume ratio."""
-    nodal = np.linalg.norm(_free(body, balance.forces), axis=1)
+    free = balance.forces.copy()
+    free[body.bone] = 0.0  # its motion balances these
+    forces = body.expand(free)
+    nodal = np.linalg.norm(np.where(np.isnan(forces), np.inf, forces), axis=1)
     worst = np.argsort(nodal)[::-1][:NAMED]
     places = (body.space.mesh.points + state.u)[worst]
     unit = "N/mm" if state.bone.size == 2 else "N"
     at = [", ".join(f"{coordinate:.4g}" for coordinate in place) for place in places]
-    forces = ", ".join(
-        f"{nodal[node]:.1e} {unit} at ({where})" for node, where in zip(worst, at, strict=True)
-    )
+    named = ", ".join(f"{nodal[node]:.1e} {unit} at ({place})" for node, place in zip(worst, at, strict=True))
     opened, sticking = int((state.status == OPEN).sum()), int((state.status == STICK).sum())
     slipping = state.status.size - opened - sticking
     smallest = body.tissue.smallest_J(state.u)
     return (
-        f"out of balance: {forces}; contact: {opened} nodes open, {sticking} stick, {slipping} slip; "
+        f"out of balance: {named}; contact: {opened} nodes open, {sticking} stick, {slipping} slip; "
         f"smallest J of a cell: {smallest:.2g}"
     )
-
-
-def _free(body: Body, reduced: Floats) -> Floats:
-    """Nodal forces (N, 2), without those of the bone, which its motion balances."""
-    kept = reduced.copy()
-    kept[body.bone] = 0.0
-    forces = body.expand(kept)
-    return np.where(np.isnan(forces), np.inf, forces)

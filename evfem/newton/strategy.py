@@ -1,10 +1,7 @@
 """Limits of the step control: lengths of parts and numbers of their iterations.
 
-A step leads from one accepted state to the next. It is tried whole first; a part that fails is halved,
-and after easy ones parts grow again. If short parts fail too, the finger is released and comes to rest
-at another equilibrium (`evfem.solver.relaxation`); if it does not, still shorter parts are tried. What
-happens on the way needs physics instead: `dynamics` "viscous" or "inertial" with a speed.
-
+A step leads from one accepted state to the next. It is tried whole first; a part that fails is halved, and
+after easy ones parts grow again. If short parts fail too, the finger is released (`evfem.solver.relaxation`).
 With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
 """
 

@@ -40,7 +40,10 @@ class Travel:
         if abs(bone[1]) > self.longest or flies:
             # a long way may rest on a single node, and a body whose attraction wins flies off: go
             # part of the way, the way the missing force pushes
-            longest = self._longest_flight(state) if flies else self.longest
+            longest = self.longest
+            if flies:  # twice the gap, or a little
+                gap = float(self.interface.surface_at(state).gap.min())
+                longest = float(np.clip(2.0 * gap, SHORTEST_FLIGHT * longest, longest))
             bone[1] = np.copysign(longest, missing if flies else bone[1])
             found = self.solve(replace(step, bone=bone, unknowns=()))
         return found, bone
@@ -52,9 +55,3 @@ class Travel:
         except ContactNotSolved:
             return True
         return travel * step.lacking(found, 0.0) < 0.0
-
-    def _longest_flight(self, state: State) -> float:
-        """Longest travel (mm) in one iteration of a body that touches nothing: twice its gap, or a little."""
-        gap = float(self.interface.surface_at(state).gap.min())
-        least = SHORTEST_FLIGHT * self.longest
-        return float(np.clip(2.0 * gap, least, self.longest))

@@ -28,6 +28,7 @@ from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import path_depth
 from evfem.scene.electrics import Electrics
 from evfem.scene.scene import Scene
+from evfem.surface.adhesion import BEYOND, Softened
 from evfem.tissue.splitlaw import plane_modulus, split
 
 #: slope times node distance over the plane modulus that a mesh resolves
@@ -39,6 +40,8 @@ FIRST, LOW = 1e-6, 0.05
 EDGE = 1.5
 #: modulus (MPa) in the place of none
 RIGID = 1e30
+#: steepest slope (MPa/mm) of adhesion above rigid cells; slopes within this factor count as one
+STEEPEST, CLASS = 1e12, 1.1
 #: a core is no longer than this share of a hovering gap, for pull-in is to see the law; nor should it be of
 #: a texture's depth
 SEEN = 0.5
@@ -103,7 +106,7 @@ class Closing:
         """
         scene, wanted, voltage = self.scene, self.scene.solver.core, self.scene.electrics.largest_voltage
         found = isinstance(scene.voltage, FollowForce) or any(one.gap is not None for one in scene.courses)
-        has_none = self._charged or found or not scene.air_layer
+        has_none = scene.electrics.resolved or found or not scene.air_layer
         if wanted == "off" or not scene.electrics.acts or has_none or self._full:
             return None
         if isinstance(wanted, str) and not self.snaps:
@@ -147,25 +150,44 @@ class Closing:
         height = self._local[2]
         return height <= height.min() + LOW * np.ptp(self.mesh.points[:, 1])
 
+    @cached_property
+    def adhesion(self) -> Softened:
+        """The law of adhesion with a line of the same work where it falls faster than the mesh at a node
+        resolves, half as fast beside a voltage; core = "off": the law itself.
+        """
+        law = self.scene.adhesion
+        if self.scene.solver.core == "off":
+            return Softened(law, self.closed, np.full(self.stiffness.shape, np.inf))
+        steepest = np.minimum(self.resolved * self.stiffness, STEEPEST)
+        return Softened(law, self.closed, CLASS ** np.floor(np.log(steepest) / np.log(CLASS)))
+
+    @property
+    def adhesion_in_words(self) -> str:
+        """What a plan says of it."""
+        law: Any = self.scene.adhesion
+        work = float(law.potential(self.closed + BEYOND)) - float(law.potential(self.closed))
+        begin, end = (1e3 * float(gap[self.first].max()) for gap in (self.adhesion.begin, self.adhesion.end))
+        line = ""
+        if end > begin:
+            line = (
+                f"; from {begin:.2g} to {end:.2g} um a line of the same work takes its place, the steepest "
+                "that this mesh resolves"
+            )
+        return f"{type(law).__name__}, work of adhesion {work:.2g} N/mm, always on{line}"
+
     @property
     def trapped(self) -> bool:
         """Whether nodes snap one by one in a run without time, for want of a core; nodes that are attracted
         only while they touch do not.
         """
         scene = self.scene
-        still = scene.air_layer and not scene.solver.timed and not self._charged
+        still = scene.air_layer and not scene.solver.timed and not scene.electrics.resolved
         return bool(still and scene.electrics.acts and self.core is None and self.snaps)
-
-    @property
-    def _charged(self) -> bool:
-        """Whether charges flow in time."""
-        return self.scene.drive is not None and self.scene.drive.resolved
 
     @property
     def _nodes(self) -> Ints:
         """Nodes of the pad (P,)."""
-        mesh = self.mesh
-        return np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
+        return np.unique(self.mesh.sides_of("pad"))
 
     @cached_property
     def closed(self) -> float:
@@ -186,7 +208,7 @@ class Closing:
         of no stiffness of their own have another's, and resolve everything.
         """
         mesh, laws = self.mesh, self.scene.finger.materials
-        sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
+        sides = mesh.cell_sides
         on_pad = np.isin(sides, self._nodes)
         cell, side = np.nonzero(on_pad.all(axis=2))
         nodes, place = np.unique(sides[cell, side], return_inverse=True)

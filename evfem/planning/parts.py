@@ -1,36 +1,43 @@
 """Mistakes in a user's parts of a scene, found before it is solved.
 
-`check_parts` evaluates a user's laws once, near rest and at three gaps, and what contact asks of
-them (`evfem.planning.partchecks`), and raises InputError for what no run could use. Built-in parts
-are not evaluated.
+`check_parts` evaluates a user's laws once, near rest and at three gaps, tries a surface at a dozen places
+of the way and laws of contact at three pressures, and raises InputError for what no run could use.
+Built-in parts are not evaluated. `evaluated` and its like say in a sentence what is wrong with a function.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
-from inspect import getattr_static, isfunction
+from collections.abc import Callable
+from functools import partial
+from inspect import getattr_static, isfunction, signature
 from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import StrongTroxel
+from evfem.electrostatics.roughness import WIDEST
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
-from evfem.planning.partchecks import (
-    check_arguments,
-    check_friction_law,
-    check_roughness,
-    check_shape,
-    check_surface,
-    evaluated,
-)
 from evfem.protocols import RoughnessLaw, TimeSignal
 from evfem.scene.scene import Scene
 from evfem.tensor import STEP, Array, complex_step, det, difference, inv, trace, transpose
 from evfem.tissue.forms import Form
 from evfem.tissue.splitlaw import SplitLaw, split
 
+#: what a user's function must be
+FUNCTION = "a function that takes arrays with a value for every point"
+#: contact pressures (MPa) at which laws are tried, and a bound of friction over the last one, at most: no
+#: coefficient of a surface is larger
+PRESSURES, GREATEST = np.array([0.0, 1e-4, 0.01]), 100.0
+#: coefficient of friction at which laws are tried, and one that is negative by rounding
+COEFFICIENT, ROUNDING = 0.3, 1e-9
+#: places of a surface as shares of the way, where no kink of a profile is likely
+PLACES = np.linspace(0.0371, 0.9643, 12)
+#: steps (mm) of differences of a height, the largest slope that counts as none, and the median relative
+#: error of a slope, at most: heights have kinks and noise
+STEPS, LEVEL, SLOPE = (1e-4, 1e-2), 1e-4, 0.3
 #: strain at which a user's material is evaluated beside rest, and the step of differences there
 STRAIN, STRAIN_STEP = 0.02, 1e-3
 #: some displacement gradient in the plane: stretch, shear and rotation
@@ -79,7 +86,6 @@ def check_parts(scene: Scene, dim: int) -> None:
 
 
 def _is_own(part: Any) -> bool:
-    """Whether a part is the user's own."""
     return not type(part).__module__.startswith("evfem.")
 
 
@@ -175,10 +181,14 @@ def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:
         given = f"a traction of shape {found.shape} at gaps of shape {GAPS.shape}"
         raise InputError(key, given, "a value for every gap")
     _check_traction(key, np.broadcast_to(found, GAPS.shape), StrongTroxel().traction(GAPS, at, layers))
-    if voltage == 0.0 or (scene.drive is not None and scene.drive.resolved):  # charges give another voltage
+    if voltage == 0.0 or scene.electrics.resolved:  # charges give another voltage
         return
-    lowest = _lowest(scene)
-    _check_negative(key, lambda gap: seen.traction(gap, lowest, layers), lowest)
+    if (lowest := _lowest(scene)) < 0.0:
+        what = f"a traction at {lowest:g} V"
+        found = evaluated(key, what, lambda gap: seen.traction(gap, lowest, layers), GAPS)
+        if (found < 0.0).any():
+            given = f"a traction of {found.min():.3g} MPa at {lowest:g} V"
+            raise InputError(key, given, "positive values, which attract")
     _check_rates(key, scene, lambda name: lambda gap: getattr(seen, name)(gap, voltage, layers))
 
 
@@ -193,16 +203,6 @@ def _check_traction(key: str, traction: Array, rigid: Any) -> None:
     if over > STRONGEST:
         given = f"{over:.1e} times the attraction of parallel plates"
         raise InputError(key, given, "a traction in MPa, not in Pa, of gaps in mm")
-
-
-def _check_negative(key: str, traction: Callable[[Array], Any], voltage: float) -> None:
-    """Whether a user's law attracts at the lowest voltage (V) of a scene, too."""
-    if voltage >= 0.0:
-        return
-    found = evaluated(key, f"a traction at {voltage:g} V", traction, GAPS)
-    if (found < 0.0).any():
-        given = f"a traction of {found.min():.3g} MPa at {voltage:g} V"
-        raise InputError(key, given, "positive values, which attract")
 
 
 def _lowest(scene: Scene) -> float:
@@ -221,11 +221,14 @@ def _lowest(scene: Scene) -> float:
 def _check_rates(key: str, scene: Scene, method: Callable[[str], Callable[[Array], Any]]) -> None:
     """Whether what a user gives as derivative by the gap is one; `method` finds the law's by name."""
     gaps = GAPS + 5.0 * GAP_STEP  # none is negative in a difference
-    for rate, of in _rates(scene):
-        found = evaluated(key, f"{rate}(gap, voltage, layers)", method(rate), gaps)
-        check_shape(key, f"{rate}(gap, voltage, layers)", found, gaps, one=True)
-        values = evaluated(key, f"{of}(gap, voltage, layers)", method(of), gaps)
-        check_shape(key, f"{of}(gap, voltage, layers)", values, gaps, one=rate == "traction_derivative")
+    has = getattr(scene.law, "traction_derivative", None) is not None
+    taken = [("traction_derivative", "traction")] if has else []
+    if scene.direction == "normal":  # a potential is asked for nowhere else
+        taken.append(("traction", "potential"))
+    for rate, of in taken:
+        found = shaped(key, f"{rate}(gap, voltage, layers)", method(rate), gaps, one=True)
+        one = rate == "traction_derivative"
+        values = shaped(key, f"{of}(gap, voltage, layers)", method(of), gaps, one=one)
         near = difference(method(of), gaps, GAP_STEP)
         error = np.abs(found - near) / (np.abs(near) + NO_RATE * np.abs(values) + np.finfo(float).tiny)
         if float(np.median(error)) > BY_GAP:
@@ -233,9 +236,125 @@ def _check_rates(key: str, scene: Scene, method: Callable[[str], Callable[[Array
             raise InputError(key, given, "two that agree, in mm and MPa")
 
 
-def _rates(scene: Scene) -> Iterator[tuple[str, str]]:
-    """Methods of a user's law that a run takes for derivatives by the gap, and of what."""
-    if getattr(scene.law, "traction_derivative", None) is not None:
-        yield "traction_derivative", "traction"
-    if scene.direction == "normal":  # a potential is asked for nowhere else
-        yield "traction", "potential"
+def evaluated(key: str, what: str, function: Callable[[Array], Any], at: Array) -> Array:
+    """The values of a user's function; InputError where it raises anything, or they are not finite
+    numbers.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            given = function(at)
+        except Exception as error:  # whatever a user's code raises
+            raise InputError(key, f"{what} that raises {type(error).__name__}: {error}", FUNCTION) from error
+        if given is None:
+            raise InputError(key, f"{what} that returns None", FUNCTION)
+        try:
+            value = np.asarray(given)
+            finite = bool(np.isfinite(value).all())
+        except (TypeError, ValueError) as error:  # ragged, or no numbers
+            name = type(given).__name__
+            raise InputError(
+                key, f"{what} that returns a {name} and no array of numbers", FUNCTION
+            ) from error
+    if not finite:
+        raise InputError(key, f"{what} that is infinite or no number", "finite values at rest and in contact")
+    return value
+
+
+def check_arguments(key: str, method: Any, called: tuple[str, ...], *, by_name: bool = False) -> None:
+    """Whether a user's method takes the arguments of `called`, those `by_name` under these names."""
+    name, *arguments = called
+    try:
+        own = signature(method)
+    except (TypeError, ValueError):  # nothing to call, or compiled
+        return
+    try:
+        own.bind(*arguments)
+        order = own.bind(**dict(zip(arguments, arguments, strict=True))).args if by_name else ()
+    except TypeError:
+        order = ("others",)
+    if order != tuple(arguments)[: len(order)]:  # fewer where a decorator takes any
+        raise InputError(key, f"{name}{own}", f"{name}({', '.join(arguments)})")
+
+
+def shaped(key: str, what: str, function: Callable[[Array], Any], at: Array, *, one: bool = False) -> Array:
+    """The same with a value for every point, or `one` for all."""
+    found = evaluated(key, what, function, at)
+    if found.shape != at.shape and not (one and found.shape == ()):
+        given = f"{what} of shape {found.shape} for arrays of shape {at.shape}"
+        raise InputError(key, given, f"an array of shape {at.shape}, with a value for every point")
+    return found
+
+
+def check_surface(scene: Scene) -> None:
+    """Whether a user's surface is finite everywhere on the way, with the slopes of its height."""
+    key, own, x = "surface", scene.surface, _places(scene)
+    for name in ("height", "slope", "curvature", "friction_coefficient"):
+        method = getattr(own, name, None)
+        if method is None:
+            continue
+        check_arguments(key, method, (name, "x"))
+        found = shaped(key, f"{name}(x)", method, x, one=name == "friction_coefficient")
+        if name == "friction_coefficient" and (found < -ROUNDING).any():
+            raise InputError(key, f"a friction_coefficient(x) of {found.min():.3g}", "none that is negative")
+    _check_slope(key, scene, x)
+
+
+def _check_slope(key: str, scene: Scene, x: Floats) -> None:
+    """Whether the slope that a run takes, given or derived, is near that of differences."""
+    given = getattr(scene.surface, "slope", None) is not None
+    slope = evaluated(key, "slope(x)" if given else "height(x)", scene.ground.slope, x)
+    errors = []
+    for step in STEPS:
+        near = evaluated(key, "height(x)", partial(difference, scene.ground.height, step=step), x)
+        size = np.maximum(np.abs(slope), np.abs(near))
+        counts = size > max(LEVEL, LEVEL * size.max())
+        errors.append(np.median(np.abs(slope - near)[counts] / size[counts]) if counts.any() else 0.0)
+    if min(errors) <= SLOPE:
+        return
+    if given:
+        raise InputError(
+            key, "slope(x) that is not the derivative of height(x)", "its derivative, or no slope"
+        )
+    allowed = "functions of numpy that take complex numbers, or a method slope(x) too"
+    raise InputError(key, "height(x) whose derivative is lost in a complex step", allowed)
+
+
+def _places(scene: Scene) -> Floats:
+    """A dozen x (mm) that the pad comes to, all of a mesh that has none."""
+    if (width := getattr(scene.finger, "width", None)) is not None:
+        ends = np.array([-0.5, 0.5]) * width
+    else:
+        mesh = scene.finger.mesh(2)
+        nodes = mesh.node_sets.get("pad", ())
+        ends = mesh.points[nodes if len(nodes) else slice(None), 0]
+    first, last = ends.min() + scene.reach[0], ends.max() + scene.reach[1]
+    return np.asarray(first + PLACES * (last - first))
+
+
+def check_friction_law(scene: Scene) -> None:
+    """Whether a user's bound is finite, not negative, in MPa, one value a node, at rest and all speeds."""
+    key, law, names = "surface.friction_law", scene.friction_law, ("pressure", "mu", "speed", "age")
+    check_arguments(key, law.bound, ("bound", *names), by_name=True)
+    speeds = np.array(sorted({0.0, *(course.speed or 0.0 for course in scene.courses)}))
+    p, speed = np.tile(PRESSURES, speeds.size), np.repeat(speeds, PRESSURES.size)
+    nodes = dict(zip(names[1:], (COEFFICIENT + 0.0 * p, speed, 0.0 * p), strict=True))
+    what = f"bound({', '.join(names)})"
+    bound = shaped(key, what, lambda at: law.bound(pressure=at, **nodes), p, one=True)
+    if (bound < 0.0).any():
+        raise InputError(key, f"a bound of {bound.min():.3g} MPa", "values that are not negative")
+    most = float(np.broadcast_to(bound, p.shape)[p == PRESSURES[-1]].max())
+    if most > GREATEST * PRESSURES[-1]:
+        given = f"a bound of {most:.3g} at a pressure of {PRESSURES[-1]:g} MPa"
+        raise InputError(key, given, "a bound in MPa")
+
+
+def check_roughness(law: Any) -> None:
+    """Whether a user's separation is a length in mm for every pressure."""
+    key = "electrostatics.roughness_gap"
+    check_arguments(key, law.separation, ("separation", "pressure"))
+    apart = shaped(key, "separation(pressure)", law.separation, PRESSURES, one=True)
+    for length in (float(apart.min()), float(apart.max())):
+        if not 0.0 <= length <= WIDEST:
+            given = f"a separation of {length:.3g} mm"
+            raise InputError(key, given, f"lengths in mm from 0 to {WIDEST:g}")

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from os import PathLike
@@ -19,15 +19,15 @@ from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
-from evfem.planning.adhesion import told
+from evfem.newton.hand import Hand
 from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
-from evfem.planning.pathdependence import steps_line
 from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
-from evfem.planning.resolution import oscillating, too_fast, unresolved
+from evfem.planning.resolution import oscillating, steps_line, too_fast, unresolved
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
+from evfem.scene.file import scene_at
 from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory
@@ -85,19 +85,12 @@ class Plan:
         return next(term.needed for term in self.terms if term.name == name)
 
     def __str__(self) -> str:
-        lines = [
-            f"Scene {self.name}: {self.steps} steps, {self.nodes} nodes, {self.cells} cells ({self.element})",
-            "",
-            "Terms",
-        ]
+        size = f"{self.steps} steps, {self.nodes} nodes, {self.cells} cells ({self.element})"
+        lines = [f"Scene {self.name}: {size}", "", "Terms"]
         for term in self.terms:
             lines += _wrapped(f"  {'+' if term.needed else '-'} {term.name:<13} ", term.reason)
-        lines += [
-            "",
-            "Unknowns",
-            f"  {self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch",
-        ]
-        lines += ["", "Solver"]
+        size = f"{self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch"
+        lines += ["", "Unknowns", f"  {size}", "", "Solver"]
         for line in self.solver:
             lines += _wrapped("  ", line)
         for warning in self.warnings:
@@ -137,10 +130,7 @@ def plan(scene: Scene | str | PathLike[str]) -> Plan:
     >>> [term.name for term in needed.terms if not term.needed]
     ['friction', 'electricity', 'time', 'user forms']
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
+    scene = scene_at(scene)
     mesh, element = scene_mesh(scene)
     return plan_on(scene, mesh, element)
 
@@ -176,18 +166,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         *drifting(scene, mesh, moduli),
     )
     locked = locking(element, scene.finger.materials, mesh.dim)
-    terms = (
-        _tissue(scene, mesh, moduli),
-        _contact(scene),
-        _friction(scene),
-        _electricity(closing),
-        *_adhesion(closing),
-        *_field(scene, mesh),
-        *_drive(scene),
-        _time(scene, mesh, element),
-        *_hand(scene),
-        _forms(scene, mesh),
-    )
+    terms = tuple(_terms(closing, moduli, element))
     return Plan(
         name=scene.name,
         element=element,
@@ -197,10 +176,31 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         pad_nodes=int(np.setdiff1d(pad, bone).size),
         steps=scene.total_steps,
         terms=terms,
-        solver=_solver(scene, mesh, terms),
+        solver=tuple(_solver(scene, mesh, terms)),
         warnings=(*implausible(scene, mesh, moduli), *locked, *filter(None, others)),
         closing=closing,
     )
+
+
+def _terms(closing: Closing, moduli: Mapping[str, float], element: str) -> Iterator[Term]:
+    scene, mesh = closing.scene, closing.mesh
+    yield _tissue(scene, mesh, moduli)
+    yield _contact(scene)
+    yield _friction(scene)
+    yield _electricity(closing)
+    if scene.adhesion is not None:
+        yield Term("adhesion", True, closing.adhesion_in_words)
+    if scene.field != "local" and scene.electrics.acts:
+        from evfem.planning.fieldchoice import chosen_field
+
+        choice = chosen_field(scene, mesh)
+        yield Term("full field", choice.full, choice.reason)
+    if scene.drive is not None:
+        yield Term("drive", True, time_scales(scene))
+    yield _time(scene, mesh, element)
+    if scene.hand is not None:
+        yield Term("hand", True, _hand(scene.hand))
+    yield _forms(scene, mesh)
 
 
 def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
@@ -261,27 +261,12 @@ def _electricity(closing: Closing) -> Term:
     return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")
 
 
-def _adhesion(closing: Closing) -> tuple[Term, ...]:
-    """The adhesion of a scene that has any."""
-    return () if closing.scene.adhesion is None else (Term("adhesion", True, told(closing)),)
-
-
 def _other_law(scene: Scene) -> str:
     """What the other one of the two laws of the literature says, and where to read which to take."""
     if (other := OTHER_LAW.get(type(scene.law))) is None:
         return ""
     traction = touching_traction(scene, other(gap_eps_r=scene.electrics.gap_eps_r))
     return f" ({other.__name__} {traction:.2g} MPa: see docs/howto/which-law.md)"
-
-
-def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
-    """Bounds of the full field, if a scene requests it or leaves the choice."""
-    if scene.field == "local" or not scene.electrics.acts:
-        return ()
-    from evfem.planning.fieldchoice import chosen_field
-
-    choice = chosen_field(scene, mesh)
-    return (Term("full field", choice.full, choice.reason),)
 
 
 def _roughness(scene: Scene) -> str:
@@ -293,13 +278,6 @@ def _roughness(scene: Scene) -> str:
         return f", rough faces {rough.gap:g} mm apart in contact"
     apart = float(rough.separation(0.0))
     return f", rough faces up to {apart:g} mm apart, less with a node's contact pressure"
-
-
-def _drive(scene: Scene) -> tuple[Term, ...]:
-    """The time scales of a scene with a drive."""
-    if scene.drive is None:
-        return ()
-    return (Term("drive", True, time_scales(scene)),)
 
 
 def _time(scene: Scene, mesh: Mesh, element: str) -> Term:
@@ -329,18 +307,15 @@ def _relaxing(scene: Scene, mesh: Mesh, element: str) -> str:
     )
 
 
-def _hand(scene: Scene) -> tuple[Term, ...]:
-    """The hand between drive and bone, if there is one: its own frequency is to be resolved."""
-    hand = scene.hand
-    if hand is None:
-        return ()
+def _hand(hand: Hand) -> str:
+    """The hand between drive and bone, in words: its own frequency is to be resolved."""
     reason = f"x of the bone an unknown, behind a spring of {hand.stiffness:g} N/mm"
     if hand.damping > 0.0:
         reason += f", a damper of {hand.damping:g} N s/mm"
     if hand.mass > 0.0:
         own = np.sqrt(hand.stiffness / hand.mass) / (2.0 * np.pi)
         reason += f", a mass of {hand.mass:g} t: {own:.3g} Hz by themselves"
-    return (Term("hand", True, f"{reason} (per mm of depth)"),)
+    return f"{reason} (per mm of depth)"
 
 
 def _forms(scene: Scene, mesh: Mesh) -> Term:
@@ -363,34 +338,24 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
     return type(law).__name__
 
 
-def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...]:
-    needed: dict[str, Any] = {term.name: term.needed for term in terms}
-    backend = (
-        "PARDISO (symmetric, Schur complement)"
-        if find_spec("pypardiso")
-        else "SuperLU (install evfem[fast] for PARDISO)"
-    )
+def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
+    backend = "SuperLU (install evfem[fast] for PARDISO)"
+    if find_spec("pypardiso"):
+        backend = "PARDISO (symmetric, Schur complement)"
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
-    lines = [
-        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
-        f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
-    ]
+    yield f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}"
+    yield f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set"
     if mesh.dim == 3:
-        lines.append(f"direct solver: {memory(mesh)}")
+        yield f"direct solver: {memory(mesh)}"
     laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
-    stiff = [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]
-    if stiff:
-        lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")
-    unsymmetric = [name for name in ("friction", "electricity", "adhesion") if needed.get(name)]
-    if unsymmetric:
-        lines.append(
-            f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
+    if stiff := [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]:
+        yield f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume"
+    acting = [t.name for t in terms if t.needed and t.name in ("friction", "electricity", "adhesion")]
+    if acting:
+        yield (
+            f"{' and '.join(acting)} {'act' if acting[1:] else 'acts'} on the candidates only, "
             "so the tissue's matrix stays symmetric"
         )
-    steps = steps_line(scene)
-    if steps:
-        lines.append(steps)
-    return (
-        *lines,
-        f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction",
-    )
+    if steps := steps_line(scene):
+        yield steps
+    yield f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction"

@@ -45,9 +45,6 @@ PRESSED = 0.02
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
 HEAVIEST = 100.0
-#: plane modulus over shear modulus of tissue that keeps its volume; strain to which an elastic surface is
-#: taken as linear
-INCOMPRESSIBLE, LARGEST_STRAIN = 4.0, 0.1
 #: distance (mm) of the places at which a profile's height is looked at
 WAY_STEP = 0.02
 
@@ -56,14 +53,14 @@ def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[
     """One sentence per valid but implausible input of a scene; `moduli` are the shear moduli (MPa) of
     the materials.
     """
-    lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
     return (
         *_hard(scene, mesh, moduli),
-        *lengths,
+        *_small(scene),
+        *_large(scene, mesh, min(moduli.values())),
+        *_other_units(scene, mesh),
         *_breakdown(scene),
         *_unbearable(scene),
         *_hovering(scene, mesh),
-        *_strained(scene, mesh, min(moduli.values())),
     )
 
 
@@ -121,31 +118,6 @@ def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
         slope = np.diff(scene.ground.samples) / np.diff(scene.ground.x)
         if (rms := float(np.sqrt(np.mean(slope**2)))) > STEEPEST:
             yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
-
-
-def _strained(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
-    """An elastic surface whose strain, by Hertz's contact with the softest tissue (shear `modulus` in MPa,
-    hardly compressible), is too large for a linear one.
-    """
-    layers = getattr(scene.ground.elastic, "layers", ())
-    if not layers or mesh.dim == 3:
-        return
-    soft = min(layers, key=lambda one: one.E)
-    surface, tissue = soft.E / (1.0 - soft.nu**2), INCOMPRESSIBLE * modulus
-    both = surface * tissue / (surface + tissue)
-    width, depth = np.ptp(mesh.points[mesh.node_sets["pad"]], axis=0).tolist()
-    if depth == 0.0:
-        return
-    radius = width**2 / (8.0 * depth)
-    deepest = max((one.indentation or 0.0 for one in scene.courses), default=0.0)
-    load = max((one.force or 0.0 for one in scene.courses), default=0.0)
-    half = max(math.sqrt(4.0 * load * radius / (math.pi * both)), math.sqrt(radius * max(deepest, 0.0)))
-    strain = both * half / (2.0 * radius) / surface
-    if strain > LARGEST_STRAIN:
-        yield (
-            f"the elastic surface is strained by about {strain:.0%} (contact pressure over plane modulus, by "
-            f"Hertz): it is linear, which holds to about {LARGEST_STRAIN:.0%}"
-        )
 
 
 def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """Whether the pad's nodes are close enough together to feel a profile, and the profile smooth
-enough; and whether the steps are short enough to follow a voltage over time, a hand and the tissue.
+enough; whether the steps are short enough to follow a voltage over time, a hand and the tissue; and what
+makes the end depend on the steps at all.
 
 Between n nodes per wave a sine is up to 1 - cos(pi / n) of its amplitude higher than the line from
 node to node: five nodes miss a fifth.
@@ -30,6 +31,8 @@ ROUGH = 0.5
 PER_WAVE = 5.0
 #: samples of the profile per node spacing, and at most
 PER_SPACING, MOST = 8, 200_000
+#: steps that the solver chooses
+AUTO = "auto"
 #: steps in a period of the voltage, at least: 10 in one of its square, which the attraction follows
 PER_PERIOD = 20.0
 
@@ -82,9 +85,10 @@ def _unresolved(scene: Scene, mesh: Mesh, axis: int) -> str | None:
 
 def _pad_edges(mesh: Mesh, axis: int) -> Ints:
     """Ends (K, 2) of the pad's edges; in space of its faces' that run more along x (`axis` 0) or z (1)."""
+    sides = mesh.sides_of("pad")
     if mesh.dim == 2:
-        return mesh.edges_of("pad")[:, :2]
-    faces = mesh.faces_of("pad")[:, :4]
+        return sides[:, :2]
+    faces = sides[:, :4]
     edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     way = np.abs(np.diff(mesh.points[edges], axis=1)[:, 0, ::2])
     return edges[way[:, axis] > way[:, 1 - axis]]
@@ -106,7 +110,9 @@ def too_fast(scene: Scene) -> str | None:
     if 2.0 * f > 0.5 / step:
         alias = f", and shows what the attraction does above {0.5 / step:.4g} Hz at a lower frequency"
     needed = math.ceil(PER_PERIOD * f * scene.courses[longest].seconds() * (1.0 - 1e-9))
-    return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{_instead(signal)}"
+    mean = ", or resolved=False for the mean over the carrier's cycles"
+    instead = mean if isinstance(signal, Carrier) and signal.resolved else ""
+    return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{instead}"
 
 
 def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
@@ -124,7 +130,6 @@ def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
 
 
 def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
-    """Periods (s) of what swings by itself."""
     hand = scene.hand
     if hand is not None and hand.damping < 2.0 * math.sqrt(hand.stiffness * hand.mass):
         yield "the hand", 2.0 * math.pi * math.sqrt(hand.mass / hand.stiffness)
@@ -145,12 +150,6 @@ def _longest(scene: Scene) -> tuple[int, float]:
     return steps.index(max(steps)), max(steps)
 
 
-def _instead(signal: TimeSignal) -> str:
-    if isinstance(signal, Carrier) and signal.resolved:
-        return ", or resolved=False for the mean over the carrier's cycles"
-    return ""
-
-
 def path_line(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:
     """Places (n, d) on a line along x (`axis` 0) or z (1) that the pad may come to, `step` apart or as near
     to that as memory allows.
@@ -168,3 +167,39 @@ def path_depth(scene: Scene, mesh: Mesh, step: float) -> float:
     surface: Any = scene.ground
     lines = (path_line(scene, mesh, step, axis) for axis in range(mesh.dim - 1))
     return float(np.ptp(np.concatenate([surface.relief(place)[0] for place in lines])))
+
+
+def path_dependence(scene: Scene) -> tuple[str, ...]:
+    """Causes of path dependence, in words; empty if there is none.
+
+    >>> import evfem as ev
+    >>> pad, press = ev.FingerPad(resolution="coarse"), [ev.Press(indentation=0.5, steps=2)]
+    >>> [path_dependence(ev.Scene(pad, ev.Flat(friction=mu), motion=press)) for mu in (0.0, 0.3)]
+    [(), ('friction',)]
+    """
+    found = {
+        "friction": scene.has_friction,
+        "time": scene.solver.timed,
+        "charges": scene.electrics.resolved,
+        "the hand": scene.hand is not None and scene.hand.timed,
+        "who touches": scene.law is not None and not scene.air_layer,
+    }
+    return tuple(name for name, there in found.items() if there)
+
+
+def allowed_error(scene: Scene) -> float | None:
+    """The error of a part's path that its strategy allows; None where the steps are as given."""
+    strategy = scene.solver.strategy
+    return strategy.path_error if strategy.steps == AUTO and path_dependence(scene) else None
+
+
+def steps_line(scene: Scene) -> str:
+    """A plan's line on steps that the solver chooses; empty if the scene gives them."""
+    if scene.solver.strategy.steps != AUTO:
+        return ""
+    names = path_dependence(scene)
+    if not names:
+        what = "nothing but a snap" if scene.electrics.acts or not scene.ground.is_flat else "nothing"
+        return f"steps auto: {what} depends on the path, each step is one part"
+    limit = f"{100.0 * scene.solver.strategy.path_error:g} %"
+    return f"steps auto: path dependence by {', '.join(names)}, a part errs by at most {limit} of the force"

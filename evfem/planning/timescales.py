@@ -37,7 +37,8 @@ def time_scales(scene: Scene) -> str:
         what = f"{type(scene.voltage).__name__} signal"
     how = "resolved in time with its charges" if drive.resolved else "by its mean over the cycle"
     charge = _charge(scene)
-    parts = [f"{what}, {how}", *charge, f"mechanics: {_mechanics(scene)}"]
+    follows = "at once" if np.isinf(highest := bandwidth(scene)) else f"up to {highest:.3g} Hz"
+    parts = [f"{what}, {how}", *charge, f"mechanics: {follows}"]
     if drive.resolved and not getattr(scene.law, "of_a_field", False):
         parts.append("no balance of the source, which only Strong and Troxel's law has")
     if not drive.resolved and at is not None:
@@ -53,12 +54,11 @@ def _charge(scene: Scene) -> list[str]:
     solid, film = (Layer(one.thickness, Dielectric(*_constants(one, seen.frequency))) for one in layers)
     leak = scene.drive.gap_conductivity
     stack = Sandwich.of(solid, film, frequency=None, gap_conductivity=leak, gap_eps_r=seen.gap_eps_r)
-    skin, gap, _ = (float(np.max(rate)) for rate in stack.rates)
+    (skin, gap, _), (upper, _, lower) = stack.rates, stack.reduced(0.0)
     said = []
     if gap > 0.0:
         said.append(f"charge: the gap leaks below {gap / (2.0 * np.pi):.3g} Hz")
     if skin > 0.0:
-        upper, lower = (float(np.max(one.thickness)) for one in (stack.skin, stack.insulator))
         corner = skin / (1.0 + upper / lower) / (2.0 * np.pi)
         said.append(f"charge: the skin conducts below {corner:.3g} Hz")
     relaxing = _relaxing(seen.sandwich) if scene.drive.resolved else []
@@ -86,11 +86,6 @@ def bandwidth(scene: Scene) -> float:
     if not scene.solver.timed or not slowest > 0.0:
         return np.inf
     return 1.0 / (2.0 * np.pi * slowest)
-
-
-def _mechanics(scene: Scene) -> str:
-    highest = bandwidth(scene)
-    return "at once" if np.isinf(highest) else f"up to {highest:.3g} Hz"
 
 
 def slowest_swing(scene: Scene) -> float:

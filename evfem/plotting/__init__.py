@@ -25,28 +25,8 @@ from evfem.plotting.response import impedance, tornado
 from evfem.plotting.sweeps import sweep, sweep_histogram, sweep_map, sweep_scatter
 
 __all__ = [
-    "FIELDS",
-    "animate",
-    "compare",
-    "contact_area",
-    "contact_pressure",
-    "deformed",
-    "energies",
-    "footprint",
-    "force_indentation",
-    "forces",
-    "friction",
-    "history",
-    "impedance",
-    "probes",
-    "regions",
-    "residuals",
-    "side_by_side",
-    "signal",
-    "spectrum",
-    "sweep",
-    "sweep_histogram",
-    "sweep_map",
-    "sweep_scatter",
+    "FIELDS", "animate", "compare", "contact_area", "contact_pressure", "deformed", "energies", "footprint",
+    "force_indentation", "forces", "friction", "history", "impedance", "probes", "regions", "residuals",
+    "side_by_side", "signal", "spectrum", "sweep", "sweep_histogram", "sweep_map", "sweep_scatter",
     "tornado",
-]
+]  # fmt: skip

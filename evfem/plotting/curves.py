@@ -7,44 +7,18 @@ along the abscissa: any column that grows or falls, by default the one that the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from itertools import cycle
+from itertools import cycle, groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from evfem.calibration.result import FitResult
-from evfem.common.arrays import Floats
+from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
+from evfem.plotting import figures, labels
 from evfem.plotting.fields import frame_of
-from evfem.plotting.figures import (
-    BLACK,
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY,
-    STYLES,
-    VERMILION,
-    Panels,
-    axes_or_new,
-    curves,
-    new_panels,
-    styled,
-)
 from evfem.plotting.finger import check_plane, told
-from evfem.plotting.labels import (
-    Results,
-    axis_label,
-    column_label,
-    column_text,
-    kind_of,
-    named,
-    on_lines,
-    quantity_label,
-    units_of,
-    values_of,
-)
 from evfem.simulation import spectrum as spectra
 from evfem.simulation.result import Result
 
@@ -52,24 +26,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORCES = {
-    "normal_force": ("normal (contact)", BLUE, "-"),
-    "tangential_force": ("tangential (contact)", VERMILION, "-"),
-    "applied_force": ("applied on the bone", BLACK, ":"),
-    "electrostatic_force": ("electrostatic", GREEN, "--"),
+    "normal_force": ("normal (contact)", figures.BLUE, "-"),
+    "tangential_force": ("tangential (contact)", figures.VERMILION, "-"),
+    "applied_force": ("applied on the bone", figures.BLACK, ":"),
+    "electrostatic_force": ("electrostatic", figures.GREEN, "--"),
 }
 ENERGIES = {
-    "external_work": ("work of the bone", BLACK, ":"),
-    "electrostatic_work": ("work of the attraction", GREEN, "--"),
-    "stored_energy": ("stored in the tissue", BLUE, "-"),
-    "friction_dissipation": ("lost to friction", VERMILION, "-"),
-    "viscous_dissipation": ("lost to viscosity", ORANGE, "-."),
-    "kinetic_energy": ("kinetic", SKY, "-."),
-    "snap_dissipation": ("lost in snaps", PURPLE, "-."),
+    "external_work": ("work of the bone", figures.BLACK, ":"),
+    "electrostatic_work": ("work of the attraction", figures.GREEN, "--"),
+    "stored_energy": ("stored in the tissue", figures.BLUE, "-"),
+    "friction_dissipation": ("lost to friction", figures.VERMILION, "-"),
+    "viscous_dissipation": ("lost to viscosity", figures.ORANGE, "-."),
+    "kinetic_energy": ("kinetic", figures.SKY, "-."),
+    "snap_dissipation": ("lost in snaps", figures.PURPLE, "-."),
 }
 TRACTIONS = {
-    "contact_pressure": (BLUE, "-"),
-    "shear_traction": (VERMILION, "-"),
-    "electrostatic_traction": (GREEN, "--"),
+    "contact_pressure": (figures.BLUE, "-"),
+    "shear_traction": (figures.VERMILION, "-"),
+    "electrostatic_traction": (figures.GREEN, "--"),
 }
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
 #: width of a letter of a motion's name in inches, and height of its line in points
@@ -87,15 +61,10 @@ def abscissa(result: Result) -> str:
     name = changed.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"
     if name == "position" and result.in_space and not np.ptp(result.position):
         name = "position_z"
-    if _changes(result[name]):
+    steps, least = np.diff(result[name]), ZERO * float(np.abs(result[name]).max(initial=0.0))
+    if steps.size and (np.all(steps > least) or np.all(steps < -least)):
         return name
     return "time" if "wait" in kinds else "step"
-
-
-def _changes(values: Floats) -> bool:
-    """Whether every step goes on in the same direction."""
-    steps, least = np.diff(values), ZERO * float(np.abs(values).max(initial=0.0))
-    return steps.size > 0 and bool(np.all(steps > least) or np.all(steps < -least))
 
 
 def forces(
@@ -145,23 +114,20 @@ def _of_one_kind(
     over: str | None,
     sd: Mapping[str, Any],
 ) -> Axes:
-    """Lines of columns of one kind, with bands of their `sd`; those that are 0 throughout only if they must
-    `always` be there.
-    """
+    """Lines of columns of one kind, with bands of `sd`; only one of zeros must `always` be there."""
     over = checked_over(over, result)
     x, drawn = along(result, over, over), {name: along(result, name, over) for name in texts}
-    least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
+    sizes = {name: float(np.abs(y).max(initial=0.0)) for name, y in drawn.items()}
     lines = [
         (x, drawn[name], {"label": label, "color": colour, "linestyle": style})
         for name, (label, colour, style) in texts.items()
-        if name == always or np.any(np.abs(drawn[name]) > least)
+        if name == always or sizes[name] > ZERO * max(sizes.values())
     ]
-    ax = _marked(curves(ax, lines, "", axis_label(always, result.units)), over, result)
-    for name, (_, colour, _) in ((name, look) for name, look in texts.items() if name in sd):
-        middle, wide = np.asarray(result[name]), np.asarray(sd[name])
-        moved: list[dict[str, Any]] = [{name: middle - wide}, {name: middle + wide}]
-        ends = (along(replace(result, **one), name, over) for one in moved)
-        ax.fill_between(x, *ends, color=colour, alpha=0.2, linewidth=0)
+    ax = _marked(figures.curves(ax, lines, "", labels.axis_label(always, result.units)), over, result)
+    for name in (name for name in texts if name in sd):
+        wide = np.asarray(sd[name])[_drawn(result, over)]
+        ends = drawn[name] - wide, drawn[name] + wide
+        ax.fill_between(x, *ends, color=texts[name][1], alpha=0.2, linewidth=0)
     ax.legend()
     return ax
 
@@ -170,21 +136,15 @@ def checked_over(over: str | None, result: Result) -> str:
     """The name of the abscissa."""
     if over is None:
         return abscissa(result)
-    allowed = [name for name in OVER if name in result.columns]
-    if over not in allowed:
-        raise InputError("over", quoted(over), " | ".join(allowed))
-    return over
+    return choice("over", over, [name for name in OVER if name in result.columns])
 
 
 def along(result: Result, name: str, over: str) -> Any:
-    """A column as it is drawn over another one; over the time, of the steps that take none only the
-    last.
-    """
-    return values_of(result, name)[_drawn(result, over)]
+    """A column as it is drawn over another one; over the time, of steps that take none only the last."""
+    return labels.values_of(result, name)[_drawn(result, over)]
 
 
 def _drawn(result: Result, over: str) -> Any:
-    """The steps that are drawn over a column."""
     if over != "time" or not len(result.time):
         return slice(None)
     return np.append(np.diff(result.time) > 0.0, True)
@@ -192,82 +152,64 @@ def _drawn(result: Result, over: str) -> Any:
 
 def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
     """The axes with their abscissa, and over the steps with the motions, if all have the same."""
-    ax.set_xlabel(column_label(over, first.units))
+    ax.set_xlabel(labels.column_label(over, first.units))
     if over == "step" and all(np.array_equal(first.motion, other.motion) for other in others):
         _mark_motions(ax, first)
     return ax
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
-    """A thin line where a motion ends, its name above, once for neighbours of one name; names that would
-    collide stand in rows.
-    """
+    """A thin line where a motion ends, its name above; names that would collide stand in rows."""
     for last in np.flatnonzero(np.diff(result.motion_index)):
         ax.axvline(result.step[last] + 0.5, color="0.6", linewidth=0.8)
-    ends = [*np.flatnonzero(result.motion[1:] != result.motion[:-1]).tolist(), len(result.step) - 1]
     letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
     rows: list[float] = []  # where the last name of each row ends
-    start = 0
-    for end in ends:
-        if end < 0:
-            return
-        middle = 0.5 * (result.step[start] + result.step[end])
-        half = 0.5 * letter * (len(result.motion[end]) + 1)
+    for name, group in groupby(zip(result.motion, result.step, strict=True), key=itemgetter(0)):
+        steps = [step for _, step in group]
+        middle, half = 0.5 * (steps[0] + steps[-1]), 0.5 * letter * (len(name) + 1)
         row = next((row for row, last in enumerate(rows) if last <= middle - half), len(rows))
         rows[row:] = [middle + half, *rows[row + 1 :]]
-        ax.annotate(
-            result.motion[end],
-            (middle, 1.0),
-            (0.0, 2.0 + HIGH * row),
-            xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-        )
-        start = end + 1
+        place, above = ax.get_xaxis_transform(), (0.0, 2.0 + HIGH * row)
+        text = ax.annotate(name, (middle, 1.0), above, xycoords=place, textcoords="offset points")
+        text.set(ha="center", va="bottom")
 
 
-def history(result: Result, columns: Sequence[str], over: str | None = None) -> Panels:
-    """Any columns of the history over `over` (see `forces`), a panel for each kind of quantity.
-
-    Raises InputError for what is no column of numbers.
-    """
+def history(result: Result, columns: Sequence[str], over: str | None = None) -> figures.Panels:
+    """Columns of the history over `over` (see `forces`), a panel for each kind of quantity."""
     if isinstance(columns, str) or not columns:
         raise InputError("columns", quoted(columns), "a list of at least one column of the history")
     over = checked_over(over, result)
     kinds: dict[tuple[str, str], dict[str, Any]] = {}
     for name in columns:
         y = along(result, name, over)
-        kinds.setdefault(kind_of(name, result.units), {})[name] = y
-    panels, x = new_panels(len(kinds), 1.0 + 1.9 * len(kinds)), along(result, over, over)
+        kinds.setdefault(labels.kind_of(name, result.units), {})[name] = y
+    panels, x = figures.new_panels(len(kinds), 1.0 + 1.9 * len(kinds)), along(result, over, over)
     for ax, drawn in zip(panels, kinds.values(), strict=True):
-        texts = {column_text(name, result.units[name]): y for name, y in drawn.items()}
-        label = column_label if len(drawn) == 1 else axis_label
-        lines = [(x, y, look) for y, look in styled(texts)]
-        curves(ax, lines, "", on_lines(label(next(iter(drawn)), result.units)))
+        texts = {labels.column_text(name, result.units[name]): y for name, y in drawn.items()}
+        label = labels.column_label if len(drawn) == 1 else labels.axis_label
+        lines = [(x, y, look) for y, look in figures.styled(texts)]
+        figures.curves(ax, lines, "", labels.on_lines(label(next(iter(drawn)), result.units)))
     _marked(panels[0], over, result).set_xlabel("")
-    panels[-1].set_xlabel(column_label(over, result.units))
+    panels[-1].set_xlabel(labels.column_label(over, result.units))
     return panels
 
 
 def probes(
     result: Result, quantity: str = "von_mises", over: str | None = None, ax: Axes | None = None
 ) -> Axes:
-    """What was found at the points of all probes, a line for each, over `over` (see `forces`).
-
-    `quantity` is one of a `ProbeHistory`, of a vector or tensor with its component: `cauchy_stress_yy`,
-    `displacement_x`, `principal_stretches_1`. Points are told by their place in the undeformed tissue.
+    """A `quantity` of a `ProbeHistory`, or a component (`cauchy_stress_yy`, `principal_stretches_1`), a line
+    for each point of all probes, over `over` (see `forces`).
     """
     if not result.probes:
         raise InputError("result", "a run without probes", "a run of a scene with Output(probes=...)")
     over = checked_over(over, result)
     rows, x, lines = _drawn(result, over), along(result, over, over), []
-    for probe, look in styled(result.probes):
+    for probe, look in figures.styled(result.probes):
         values = probe.component(quantity)[rows]
-        for place, y, style in zip(probe.position, values.T, cycle(STYLES)):
+        for place, y, style in zip(probe.position, values.T, cycle(figures.STYLES)):
             label = f"{look['label']} ({', '.join(f'{at + 0.0:.3g}' for at in place)})"
             lines.append((x, y, look | {"label": label, "linestyle": style}))
-    ax = _marked(curves(ax, lines, "", quantity_label(quantity)), over, result)
+    ax = _marked(figures.curves(ax, lines, "", labels.field_label(quantity)), over, result)
     ax.legend(fontsize="small")
     return ax
 
@@ -277,63 +219,61 @@ def compare(
 ) -> Axes:
     """The same column of several results, each by its name, over `over` (see `forces`)."""
     found, over = _over(results, over)
-    ax = _column(ax, found, column, over, column_label(column, units_of(found)))
+    ax = _column(ax, found, column, over, labels.column_label(column, labels.units_of(found)))
     ax.legend()
     return ax
 
 
-def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
+def force_indentation(results: labels.Results, ax: Axes | None = None) -> Axes:
     """Applied force over indentation, of the presses of one result or of several by their names."""
-    found = named(results)
-    lines = [
-        (*_of_presses(result, "indentation", "applied_force"), look | {"marker": "."})
-        for result, look in styled(found)
-    ]
-    units = units_of(found)
-    return curves(ax, lines, column_label("indentation", units), axis_label("applied_force", units))
+    found, columns = labels.named(results), ("indentation", "applied_force")
+    lines = [(*_of_presses(one, *columns), look | {"marker": "."}) for one, look in figures.styled(found)]
+    units = labels.units_of(found)
+    return figures.curves(
+        ax, lines, labels.column_label("indentation", units), labels.axis_label("applied_force", units)
+    )
 
 
-def contact_area(results: Results, ax: Axes | None = None) -> Axes:
+def contact_area(results: labels.Results, ax: Axes | None = None) -> Axes:
     """Contact width (in total: area) over the applied force of the presses: outer and real."""
-    found, lines = named(results), []
-    for result, look in styled(found):
+    found, lines = labels.named(results), []
+    for result, look in figures.styled(found):
         width = "contact_area" if result.mesh.dim == 3 else "contact_width"
         for column, text, style in ((width, "edge to edge", "-"), (f"real_{width}", "touching", "--")):
-            label = ", ".join(filter(None, (look["label"], text)))
+            label = f"{look['label']}, {text}".removeprefix(", ")
             own = look | {"label": label, "linestyle": style, "marker": "."}
             lines.append((*_of_presses(result, "applied_force", column), own))
-    units = units_of(found)
-    return curves(ax, lines, column_label("applied_force", units), axis_label(width, units))
+    units = labels.units_of(found)
+    return figures.curves(
+        ax, lines, labels.column_label("applied_force", units), labels.axis_label(width, units)
+    )
 
 
-def friction(results: Results, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Apparent friction coefficient, tangential over normal force on the bone, over `over` (`forces`).
-
-    Steps without a load on the bone are left out.
-    """
+def friction(results: labels.Results, over: str | None = None, ax: Axes | None = None) -> Axes:
+    """Tangential over normal force on the bone, of steps with a load, over `over` (see `forces`)."""
     found, over = _over(results, over)
     lines = []
-    for result, look in styled(found):
+    for result, look in figures.styled(found):
         load = along(result, "applied_force", over)
         rows = load > ZERO * float(np.abs(load).max(initial=0.0))
         ratio = along(result, "applied_tangential_force", over)[rows] / load[rows]
         lines.append((along(result, over, over)[rows], ratio, look))
-    ax = curves(ax, lines, "", "apparent friction coefficient")
+    ax = figures.curves(ax, lines, "", "apparent friction coefficient")
     return _marked(ax, over, *found.values())
 
 
-def signal(results: Results, over: str | None = None) -> Panels:
+def signal(results: labels.Results, over: str | None = None) -> figures.Panels:
     """Voltage above, friction force on the bone below, over `over` (see `forces`)."""
     found, over = _over(results, over)
-    panels = new_panels(2, 4.8)
+    panels = figures.new_panels(2, 4.8)
     _column(panels[0], found, "voltage", over, "voltage (V)").set_xlabel("")
-    label = f"friction force ({units_of(found)['tangential_force']})"
+    label = f"friction force ({labels.units_of(found)['tangential_force']})"
     _column(panels[1], found, "applied_tangential_force", over, label)
     return panels
 
 
 def spectrum(
-    results: Results,
+    results: labels.Results,
     column: str = "tangential_force",
     ax: Axes | None = None,
     *,
@@ -341,31 +281,24 @@ def spectrum(
     stop: float | None = None,
     window: str = "none",
 ) -> Axes:
-    """Amplitudes of a column over the frequency (Hz), of one result or of several by their names.
-
-    They are those of `ev.spectrum`, which says what `start`, `stop` and `window` are; the mean, at
-    0 Hz, is left out.
+    """Amplitudes of a column over the frequency (Hz) without the mean, of one result or of several by their
+    names, as `ev.spectrum` finds them.
     """
-    found = named(results)
-    drawn = {
-        name: spectra.spectrum(result, column, start=start, stop=stop, window=window)
-        for name, result in found.items()
-    }
-    ax, lines = axes_or_new(ax), []
-    for number, ((frequency, amplitude), look) in enumerate(styled(drawn)):
-        f, a, look = frequency[1:], amplitude[1:], look | {"linewidth": 1.0}
+    found, ax, lines = labels.named(results), figures.axes_or_new(ax), []
+    for number, (result, look) in enumerate(figures.styled(found)):
+        f, a = (x[1:] for x in spectra.spectrum(result, column, start=start, stop=stop, window=window))
+        look |= {"linewidth": 1.0}
         if len(f) <= FEW:
             ax.vlines(f, 0.0, a, colors=look["color"], linewidth=THICK / (1.0 + number))
             look |= {"linestyle": "none", "marker": "oxs^v"[number % 5], "markersize": 4}
         lines.append((f, a, look))
-    return curves(ax, lines, "frequency (Hz)", f"amplitude of {column_label(column, units_of(found))}")
+    return figures.curves(
+        ax, lines, "frequency (Hz)", f"amplitude of {labels.column_label(column, labels.units_of(found))}"
+    )
 
 
 def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) -> Axes:
-    """Contact pressure, shear and electrostatic traction (MPa) of the pad over its current x (mm).
-
-    Shear and attraction are left out where they are 0 throughout.
-    """
+    """Contact pressure, and shear and attraction if there is any (MPa), of the pad over its x (mm)."""
     check_plane(result.mesh)
     shown = frame_of(result, frame)
     pad = np.flatnonzero(np.isfinite(shown.gap))
@@ -376,7 +309,7 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
         for name, (colour, style) in TRACTIONS.items()
         if np.any((y := getattr(shown, name)[pad]) != 0.0) or name == "contact_pressure"
     ]
-    ax = curves(ax, lines, "x (mm)", "traction (MPa)")
+    ax = figures.curves(ax, lines, "x (mm)", "traction (MPa)")
     touching = x[shown.contact_status[pad] > 0]
     if len(touching):
         margin = 0.25 * (touching[-1] - touching[0]) + 0.2
@@ -389,14 +322,12 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
 
 
 def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
-    """Computed minus measured for each measured value of a fit, in the order of the data.
-
-    In standard deviations where the data have them, with a band of two on either side; else in percent of the
-    root mean square of the measurement. A good fit scatters about zero without a pattern.
+    """Computed minus measured for each measured value of a fit: in standard deviations where the data have
+    them, with a band of two, else in percent of their root mean square. Good ones have no pattern.
     """
     from matplotlib.ticker import MaxNLocator
 
-    ax = axes_or_new(ax)
+    ax = figures.axes_or_new(ax)
     in_sd = bool(fit.provenance.get("sd"))
     values = fit.residuals * (1.0 if in_sd else 100.0)
     number = np.arange(1, len(values) + 1)
@@ -405,31 +336,31 @@ def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
         ax.axhspan(-TWO, TWO, color="0.92", label="two standard deviations")
     ax.axhline(0.0, color="0.4", linewidth=0.8)
     lines = []
-    for own, look in styled({column_text(kind): kinds == kind for kind in dict.fromkeys(kinds.tolist())}):
+    for own, look in figures.styled(
+        {labels.column_text(kind): kinds == kind for kind in dict.fromkeys(kinds.tolist())}
+    ):
         ax.vlines(number[own], 0.0, values[own], color=look["color"], linewidth=1.2)
         lines.append((number[own], values[own], look | {"linestyle": "none", "marker": "o"}))
     unit = "sd" if in_sd else "% of root mean square"
-    curves(ax, lines, "measured value", f"computed - measured ({unit})").legend()
+    figures.curves(ax, lines, "measured value", f"computed - measured ({unit})").legend()
     ax.set_xlim(0.4, len(values) + 0.6)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     return ax
 
 
-def _over(results: Results, over: str | None) -> tuple[dict[str, Result], str]:
+def _over(results: labels.Results, over: str | None) -> tuple[dict[str, Result], str]:
     """Results by their names, and the abscissa of the first."""
-    found = named(results)
+    found = labels.named(results)
     return found, checked_over(over, next(iter(found.values())))
 
 
 def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, label: str) -> Axes:
-    """A column of several results."""
-    lines = [(along(one, over, over), along(one, column, over), look) for one, look in styled(found)]
-    return _marked(curves(ax, lines, "", label), over, *found.values())
+    lines = [(along(one, over, over), along(one, column, over), look) for one, look in figures.styled(found)]
+    return _marked(figures.curves(ax, lines, "", label), over, *found.values())
 
 
 def _of_presses(result: Result, *columns: str) -> list[Any]:
-    """Columns of the steps that press."""
     rows = np.flatnonzero(result.motion == "press")
     if not rows.size:
         raise InputError("results", f"a run of {', '.join(sorted(set(result.motion)))}", "a run with a press")
-    return [values_of(result, column)[rows] for column in columns]
+    return [labels.values_of(result, column)[rows] for column in columns]

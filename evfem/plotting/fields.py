@@ -12,60 +12,45 @@ down. Pressure and shear stand in the surface, attraction begins at the outline.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
+from evfem.errors import EvfemError, InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.figures import BOTH_SIGNS, EDGE, ONE_SIGN, STATUS, TISSUE
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-from collections.abc import Callable
-
-from evfem.errors import EvfemError
 
 Height = Callable[[Floats], Floats]
 
 
 def height_of(result: Result, frame: Frame) -> Height:
-    """Height (mm) of the surface at x (mm) of the laboratory, while the finger is as in `frame`."""
-    known = _from_scene(result)
-    if known is None:
-        return _from_gaps(result, frame)
-    return known if not frame.surface_sink.any() else _sunk(known, result, frame)
-
-
-def _sunk(height: Height, result: Result, frame: Frame) -> Height:
-    """The surface, which has sunk below the pad; beside it as the pad's last node has it."""
+    """Height (mm) of the surface at x (mm): the scene's, sunk as the pad's nodes say, or by their gaps."""
+    known, place = _from_scene(result), result.mesh.points + frame.displacement
     pad = np.flatnonzero(np.isfinite(frame.gap))
-    x, sink = (result.mesh.points + frame.displacement)[pad, 0], frame.surface_sink[pad]
-    order = np.argsort(x)
-    return lambda at: height(at) - np.interp(at, x[order], sink[order])
+    pad = pad[np.argsort(place[pad, 0])]
+    x, y, gap, sink = place[pad, 0], place[pad, 1], frame.gap[pad], frame.surface_sink[pad]
+    if known is None:
+        return lambda at: np.interp(at, x, y - gap)
+    return known if not sink.any() else lambda at: known(at) - np.interp(at, x, sink)
 
 
 def _from_scene(result: Result) -> Height | None:
     from evfem.scene.file import loads
     from evfem.simulation.model import placed
 
-    try:
+    with suppress(EvfemError):
         surface = loads(result.provenance.get("parameters", "")).ground
-        mesh = result.mesh
-        surface, _ = placed(surface, mesh.points[mesh.node_sets["pad"]])
-    except EvfemError:
-        return None
-    return lambda x: surface.y + surface.height(x)
-
-
-def _from_gaps(result: Result, frame: Frame) -> Height:
-    pad = np.flatnonzero(np.isfinite(frame.gap))
-    x, y = (result.mesh.points + frame.displacement)[pad].T
-    order = np.argsort(x)
-    return lambda at: np.interp(at, x[order], (y - frame.gap[pad])[order])
+        surface, _ = placed(surface, result.mesh.points[result.mesh.node_sets["pad"]])
+        return lambda x: surface.y + surface.height(x)
+    return None
 
 
 STRESSES = tuple(f"cauchy_stress_{c}" for c in ("xx", "yy", "zz", "xy"))
@@ -89,18 +74,11 @@ def values_of(frame: Frame, field: str) -> Floats:
     return getattr(frame, field)
 
 
-def check_field(field: str) -> None:
-    """Raises InputError unless the field is one of `FIELDS`."""
-    if field not in FIELDS:
-        raise InputError("field", quoted(field), " | ".join(FIELDS))
-
-
 def frame_of(result: Result, number: int) -> Frame:
     """A frame by its number among those kept, from the end if negative; InputError for another."""
     if not -len(result.frames) <= number < len(result.frames):
-        raise InputError(
-            "frame", quoted(number), f"the number of one of the {len(result.frames)} frames kept"
-        )
+        allowed = f"the number of one of the {len(result.frames)} frames kept"
+        raise InputError("frame", quoted(number), allowed)
     return result.frames[number]
 
 
@@ -113,11 +91,7 @@ def rounds(mesh: Mesh) -> Ints:
 
 
 def areas(outlines: Floats) -> Floats:
-    """Areas (E,) of polygons (E, n, 2), positive if they go round counter-clockwise.
-
-    >>> areas(np.array([[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]])).tolist()
-    [2.0]
-    """
+    """Areas (E,) of polygons (E, n, 2), positive if they go round counter-clockwise."""
     x, y = outlines[..., 0], outlines[..., 1]
     return 0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1)
 
@@ -204,13 +178,12 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
     least, most = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     least = min(least, 0.0) if field in FROM_ZERO else least
     middle = MIDDLES.get(field)
-    if middle is None:
-        low, high = (least if vmin is None else vmin), (most if vmax is None else vmax)
-    else:
-        reach = max(most - middle, middle - least) or 1.0
+    low, high = least, most
+    if middle is not None:
         given = vmin if vmax is None else vmax
-        reach = reach if given is None else abs(given - middle)
-        low, high = (middle - reach if vmin is None else vmin), (middle + reach if vmax is None else vmax)
+        reach = max(most - middle, middle - least) or 1.0 if given is None else abs(given - middle)
+        low, high = middle - reach, middle + reach
+    low, high = (low if vmin is None else vmin), (high if vmax is None else vmax)
     if not low < high:  # one value throughout, or all beyond a given end
         low, high = (high - 1.0, high) if vmin is None and vmax is not None else (low, low + 1.0)
     slack = 1e-9 * (high - low)
@@ -253,7 +226,7 @@ def draw_outline(ax: Axes, mesh: Mesh, frame: Frame, field: str, scale: Scale) -
 
 def half_edges(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
     """The pad's edges in halves (H, 2, 2), and the node that each belongs to (H,)."""
-    edges = mesh.edges_of("pad")
+    edges = mesh.sides_of("pad")
     pairs = edges[:, :2] if edges.shape[1] == 2 else np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])
     start, end = points[pairs[:, 0]], points[pairs[:, 1]]
     middle = 0.5 * (start + end)
@@ -262,10 +235,7 @@ def half_edges(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
 
 
 def draw_arrows(ax: Axes, mesh: Mesh, frame: Frame, field: str, height: Height, window: Window) -> Any:
-    """The tractions on the finger as arrows (a Quiver), the longest ones where they are largest.
-
-    Of neighbouring nodes only the one with the largest traction has an arrow.
-    """
+    """Tractions on the finger as arrows (a Quiver), of neighbouring nodes that of the largest traction."""
     values, place = values_of(frame, field), mesh.points + frame.displacement
     nodes = _thinned(place, np.where(within(place, window), np.abs(values), 0.0), window)
     if not nodes.size:

@@ -37,13 +37,12 @@ TISSUE, GROUND, EDGE = "#EFEBE7", "#D0D0D0", "0.25"
 FILES_ONLY = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
 WIDTH, HEIGHT = 7.0, 4.5  # of a figure, in inches
 SLENDER = 25.0  # height of a colour bar over its width
+#: x, y and look of a curve
+Line = tuple[Any, Any, Mapping[str, Any]]
 
 
 class Panels(tuple["Axes", ...]):
-    """The axes of a picture with several panels, from the top; `figure` is the figure of all.
-
-    In a notebook it shows itself as its picture.
-    """
+    """Axes of several panels, from the top, and their `figure`; a notebook shows them as its picture."""
 
     @property
     def figure(self) -> Figure:
@@ -75,16 +74,11 @@ def axes_or_new(ax: Axes | None, height: float = HEIGHT) -> Axes:
     return ax
 
 
-def new_panels(rows: int, height: float) -> Panels:
-    """Panels below each other that share their abscissa, `height` inches in all."""
-    axes = new_figure(height).subplots(rows, 1, sharex=True, squeeze=False)
-    return Panels(axes[:, 0])
-
-
-def new_columns(columns: int, height: float = 3.2) -> Panels:
-    """Panels side by side that share their ordinate."""
-    axes = new_figure(height, max(WIDTH, 2.6 * columns)).subplots(1, columns, sharey=True, squeeze=False)
-    return Panels(axes[0])
+def new_panels(rows: int, height: float, columns: int = 1) -> Panels:
+    """Panels, `height` inches in all: rows share their abscissa, columns their ordinate."""
+    figure = new_figure(height, max(WIDTH, 2.6 * columns))
+    axes = figure.subplots(rows, columns, sharex=rows > 1, sharey=columns > 1, squeeze=False)
+    return Panels(axes.ravel())
 
 
 def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:
@@ -93,13 +87,8 @@ def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:
         yield what, {"label": name, "color": colour, "linestyle": style}
 
 
-def curves(
-    ax: Axes | None, lines: Sequence[tuple[Any, Any, Mapping[str, Any]]], xlabel: str, ylabel: str
-) -> Axes:
-    """Lines, each with x, y and its look, on a grid, with a legend where there are several.
-
-    Few points are marked: one alone would not be seen.
-    """
+def curves(ax: Axes | None, lines: Sequence[Line], xlabel: str, ylabel: str) -> Axes:
+    """Lines of x, y and look on a grid, with a legend where there are several; few points are marked."""
     ax = axes_or_new(ax)
     for x, y, look in lines:
         ax.plot(x, y, **{"marker": "o" if len(x) < 3 else None, **look})

@@ -3,50 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
-from evfem.plotting.fields import (
-    TRACTIONS,
-    Height,
-    Scale,
-    Window,
-    areas,
-    check_field,
-    draw_arrows,
-    draw_outline,
-    frame_of,
-    height_of,
-    patches,
-    rounds,
-    scale_of,
-    shown_values,
-    values_of,
-    within,
-)
-from evfem.plotting.figures import (
-    EDGE,
-    GROUND,
-    STATUS,
-    WIDTH,
-    Panels,
-    add_colorbar,
-    axes_or_new,
-    new_figure,
-    styled,
-)
+from evfem.plotting import fields, figures
 from evfem.plotting.labels import field_label, named
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Near = Literal["contact"] | Window | None
+Near = Literal["contact"] | fields.Window | None
 #: what is shown below the surface and beside the finger, as a share of the picture or the finger
 BELOW, MARGIN = 0.16, 0.03
 #: width of a close-up over that of the contact; its height over its width, for the tissue and the pad
@@ -99,19 +73,19 @@ def deformed(
     InputError
         Another field or frame, or a finger in three dimensions.
     """
-    check_field(field)
+    choice("field", field, fields.FIELDS)
     check_plane(result.mesh)
-    return picture(View(result, frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)
+    return picture(View(result, fields.frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)
 
 
 def picture(view: Any, near: Near, limits: tuple[float | None, float | None], ax: Axes | None) -> Axes:
     """A view (`View`, or that of a skin) with its title and colour bar."""
     window = view.window(near)
-    scale = scale_of(view.scaled_as, view.shown(window), *limits)
-    ax = axes_or_new(ax, figure_height(window))
+    scale = fields.scale_of(view.scaled_as, view.shown(window), *limits)
+    ax = figures.axes_or_new(ax, figure_height(window))
     mapped = view.draw(ax, window, scale)
     ax.set_title(told(view.result, view.frame), fontsize="medium")
-    label_bar(add_colorbar(mapped, ax, field_label(view.field), scale.extend), view.field)
+    label_bar(figures.add_colorbar(mapped, ax, field_label(view.field), scale.extend), view.field)
     return ax
 
 
@@ -123,25 +97,21 @@ def side_by_side(
     near: Near = "contact",
     vmin: float | None = None,
     vmax: float | None = None,
-) -> Panels:
+) -> figures.Panels:
     """The deformed fingers of several results by their names: whole above, close-ups below.
 
     All are coloured by one field on one scale, as `deformed` does it; `near=None` leaves out the
     close-ups. The panels come row by row.
     """
-    check_field(field)
-    views = {name: View(one, frame_of(one, frame), field) for name, one in named(results).items()}
-    rows = [[view.window(None) for view in views.values()]]
-    if near is not None:
-        rows.append([view.window(near) for view in views.values()])
-    shown = [
-        shown_values(view.result.mesh, view.frame, field, window)
-        for row in rows
-        for view, window in zip(views.values(), row, strict=True)
-    ]
-    scale = scale_of(field, np.concatenate(shown), vmin, vmax)
-    tall = [max(_height(window) for window in row) for row in rows]
-    figure = new_figure(sum(tall) + 0.75 * len(rows), ACROSS * len(views) + 1.0)
+    choice("field", field, fields.FIELDS)
+    views = {name: View(one, fields.frame_of(one, frame), field) for name, one in named(results).items()}
+    levels = [None] if near is None else [None, near]
+    rows = [[view.window(level) for view in views.values()] for level in levels]
+    pairs = (pair for row in rows for pair in zip(views.values(), row, strict=True))
+    scale = fields.scale_of(field, np.concatenate([view.shown(window) for view, window in pairs]), vmin, vmax)
+    shapes = [[(top - bottom) / (right - left) for left, right, bottom, top in row] for row in rows]
+    tall = [(ACROSS - 0.7) * max(row) for row in shapes]
+    figure = figures.new_figure(sum(tall) + 0.75 * len(rows), ACROSS * len(views) + 1.0)
     axes = figure.subplots(len(rows), len(views), squeeze=False, height_ratios=tall)
     for panels, row in zip(axes, rows, strict=True):
         for ax, view, window in zip(panels, views.values(), row, strict=True):
@@ -155,13 +125,7 @@ def side_by_side(
         ax.set_xlabel("")
     bar = figure.colorbar(mapped, ax=axes, label=field_label(field), shrink=0.8, extend=scale.extend)
     label_bar(bar, field)
-    return Panels(axes.ravel())
-
-
-def _height(window: Window) -> float:
-    """Inches of a window that is as wide as its finger's place."""
-    left, right, bottom, top = window
-    return (ACROSS - 0.7) * (top - bottom) / (right - left)
+    return figures.Panels(axes.ravel())
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,42 +142,39 @@ class View:
         """Current positions (N, 2) of the nodes in mm."""
         return self.result.mesh.points + self.frame.displacement
 
-    def window(self, near: Near) -> Window:
+    def window(self, near: Near) -> fields.Window:
         """What is shown: left, right, bottom and top in mm."""
         if near is None:
-            return _whole(self.points, height_of(self.result, self.frame))
-        if isinstance(near, str):
-            if near != "contact":
-                raise InputError(
-                    "near", quoted(near), "contact, or a window (left, right, bottom, top) in mm"
-                )
+            return _whole(self.points, fields.height_of(self.result, self.frame))
+        if near == "contact":
             flat = OF_PAD if self.field in POINT_FIELDS else OF_TISSUE
-            return _close(self.points, self.frame, height_of(self.result, self.frame), flat)
+            return _close(self.points, self.frame, fields.height_of(self.result, self.frame), flat)
         return checked_window(near)
 
     @property
     def scaled_as(self) -> str:
-        """The field whose scale it has."""
         return self.field
 
-    def shown(self, window: Window) -> Floats:
+    def shown(self, window: fields.Window) -> Floats:
         """The values inside a window."""
-        return shown_values(self.result.mesh, self.frame, self.field, window)
+        return fields.shown_values(self.result.mesh, self.frame, self.field, window)
 
-    def draw(self, ax: Axes, window: Window, scale: Scale) -> Any:
+    def draw(self, ax: Axes, window: fields.Window, scale: fields.Scale) -> Any:
         """Draw the view into axes, and return what a colour bar needs."""
         mesh, points = self.result.mesh, self.points
-        height = height_of(self.result, self.frame)
+        height = fields.height_of(self.result, self.frame)
         if self.field in POINT_FIELDS:
-            mapped = draw_outline(ax, mesh, self.frame, self.field, scale)
+            mapped = fields.draw_outline(ax, mesh, self.frame, self.field, scale)
         else:
-            mapped = _draw_tissue(ax, mesh, points, values_of(self.frame, self.field), scale, self.smooth)
+            mapped = _draw_tissue(
+                ax, mesh, points, fields.values_of(self.frame, self.field), scale, self.smooth
+            )
         _draw_borders(ax, mesh, points)
         _name_bone(ax, mesh, points, window)
         _draw_surface(ax, height, window)
         _mark_probes(ax, self.result, self.frame, window)
-        if self.field in TRACTIONS:
-            draw_arrows(ax, mesh, self.frame, self.field, height, window)
+        if self.field in fields.TRACTIONS:
+            fields.draw_arrows(ax, mesh, self.frame, self.field, height, window)
         ax.set(xlim=window[:2], ylim=window[2:], aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
         return mapped
 
@@ -225,20 +186,16 @@ def check_plane(mesh: Mesh) -> None:
         raise InputError("mesh", "a finger in three dimensions", allowed)
 
 
-def checked_window(window: Any) -> Window:
+def checked_window(window: Any) -> fields.Window:
     """A window of four numbers, left before right and bottom before top."""
-    allowed = "contact, or a window (left, right, bottom, top) in mm"
-    try:
+    with suppress(TypeError, ValueError):
         left, right, bottom, top = (float(value) for value in window)
-    except (TypeError, ValueError) as error:
-        raise InputError("near", quoted(window), allowed) from error
-    if not (left < right and bottom < top and np.isfinite([left, right, bottom, top]).all()):
-        raise InputError("near", quoted(window), allowed)
-    return left, right, bottom, top
+        if left < right and bottom < top and np.isfinite([left, right, bottom, top]).all():
+            return left, right, bottom, top
+    raise InputError("near", quoted(window), "contact, or a window (left, right, bottom, top) in mm")
 
 
-def _whole(points: Floats, height: Height) -> Window:
-    """The whole finger and the surface below it."""
+def _whole(points: Floats, height: fields.Height) -> fields.Window:
     (left, lowest), (right, top) = points.min(axis=0), points.max(axis=0)
     x = np.linspace(left, right, 500)
     aside, tall = MARGIN * (right - left), top - lowest
@@ -246,7 +203,7 @@ def _whole(points: Floats, height: Height) -> Window:
     return left - aside, right + aside, ground - 0.6 * BELOW * tall, top + MARGIN * tall
 
 
-def _close(points: Floats, frame: Frame, height: Height, flat: float) -> Window:
+def _close(points: Floats, frame: Frame, height: fields.Height, flat: float) -> fields.Window:
     """What touches, or the node with the smallest gap; `flat` is the window's height over its width."""
     touching = frame.contact_status > 0
     if not touching.any():
@@ -260,18 +217,16 @@ def _close(points: Floats, frame: Frame, height: Height, flat: float) -> Window:
     return middle - half, middle + half, bottom, bottom + tall
 
 
-def figure_height(window: Window) -> float:
+def figure_height(window: fields.Window) -> float:
     """Height in inches of a figure that a window fills, with its labels and a colour bar."""
     left, right, bottom, top = window
-    return float(np.clip((WIDTH - 1.3) * (top - bottom) / (right - left) + 0.85, 2.2, 9.0))
+    return float(np.clip((figures.WIDTH - 1.3) * (top - bottom) / (right - left) + 0.85, 2.2, 9.0))
 
 
 def told(result: Result, frame: Frame) -> str:
     """Where the finger of a frame is, in a line."""
-    rows = np.flatnonzero(result.step == frame.step)
     text = f"step {frame.step}: position {frame.position + 0.0:.4g} mm"
-    if rows.size:
-        row = rows[0]
+    for row in np.flatnonzero(result.step == frame.step)[:1]:
         text += f", load {result.applied_force[row] + 0.0:.3g} {result.units['applied_force']}"
         text += f", {result.voltage[row]:.4g} V" if np.any(result.voltage != 0.0) else ""
     return text
@@ -280,14 +235,16 @@ def told(result: Result, frame: Frame) -> str:
 def label_bar(bar: Any, field: str) -> None:
     """The statuses by their names."""
     if field == "contact_status":
-        bar.set_ticks(range(len(STATUS)), labels=list(STATUS))
+        bar.set_ticks(range(len(figures.STATUS)), labels=list(figures.STATUS))
         bar.ax.tick_params(length=0)
 
 
-def _draw_tissue(ax: Axes, mesh: Mesh, points: Floats, values: Floats, scale: Scale, smooth: bool) -> Any:
+def _draw_tissue(
+    ax: Axes, mesh: Mesh, points: Floats, values: Floats, scale: fields.Scale, smooth: bool
+) -> Any:
     """Every cell in its colour, or colours that change from node to node."""
     of_cells = len(values) == len(mesh.cells)
-    outlines = points[rounds(mesh)]
+    outlines = points[fields.rounds(mesh)]
     if not smooth:
         from matplotlib.collections import PolyCollection
 
@@ -297,8 +254,8 @@ def _draw_tissue(ax: Axes, mesh: Mesh, points: Floats, values: Floats, scale: Sc
     else:
         from matplotlib.tri import Triangulation
 
-        pieces = patches(mesh)
-        array = pieces.averages(values, areas(outlines)) if of_cells else values[pieces.nodes]
+        pieces = fields.patches(mesh)
+        array = pieces.averages(values, fields.areas(outlines)) if of_cells else values[pieces.nodes]
         x, y = points[pieces.nodes].T
         mapped = ax.tripcolor(Triangulation(x, y, pieces.triangles), array, shading="gouraud")
     scale.apply(mapped)
@@ -307,53 +264,46 @@ def _draw_tissue(ax: Axes, mesh: Mesh, points: Floats, values: Floats, scale: Sc
 
 
 def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
-    """The outer outline and the lines between regions."""
     from matplotlib.collections import LineCollection
 
-    edges = mesh.cell_edges.reshape(-1, mesh.cell_edges.shape[-1])
-    owner = np.repeat(mesh.region, mesh.corners)
-    number = mesh.edges[1].ravel()
-    low, high = np.full(number.max() + 1, np.inf), np.full(number.max() + 1, -np.inf)
-    np.minimum.at(low, number, owner)
-    np.maximum.at(high, number, owner)
-    first = np.unique(number, return_index=True)[1]
-    border = edges[first[(np.bincount(number) == 1) | (low < high)]]
+    edges = mesh.cell_sides.reshape(-1, mesh.order + 1)
+    owner, number = np.repeat(mesh.region, mesh.corners), mesh.sides[1].ravel()
+    _, first, count = np.unique(number, return_index=True, return_counts=True)
+    border = edges[first[(count == 1) | (np.bincount(number, owner) != count * owner[first])]]
     order = [0, 2, 1] if mesh.order == 2 else [0, 1]
-    ax.add_collection(LineCollection(list(points[border[:, order]]), colors=EDGE, linewidths=0.5))
+    ax.add_collection(LineCollection(list(points[border[:, order]]), colors=figures.EDGE, linewidths=0.5))
 
 
-def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: Window) -> None:
+def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: fields.Window) -> None:
     """What the hole in the middle is, where the tissue has one around the bone."""
-    edges = mesh.edges_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
+    edges = mesh.sides_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
     around, count = np.unique(edges, return_counts=True)
     if not count.size or np.any(count != 2):
         return
     middle = 0.5 * (points[around].min(axis=0) + points[around].max(axis=0))
-    if within(middle[None], window)[0]:
+    if fields.within(middle[None], window)[0]:
         ax.text(middle[0], middle[1], "bone", ha="center", va="center", color="0.5", fontsize="small")
 
 
-def _mark_probes(ax: Axes, result: Result, frame: Frame, window: Window) -> None:
+def _mark_probes(ax: Axes, result: Result, frame: Frame, window: fields.Window) -> None:
     """The probes' points where the tissue has them, in the colours of their histories, and their names."""
-    for probe, look in styled(result.probes):
+    for probe, look in figures.styled(result.probes):
         moved = probe.displacement[result.step == frame.step]
-        shown = [place for place in (probe.position + moved).reshape(-1, 2) if within(place[None], window)[0]]
+        shown = [
+            place
+            for place in (probe.position + moved).reshape(-1, 2)
+            if fields.within(place[None], window)[0]
+        ]
         for place in shown:
             ax.plot(*place, "o", color=look["color"], markersize=6.0, markeredgecolor="white", zorder=3.0)
         if shown:
             box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-            at: dict[str, Any] = {
-                "textcoords": "offset points",
-                "va": "center",
-                "fontsize": "small",
-                "zorder": 3.0,
-            }
-            ax.annotate(look["label"], shown[-1], (6.0, 0.0), color=look["color"], bbox=box, **at)
+            text = ax.annotate(look["label"], shown[-1], (6.0, 0.0), textcoords="offset points", bbox=box)
+            text.set(color=look["color"], va="center", fontsize="small", zorder=3.0)
 
 
-def _draw_surface(ax: Axes, height: Height, window: Window) -> None:
-    """The surface, filled down to the lower end of the window."""
+def _draw_surface(ax: Axes, height: fields.Height, window: fields.Window) -> None:
     x = np.linspace(window[0], window[1], 2001)
     y = height(x)
-    ax.fill_between(x, y, min(window[2], y.min()), color=GROUND, linewidth=0.0, zorder=0.5)
+    ax.fill_between(x, y, min(window[2], y.min()), color=figures.GROUND, linewidth=0.0, zorder=0.5)
     ax.plot(x, y, color="black", linewidth=0.8, zorder=2.5)

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
+from evfem.common.checks import choice
+from evfem.errors import InputError
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.plotting.fields import TRACTIONS, Scale, Window, frame_of, values_of, within
 from evfem.plotting.figures import TISSUE
@@ -55,15 +56,11 @@ def footprint(
     field
         `gap`, `contact_pressure`, `shear_traction` (its magnitude), `electrostatic_traction` or
         `contact_status`.
-    frame
-        Index in `result.frames`.
-    ax
-        Axes to draw in; None: new ones.
     near
         "contact": a close-up of the contact, or of the smallest gap. A window (left, right, lower,
         upper) of x and z in mm. None: the whole skin.
-    vmin, vmax
-        Range of the colours; None: that of the values shown.
+    frame, ax, vmin, vmax
+        As in `deformed`.
 
     Returns
     -------
@@ -75,8 +72,7 @@ def footprint(
     InputError
         Another field or frame, or a plane finger.
     """
-    if field not in POINT_FIELDS:
-        raise InputError("field", quoted(field), " | ".join(POINT_FIELDS))
+    choice("field", field, POINT_FIELDS)
     if result.mesh.dim != 3:
         raise InputError("result", "a plane finger", "a finger in three dimensions; deformed(result) else")
     return picture(SkinView(result, frame_of(result, frame), field), near, (vmin, vmax), ax)
@@ -97,7 +93,6 @@ class SkinView:
 
     @cached_property
     def skin(self) -> Skin:
-        """The skin of the mesh."""
         return make_skin(self.result.mesh)
 
     @cached_property
@@ -115,15 +110,11 @@ class SkinView:
         place = self.position[:, ::2]
         if near is None:
             return _around(place, MARGIN)
-        if not isinstance(near, str):
-            return checked_window(near)
         if near != "contact":
-            raise InputError("near", quoted(near), "contact, or a window (left, right, lower, upper) in mm")
-        touching = self.frame.contact_status[self.skin.nodes] > 0
-        if not touching.any():
-            gap = self.frame.gap[self.skin.nodes]
-            touching = gap <= np.nanmin(gap) + 0.05 * np.nanmax(gap)
-        return _around(place[touching], AROUND)
+            return checked_window(near)
+        touching, gap = self.frame.contact_status[self.skin.nodes] > 0, self.frame.gap[self.skin.nodes]
+        nearest = gap <= np.nanmin(gap) + 0.05 * np.nanmax(gap)
+        return _around(place[touching if touching.any() else nearest], AROUND)
 
     def shown(self, window: Window) -> Floats:
         """The values inside a window."""
@@ -134,9 +125,8 @@ class SkinView:
         from matplotlib.collections import PolyCollection
 
         faces = self.skin.faces[self.skin.facing(self.position)]
-        place = self.position[:, ::2]
-        skin = PolyCollection(list(place[faces[:, :4]]), facecolors=TISSUE, edgecolors=TISSUE, linewidths=0.3)
-        ax.add_collection(skin)
+        cells = list(self.position[faces[:, :4], ::2])
+        ax.add_collection(PolyCollection(cells, facecolors=TISSUE, edgecolors=TISSUE, linewidths=0.3))
         mapped = self._draw_shares(ax, faces) if self.field == "contact_status" else self._draw(ax, faces)
         scale.apply(mapped)
         mapped.set_rasterized(True)
@@ -156,7 +146,6 @@ class SkinView:
         return ax.tripcolor(Triangulation(x, z, triangles), values, shading="gouraud")
 
     def _draw_shares(self, ax: Axes, faces: Ints) -> Any:
-        """One colour for each node's share of a face."""
         from matplotlib.collections import PolyCollection
 
         m, shares, values = faces.shape[1], [], []
@@ -172,6 +161,6 @@ class SkinView:
 
 def _around(place: Floats, margin: float) -> Window:
     """A window around points (n, 2), with so much of their width beyond them."""
-    low, high = place.min(axis=0), place.max(axis=0)
-    wide = margin * max(float(np.max(high - low)), 1e-3)
-    return (float(low[0] - wide), float(high[0] + wide), float(low[1] - wide), float(high[1] + wide))
+    (left, low), (right, high) = place.min(axis=0).tolist(), place.max(axis=0).tolist()
+    wide = margin * max(right - left, high - low, 1e-3)
+    return left - wide, right + wide, low - wide, high + wide

@@ -9,7 +9,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-from evfem.errors import InputError, quoted
+from evfem.common.checks import choice
+from evfem.errors import InputError
 from evfem.simulation.history import COLUMNS, SPATIAL, UNITS
 from evfem.simulation.result import FIELD_UNITS, Result
 from evfem.sweeps.table import unit_of
@@ -36,29 +37,18 @@ TEXTS = {
 }
 #: letters beside a panel of two inches
 LINE = 20
-#: fields of a frame: name where the underscores alone do not make one
-FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
-FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
-#: quantity of a probe -> its unit if it is not MPa
-QUANTITY_UNITS = dict.fromkeys(("deformation_gradient", "green_strain", "principal_stretches", "J"), "")
-QUANTITY_UNITS |= {"displacement": "mm", "strain_energy_density": "N/mm2", "branch_energy_density": "N/mm2"}
+#: unit of a field of a frame, or a quantity of a probe, if it is not MPa
+OTHER_UNITS = FIELD_UNITS | {"strain_energy_density": "N/mm2", "branch_energy_density": "N/mm2"}
+OTHER_UNITS |= dict.fromkeys(("deformation_gradient", "green_strain", "principal_stretches", "J"), "")
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Text and unit of an axis.
-
-    >>> with_unit("area", "mm2"), with_unit("step", "")
-    ('area (mm²)', 'step')
-    """
+    """Text and unit of an axis."""
     return f"{text} ({unit.replace('mm2', 'mm²')})" if unit else text
 
 
 def column_text(name: str, unit: str = "") -> str:
-    """A column in words, without its unit: a width over a whole depth is an area.
-
-    >>> column_text("normal_force"), column_text("contact_width", "mm2")
-    ('normal force', 'contact area')
-    """
+    """A column in words, without its unit: a width over a whole depth is an area."""
     text = TEXTS.get(name, name.replace("_", " "))
     return text.replace("width", "area") if unit == "mm2" else text
 
@@ -82,64 +72,40 @@ def kind_of(name: str, units: Units = UNITS) -> tuple[str, str]:
 
 
 def column_label(name: str, units: Units = UNITS) -> str:
-    """A column with its unit, for an axis of its own.
-
-    >>> from evfem.simulation.history import WHOLE_UNITS
-    >>> column_label("min_gap"), column_label("step"), column_label("real_contact_width", WHOLE_UNITS)
-    ('smallest gap (mm)', 'step', 'real contact area (mm²)')
-    """
+    """A column with its unit, for an axis of its own."""
     return with_unit(column_text(name, units[name]), units[name])
 
 
 def axis_label(name: str, units: Units = UNITS) -> str:
-    """The kind of a column with its unit, for an axis that it shares.
-
-    >>> from evfem.simulation.history import WHOLE_UNITS
-    >>> axis_label("normal_force"), axis_label("normal_force", WHOLE_UNITS)
-    ('force per depth (N/mm)', 'force (N)')
-    """
+    """The kind of a column with its unit, for an axis that it shares."""
     return with_unit(*kind_of(name, units))
 
 
 def on_lines(label: str) -> str:
-    """A label beside a low panel, on lines that are no longer than the panel is high.
-
-    >>> on_lines("electrostatic force (N/mm)").split(chr(10)), on_lines("voltage (V)")
-    (['electrostatic force', '(N/mm)'], 'voltage (V)')
-    """
+    """A label beside a low panel, on lines that are no longer than the panel is high."""
     return textwrap.fill(label, LINE, break_long_words=False, break_on_hyphens=False)
 
 
-def field_label(field: str) -> str:
-    """A field of a frame with its unit.
+def field_label(name: str) -> str:
+    """A field of a frame, or a quantity of a probe or a component of it, with its unit.
 
-    >>> field_label("von_mises"), field_label("contact_pressure")
-    ('von Mises stress (MPa)', 'contact pressure (MPa)')
-    """
-    return with_unit(FIELD_TEXTS.get(field, field.replace("_", " ")), FIELD_UNITS.get(field, "MPa"))
-
-
-def quantity_label(name: str) -> str:
-    """A quantity of a probe, or a component of it, with its unit.
-
-    >>> quantity_label("cauchy_stress_yy"), quantity_label("J"), quantity_label("displacement_x")
+    >>> field_label("cauchy_stress_yy"), field_label("J"), field_label("displacement_x")
     ('Cauchy stress yy (MPa)', 'volume ratio J', 'displacement x (mm)')
     """
-    quantity = next((one for one in QUANTITY_UNITS if name.startswith(one)), "")
-    text = FIELD_TEXTS.get(name, name.replace("_", " ").replace("cauchy", "Cauchy").replace("green", "Green"))
-    return with_unit(text, QUANTITY_UNITS.get(quantity, "MPa"))
+    text = name.replace("_", " ").replace("cauchy", "Cauchy").replace("green", "Green")
+    text = {"von_mises": "von Mises stress", "J": "volume ratio J"}.get(name, text)
+    unit = next((unit for one, unit in OTHER_UNITS.items() if name.startswith(one)), "MPa")
+    return with_unit(text, unit)
 
 
 def _computed(key: str) -> bool:
     """Whether a column of a sweep is an output: one of a motion's keys is called as a column is."""
-    name = key.split(".")[0]
-    return name in (*COLUMNS, *SPATIAL) and name != "motion"
+    return key.split(".")[0] in {*COLUMNS, *SPATIAL} - {"motion"}
 
 
 def key_unit(key: str, units: Units = UNITS) -> str:
     """Unit of a column of a sweep, which says its `units`."""
-    usual = UNITS.get(key.split(".")[0], "") if _computed(key) else unit_of(key)
-    return units.get(key) or usual
+    return units.get(key) or (UNITS.get(key.split(".")[0], "") if _computed(key) else unit_of(key))
 
 
 def key_label(key: str, units: Units = UNITS) -> str:
@@ -162,13 +128,8 @@ def key_label(key: str, units: Units = UNITS) -> str:
 
 
 def values_of(result: Result, name: str) -> Any:
-    """A column of the history (steps,).
-
-    Raises InputError for what is no column of numbers.
-    """
-    names = [column for column in result.columns if column != "motion"]
-    if name not in names:
-        raise InputError("column", quoted(name), " | ".join(names))
+    """A column of the history (steps,); InputError for what is no column of numbers."""
+    choice("column", name, [column for column in result.columns if column != "motion"])
     return result[name]
 
 

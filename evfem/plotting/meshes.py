@@ -42,9 +42,8 @@ def _draw_plane(mesh: Mesh, ax: Axes) -> None:
     outlines = mesh.points[rounds(mesh)]
     for (name, number), color in zip(mesh.region_names.items(), cycle(REGIONS), strict=False):
         cells, label = list(outlines[mesh.region == number]), name.replace("_", " ")
-        ax.add_collection(
-            PolyCollection(cells, facecolors=color, edgecolors="white", linewidths=0.2, label=label)
-        )
+        patches = PolyCollection(cells, facecolors=color, edgecolors="white", linewidths=0.2, label=label)
+        ax.add_collection(patches)
     ax.set_xlabel("x (mm)")
     ax.set_ylabel("y (mm)")
 
@@ -77,7 +76,7 @@ def cut_open(mesh: Mesh) -> tuple[Ints, Ints]:
     """Outer faces (K, 4 or 9), and their regions (K,), of the cells behind the middle of a solid's length."""
     middle = 0.5 * (mesh.points[:, 2].min() + mesh.points[:, 2].max())
     kept = mesh.points[mesh.cells[:, :8], 2].mean(axis=1) < middle
-    _, of_cell = mesh.faces
+    _, of_cell = mesh.sides
     alone = np.bincount(of_cell[kept].ravel(), minlength=len(of_cell) * 6)[of_cell[kept]] == 1
     region = np.broadcast_to(mesh.region[kept, None], alone.shape)
-    return mesh.cell_faces[kept][alone], region[alone]
+    return mesh.cell_sides[kept][alone], region[alone]

@@ -6,7 +6,7 @@ colours are the same in every frame; a close-up goes along with the finger.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import CalledProcessError
@@ -16,11 +16,11 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.common.arrays import Floats
-from evfem.common.checks import count
+from evfem.common.checks import choice, count
 from evfem.common.storage import replacing
-from evfem.errors import InputError, StorageError, quoted
+from evfem.errors import InputError, StorageError
 from evfem.plotting.curves import abscissa, forces
-from evfem.plotting.fields import Scale, Window, check_field, scale_of
+from evfem.plotting.fields import FIELDS, Scale, Window, scale_of
 from evfem.plotting.figures import BLACK, BLUE, GREEN, VERMILION, WIDTH, add_colorbar
 from evfem.plotting.finger import Near, View, figure_height, label_bar, told
 from evfem.plotting.footprint import SkinView
@@ -30,7 +30,6 @@ from evfem.simulation.result import POINT_FIELDS, Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ENDINGS = (".gif", ".mp4")
 DPI, CURVES_HEIGHT = 100, 2.0  # pixels per inch; height of the forces in inches
 OF_SCALE, SHADES = 160, 12  # of the 256 colours of a .gif: those of the scale, and of each curve
 
@@ -46,24 +45,27 @@ def animate(
     fps: int = 10,
     progress: bool = True,
 ) -> Path:
-    """Write the frames of a result as a moving picture, `path` ending in .gif or .mp4, and return the path.
+    """Write the frames of a result as a moving picture, `path` ending in .gif or .mp4, and return the path,
+    which a notebook shows as the picture.
 
-    In a notebook the path shows itself as the picture.
-
-    Each frame shows the deformed finger as `deformed` does, or the skin of a finger in three
-    dimensions as `footprint` does, and the forces with a mark where it is.
+    Each frame shows the finger as `deformed` or `footprint` does, and the forces with a mark where it is.
     `near="contact"` goes along with the finger, as does no other window. `fps` frames are shown in
-    a second; keep more of them with `Output(every=...)`. A terminal or notebook shows a bar. The
-    file is written whole or not at all. Raises InputError for another ending, for .mp4 where
-    ffmpeg is not installed, and for a result without frames; StorageError when the disk refuses.
+    a second; keep more of them with `Output(every=...)`. Raises InputError for another ending, for .mp4
+    without ffmpeg, and for a result without frames; StorageError when the disk refuses.
     """
+    from matplotlib.animation import FFMpegWriter
+
     path, fps = Path(path), count("fps", fps, 60)
-    check_field(field)
-    if result.mesh.dim == 3 and field not in POINT_FIELDS:
-        raise InputError("field", quoted(field), " | ".join(POINT_FIELDS))
+    choice("field", field, POINT_FIELDS if result.mesh.dim == 3 else FIELDS)
     if not result.frames:
         raise InputError("result", "a result without frames", "a result with frames (Output(every=...))")
-    write = _writer(path)
+    if path.suffix not in (".gif", ".mp4"):
+        raise InputError("path", str(path), "a file name that ends in .gif or .mp4")
+    if not path.absolute().parent.is_dir():
+        raise StorageError(f"cannot write {path}: there is no folder {path.parent}")
+    if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError("path", f"{path}, and no ffmpeg", "a .gif, or an .mp4 where ffmpeg is installed")
+    write = _write_gif if path.suffix == ".gif" else _write_mp4
     reel = make_reel(result, field, near, (vmin, vmax))
     wanted = progress and notices.drawable()
     with replacing(path) as temporary, notices.bar(len(result.frames), "frame", wanted=wanted) as bar:
@@ -81,21 +83,6 @@ class MoviePath(type(Path())):  # type: ignore[misc]
         if self.suffix == ".gif":
             return f'<img src="data:image/gif;base64,{data}">'
         return f'<video controls loop src="data:video/mp4;base64,{data}"></video>'
-
-
-def _writer(path: Path) -> Callable[[Path, Reel, int, Any], None]:
-    """What writes files with this ending."""
-    if path.suffix not in ENDINGS:
-        raise InputError("path", str(path), "a file name that ends in .gif or .mp4")
-    if not path.absolute().parent.is_dir():
-        raise StorageError(f"cannot write {path}: there is no folder {path.parent}")
-    if path.suffix == ".gif":
-        return _write_gif
-    from matplotlib.animation import FFMpegWriter
-
-    if not FFMpegWriter.isAvailable():
-        raise InputError("path", f"{path}, and no ffmpeg", "a .gif, or an .mp4 where ffmpeg is installed")
-    return _write_mp4
 
 
 def _write_gif(path: Path, reel: Reel, fps: int, update: Any) -> None:
@@ -134,7 +121,6 @@ def _palette(scale: Scale, pixels: Any) -> Floats:
 
 
 def _write_mp4(path: Path, reel: Reel, fps: int, update: Any) -> None:
-    """All frames through ffmpeg."""
     from matplotlib.animation import FFMpegWriter
 
     writer = FFMpegWriter(fps=fps, extra_args=["-f", "mp4"])
@@ -159,7 +145,8 @@ class Reel:
     def frames(self) -> Iterator[Figure]:
         """The figure, drawn for one frame after the other."""
         result, field = self.views[0].result, self.views[0].field
-        above, below = self.figure.subplots(2, 1, height_ratios=(self._share(), 1.0))
+        heights = figure_height(self.windows[0]), CURVES_HEIGHT
+        above, below = self.figure.subplots(2, 1, height_ratios=heights)
         column = abscissa(result)
         forces(result, column, ax=below)
         below.set_ylabel(on_lines(below.get_ylabel()))
@@ -182,9 +169,6 @@ class Reel:
             for mark in marks:
                 mark.remove()
 
-    def _share(self) -> float:
-        return figure_height(self.windows[0]) / CURVES_HEIGHT
-
 
 def make_reel(result: Result, field: str, near: Near, limits: tuple[float | None, float | None]) -> Reel:
     """Views, windows and scale of all frames of a result, and an empty figure for them."""
@@ -205,7 +189,7 @@ def make_reel(result: Result, field: str, near: Near, limits: tuple[float | None
 def _windows(views: Sequence[View | SkinView], near: Near) -> list[Window]:
     """A window for each view, all of one size: around all of them, or a close-up that goes along."""
     found = np.array([view.window(near) for view in views])
-    x = np.array([view.frame.position for view in views]) if near == "contact" else np.zeros(len(views))
-    low = (found[:, [0, 2]] - np.column_stack([x, 0.0 * x])).min(axis=0)
-    high = (found[:, [1, 3]] - np.column_stack([x, 0.0 * x])).max(axis=0)
-    return [(low[0] + at, high[0] + at, low[1], high[1]) for at in x.tolist()]
+    x = np.array([view.frame.position if near == "contact" else 0.0 for view in views])
+    found[:, :2] -= x[:, None]
+    (left, _, bottom, _), (_, right, _, top) = found.min(axis=0), found.max(axis=0)
+    return [(left + at, right + at, bottom, top) for at in x.tolist()]

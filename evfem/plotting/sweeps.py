@@ -10,18 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.errors import InputError, quoted
-from evfem.plotting.figures import (
-    BLUE,
-    ONE_SIGN,
-    ORANGE,
-    SKY,
-    Panels,
-    add_colorbar,
-    axes_or_new,
-    curves,
-    new_columns,
-    styled,
-)
+from evfem.plotting import figures
 from evfem.plotting.labels import key_label, key_unit
 from evfem.sweeps.file import FIRST, LAST
 
@@ -41,26 +30,24 @@ MARKERS = "os^Dv<>P"
 def sweep(
     table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | None = None, log: str = ""
 ) -> Axes:
-    """Column `y` of a sweep over its column `x`, a line with markers of its own for each value of the column
-    `by`.
+    """Column `y` of a sweep over its column `x`, a line with its own markers for each value of column `by`.
 
-    `log` is "x", "y" or "xy": axes with logarithmic scales, on which all numbers must be above 0. Points
-    without a number are left out. Samples, which have no value of `x` twice but also no order, and everything
-    that is varied beside `x` and `by` are points without lines. Names on the abscissa stand in the order of
-    the table.
+    `log` is "x", "y" or "xy": axes with logarithmic scales, on which all numbers must be above 0. Samples,
+    and what is varied beside `x` and `by`, are points without lines; points without a number are left out.
+    Names on the abscissa stand in the order of the table.
     """
     rows = _done(table, x, y, *([by] if by else []))
     names = _names(rows, x)
-    _check_log(log, rows, {"x": None if names else x, "y": y})
+    _check_log(log, rows, {"x": x, "y": y})
     groups, lines = ({row[by]: row[by] for row in rows} if by else {None: None}), []
-    for (value, look), marker in zip(styled(groups), cycle(MARKERS), strict=False):
+    for (value, look), marker in zip(figures.styled(groups), cycle(MARKERS), strict=False):
         chosen = [row for row in rows if by is None or row[by] == value]
         across = np.array([names.index(row[x]) if names else row[x] for row in chosen])
         up, order = np.array([row[y] for row in chosen]), np.argsort(across, kind="stable")
         if names or table.provenance.get("samples") is not None or np.unique(across).size < across.size:
             look["linestyle"] = "none"
         lines.append((across[order], up[order], look | {"label": _value(table, by, value), "marker": marker}))
-    ax = curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
+    ax = figures.curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
     ax.set(**{f"{axis}scale": "log" for axis in log})
     if "x" in log and (places := np.unique(np.concatenate([line[0] for line in lines]))).size <= FEW:
         ax.set_xticks(places, [f"{place:g}" for place in places])
@@ -79,22 +66,25 @@ def sweep_histogram(table: SweepResult, column: str, ax: Axes | None = None) -> 
     Cells are as wide as Freedman and Diaconis or Sturges take them, whichever is less (numpy's "auto").
     Raises InputError for a column without numbers.
     """
-    values = _numbers_of(table, column)
-    ax = axes_or_new(ax)
-    ax.hist(values, bins="auto", color=SKY, edgecolor="white")
+    found = [row[column] for row in _done(table, column)]
+    if not all(type(value) in (int, float) for value in found):
+        raise InputError("column", quoted(column), "a column of numbers")
+    values, ax = np.array(found, dtype=float), figures.axes_or_new(ax)
+    ax.hist(values, bins="auto", color=figures.SKY, edgecolor="white")
     low, high = np.quantile(values, [0.05, 0.95])
     unit = key_unit(column, table.units).replace("mm2", "mm²")
-    mean, deviation = (f"{number:.4g} {unit}".rstrip() for number in (values.mean(), _deviation(values)))
-    ax.axvline(values.mean(), color=BLUE, label=f"mean {mean}, deviation {deviation}")
-    ends = f"{low:.4g} to {high:.4g} {unit}".rstrip()
-    ax.axvspan(low, high, color=ORANGE, alpha=0.25, zorder=0, label=f"90 % of the points: {ends}")
+    deviation = np.std(values, ddof=1) if values.size > 1 else 0.0
+    mean = f"mean {values.mean():.4g} {unit}".rstrip() + f", deviation {deviation:.4g} {unit}".rstrip()
+    ends = f"90 % of the points: {low:.4g} to {high:.4g} {unit}".rstrip()
+    ax.axvline(values.mean(), color=figures.BLUE, label=mean)
+    ax.axvspan(low, high, color=figures.ORANGE, alpha=0.25, zorder=0, label=ends)
     ax.set(xlabel=key_label(column, table.units), ylabel=f"points of {values.size}")
     ax.set_ylim(0.0, 1.35 * ax.get_ylim()[1])  # room for the legend
     ax.legend(loc="upper right")
     return ax
 
 
-def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = None) -> Panels:
+def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = None) -> figures.Panels:
     """Column of a sweep over each of the columns of numbers that are varied, in panels side by side, with the
     rank correlation (Spearman 1904): of 1 or -1 where one always rises or falls with the other.
 
@@ -103,27 +93,15 @@ def sweep_scatter(table: SweepResult, column: str, over: Sequence[str] | None = 
     names = list(_varied(table) if over is None else over)
     if not names:
         raise InputError("table", "no column of numbers that is varied", "a sweep of numbers")
-    panels = new_columns(len(names))
+    panels = figures.new_panels(1, 3.2, len(names))
     for ax, name in zip(panels, names, strict=True):
         rows = _done(table, name, column)
         x, y = (np.array([row[key] for row in rows]) for key in (name, column))
-        ax.plot(x, y, "o", color=BLUE, markersize=4, alpha=0.7)
+        ax.plot(x, y, "o", color=figures.BLUE, markersize=4, alpha=0.7)
         ax.set(xlabel=key_label(name, table.units), title=f"rank correlation {_ranked(x, y):.2f}")
         ax.grid(alpha=0.3)
     panels[0].set_ylabel(key_label(column, table.units))
     return panels
-
-
-def _numbers_of(table: SweepResult, column: str) -> Any:
-    """The numbers in a column; InputError where it has others, or none."""
-    values = [row[column] for row in _done(table, column)]
-    if not all(type(value) in (int, float) for value in values):
-        raise InputError("column", quoted(column), "a column of numbers")
-    return np.array(values, dtype=float)
-
-
-def _deviation(values: Any) -> float:
-    return float(np.std(values, ddof=1)) if values.size > 1 else 0.0
 
 
 def _varied(table: SweepResult) -> list[str]:
@@ -135,21 +113,18 @@ def _varied(table: SweepResult) -> list[str]:
 
 def _ranked(x: Any, y: Any) -> float:
     """Spearman's rank correlation, NaN where one does not change; equal values share the mean rank."""
-    ranks: list[Any] = []
-    for values in (x, y):
-        _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-        ranks.append((np.cumsum(count) - 0.5 * (count - 1))[place])
-    if any(np.ptp(rank) == 0.0 for rank in ranks):
+    from scipy.stats import rankdata
+
+    if not (np.ptp(x) and np.ptp(y)):
         return math.nan
-    return float(np.corrcoef(ranks)[0, 1])
+    return float(np.corrcoef(rankdata(x), rankdata(y))[0, 1])
 
 
-def _check_log(log: str, rows: Sequence[dict[str, Any]], keys: dict[str, str | None]) -> None:
+def _check_log(log: str, rows: Sequence[dict[str, Any]], keys: dict[str, str]) -> None:
     if log not in ("", "x", "y", "xy"):
         raise InputError("log", quoted(log), '"", "x", "y" or "xy"')
     for axis in log:
-        key = keys[axis]
-        if key is None or not all(type(row[key]) in (int, float) and row[key] > 0.0 for row in rows):
+        if not all(type(row[keys[axis]]) in (int, float) and row[keys[axis]] > 0.0 for row in rows):
             raise InputError("log", quoted(log), f"numbers above 0 along {axis}")
 
 
@@ -170,10 +145,10 @@ def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = 
     cells = np.full((up.size, across.size), np.nan)
     for row in rows:
         cells[np.searchsorted(up, row[y]), np.searchsorted(across, row[x])] = row[value]
-    ax = axes_or_new(ax)
-    mapped = ax.pcolormesh(_sides(across, ax.xaxis), _sides(up, ax.yaxis), cells, cmap=ONE_SIGN)
+    ax = figures.axes_or_new(ax)
+    mapped = ax.pcolormesh(_sides(across, ax.xaxis), _sides(up, ax.yaxis), cells, cmap=figures.ONE_SIGN)
     ax.set(xlabel=key_label(x, table.units), ylabel=key_label(y, table.units))
-    add_colorbar(mapped, ax, key_label(value, table.units))
+    figures.add_colorbar(mapped, ax, key_label(value, table.units))
     return ax
 
 
@@ -204,7 +179,6 @@ def _value(table: SweepResult, by: str | None, value: Any) -> str:
 
 
 def _sides(places: Any, axis: Any) -> Any:
-    """Borders of the cells along an axis."""
     steps = np.diff(places)
     if steps.size == 0 or steps.max() <= UNEVEN * steps.min():
         return _edges(places)
@@ -217,4 +191,4 @@ def _edges(places: Any) -> Any:
     if places.size == 1:
         return places[0] + np.array([-0.5, 0.5])
     middles = 0.5 * (places[1:] + places[:-1])
-    return np.concatenate([[2.0 * places[0] - middles[0]], middles, [2.0 * places[-1] - middles[-1]]])
+    return np.r_[2.0 * places[0] - middles[0], middles, 2.0 * places[-1] - middles[-1]]

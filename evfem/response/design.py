@@ -17,7 +17,7 @@ import numpy as np
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.errors import InputError, NotConverged, quoted
-from evfem.response.parameters import parameter_of
+from evfem.response.parameters import parameter_of, scene_of
 from evfem.response.sensitivities import sensitivities
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
@@ -91,7 +91,7 @@ class _Search:
 
 
 def design(
-    scene: Scene | str | PathLike[str],
+    scene: Scene | Result | str | PathLike[str],
     objective: Callable[[Result], float] | str,
     parameters: Sequence[str],
     bounds: Mapping[str, Sequence[float]] | Sequence[Sequence[float]],
@@ -102,7 +102,7 @@ def design(
     Parameters
     ----------
     scene
-        A `Scene`, or the path of a scene file; its own parameters are the start.
+        A `Scene`, the path of a scene file, or a result; its own parameters are the start.
     objective
         A smooth function from a `Result` to a number, or COLUMN.STATISTIC[.MOTION] as the outputs of a sweep,
         with a minus before it to make that largest.
@@ -135,10 +135,7 @@ def design(
     """
     from scipy.optimize import minimize
 
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
+    scene = scene_of(scene)
     keys = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     limits = _bounds(scene, keys, bounds)
     search = _Search(scene, _objective(scene, objective), keys, limits, progress)

@@ -24,6 +24,8 @@ one that slides on: the motion is smaller than what it slides in a period.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,11 +33,14 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import choice
 from evfem.common.pools import blas_limits
+from evfem.common.storage import write_text
+from evfem.common.tables import csv_text
 from evfem.contact.condensed import COMPONENTS
 from evfem.contact.signorini import FORWARD, STICK, sizes
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, quoted
 from evfem.newton.state import State
+from evfem.response.parameters import scene_of
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.simulation.result import Result
@@ -67,6 +72,12 @@ class Impedance:
         """Force over velocity (n,), complex: N s/mm, in the plane per mm of depth."""
         return self.stiffness / (2.0j * np.pi * self.frequency)
 
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the table, a row for each frequency; whole or not at all."""
+        names = ("frequency (Hz)", f"stiffness real ({self.unit})", f"stiffness imaginary ({self.unit})")
+        columns = (self.frequency, self.stiffness.real, self.stiffness.imag)
+        write_text(Path(path), csv_text([names, *np.transpose(columns).tolist()]))
+
     def __repr__(self) -> str:
         """Axis, and stiffness at the first and the last frequency."""
         ends = dict.fromkeys((0, len(self.frequency) - 1))
@@ -78,13 +89,16 @@ class Impedance:
         return f"Impedance, {self.axis}: " + ", ".join(told)
 
 
-def impedance(source: Scene | Result, frequencies: Any, axis: str = "normal") -> Impedance:
+def impedance(
+    scene: Scene | Result | str | PathLike[str], frequencies: Any, axis: str = "normal"
+) -> Impedance:
     """Stiffness and impedance of a finger about the state at the end of a scene, relaxed.
 
     Parameters
     ----------
-    source
-        A scene, or a result, whose scene is run again. Its motions are followed with tissue at rest in every
+    scene
+        A `Scene`, the path of a scene file, or a result, whose scene is run again. Its motions
+        are followed with tissue at rest in every
         step; viscosity, branches and densities count in the impedance, whatever the scene's `dynamics`.
     frequencies
         In Hz, larger than 0.
@@ -116,7 +130,7 @@ def impedance(source: Scene | Result, frequencies: Any, axis: str = "normal") ->
     """
     choice("axis", axis, AXES)
     frequency = _checked(frequencies)
-    scene = _scene_of(source)
+    _check(scene := scene_of(scene))
     state, model = _end(scene)
     system = linearised(model, state)
     way = _way(scene, axis, model.mesh.dim)
@@ -135,26 +149,15 @@ def _checked(frequencies: Any) -> Floats:
     return found
 
 
-def _scene_of(source: Any) -> Scene:
-    if isinstance(source, Result):
-        from evfem.scene.file import loads
-
-        try:
-            source = loads(source.provenance.get("parameters", ""))
-        except InputError as error:
-            given = f"a result of a scene that no file holds ({error})"
-            raise InputError("source", given, "the scene itself") from None
-    if not isinstance(source, Scene):
-        raise InputError("source", quoted(source), "a Scene or a Result")
-    if source.ground.elastic is not None:
-        raise InputError("source", "a scene with an elastic surface", "a rigid surface")
-    resolved = source.drive is not None and source.drive.resolved
-    if resolved or isinstance(source.electrics.voltage, (ChargeControl, OpenCircuit)):
+def _check(scene: Scene) -> None:
+    """Refuse what has no stiffness of small motions."""
+    if scene.ground.elastic is not None:
+        raise InputError("scene", "a scene with an elastic surface", "a rigid surface")
+    resolved = scene.drive is not None and scene.drive.resolved
+    if resolved or isinstance(scene.electrics.voltage, (ChargeControl, OpenCircuit)):
         given = "a drive that is resolved in time" if resolved else "a given charge"
-        raise InputError(
-            "source", given, 'a scene with a given voltage, and drive = "mean" where it alternates'
-        )
-    return source
+        allowed = 'a scene with a given voltage, and drive = "mean" where it alternates'
+        raise InputError("scene", given, allowed)
 
 
 def _end(scene: Scene) -> tuple[State, Model]:

@@ -21,6 +21,7 @@ from evfem.response.parts import Equations
 from evfem.scene.scene import Scene
 from evfem.simulation.history import UNITS
 from evfem.simulation.ledger import Ledger
+from evfem.simulation.model import Model
 from evfem.simulation.run import Request, Run
 from evfem.simulation.works import Books
 from evfem.surface.ways import Steps
@@ -31,25 +32,22 @@ PLACES, WEIGHTS = (-2, -1, 1, 2), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 #: the farthest place goes no further than this share of the way to a kink of the attraction or to another
 #: status, than this share of the length over which the attraction changes, and at least so far
 NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
-#: how far (mm) nodes of the undeformed finger move between places, and nodes along a profile
-SHIFT, ALONG = 5e-6, 1e-5
+#: how far nodes of the undeformed finger move between places, as a share of the distance of pad nodes; in mm
+#: pad nodes below which there is an attraction or a profile, and nodes along a profile
+INSIDE, SHIFT, ALONG = 4e-3, 5e-6, 1e-5
 #: how many times as far apart places are for what is smooth
 FAR = 4.0
 #: refinements at most; the relative change that is still to come when they are done, that from which on it is
 #: rounding where it falls no more than by the next factor, and what is too much; the factor by which it must
 #: fall with the matrix of another part
 ROUNDS, DONE, ROUNDING, NOISE, WRONG, SLOW = 30, 1e-13, 1e-7, 0.5, 1e-6, 0.01
+#: the unknowns of a part
+UNKNOWN = ("u", "bone", "contact_force")
 #: what of a state knows the kinks of the attraction
 NEARBY = ("attraction", "charges")
 LOST = "the linear equations of step {} were not solved"
-#: columns with units that are counted all the same
-WHOLE = (
-    "contact_width",
-    "real_contact_width",
-    "mean_contact_pressure",
-    "contact_area",
-    "real_contact_area",
-)
+#: how columns with units end that are counted all the same
+WHOLE = ("contact_width", "contact_area", "mean_contact_pressure")
 #: derivatives of states and books, by their fields
 Change = dict[str, Any]
 
@@ -60,7 +58,7 @@ def differentiable(column: str) -> bool:
     >>> differentiable("normal_force"), differentiable("substeps"), differentiable("contact_width")
     (True, False, False)
     """
-    return UNITS.get(column, "N") not in ("", "s") and column not in WHOLE
+    return UNITS.get(column, "N") not in ("", "s") and not column.endswith(WHOLE)
 
 
 def is_work(column: str) -> bool:
@@ -191,9 +189,9 @@ class Line:
         """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
         step = longest = STEP * parameter.size
         last = Beside.of(scene, parameter, PLACES[-1] * step)
-        shift = _shift(last, centre.run.model.mesh.points) / PLACES[-1]
-        if shift > SHIFT:
-            step *= SHIFT / shift
+        share = _shift(last, centre.run.model) / PLACES[-1]
+        if share > 1.0:
+            step /= share
             last = Beside.of(scene, parameter, PLACES[-1] * step)
         beside = [*(Beside.of(scene, parameter, place * step) for place in PLACES[:-1]), last]
         state = changes([one.run.state for one in beside], step)
@@ -211,9 +209,9 @@ class Line:
     ) -> bool:
         """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(part, jumps, part.old) for one in self.beside]
-        change = self._nothing(
-            part.new, difference([one.target.voltage.voltage for one in equations], self.step)
-        )
+        voltage = difference([one.target.voltage.voltage for one in equations], self.step)
+        change: Change = {name: np.zeros_like(getattr(part.new, name)) for name in UNKNOWN}
+        change["voltage"] = float(voltage)
         parts = [(one.smooth(part.new), one.kinked(part.new)) for one in equations]
         by_parameter, reaction = (difference([a[i] + b[i] for a, b in parts], self.step) for i in (0, 1))
         rate, before, rounds = 1.0, 1.0, 0
@@ -234,19 +232,12 @@ class Line:
         self.reason = LOST if patient else ""
         return False
 
-    def _nothing(self, state: State, voltage: Any) -> Change:
-        """The derivative of a part's end before anything is known but that of the voltage."""
-        zero = {name: np.zeros_like(getattr(state, name)) for name in ("u", "bone", "contact_force")}
-        return {**zero, "voltage": float(voltage)}
-
     def _add(self, change: Change, more: Floats) -> None:
         """Add a solution (m,) of a part's equations to a derivative."""
         body = self.centre.run.model.body
-        change["u"] = change["u"] + body.expand(more[: body.size])
-        change["bone"] = change["bone"] + more[body.bone]
-        change["contact_force"] = change["contact_force"] + more[body.size :].reshape(
-            change["contact_force"].shape
-        )
+        parts = body.expand(more[: body.size]), more[body.bone], more[body.size :]
+        for name, part in zip(UNKNOWN, parts, strict=True):
+            change[name] = change[name] + part.reshape(change[name].shape)
 
     def _share(self, more: Floats, change: Change, state: State) -> float:
         """The largest change of displacements and of contact forces, as a share of the largest derivative of
@@ -264,17 +255,21 @@ class Line:
         end's being `change`.
         """
         way = self._way(part, change)
-        near, far = [], []
-        for place in PLACES:
-            begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
-            near.append(begun.kinked(moved(part.new, change, place * way)))
-            begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * self.far))
-            far.append(begun.smooth(moved(part.new, change, place * self.far)))
+        near = self._asked(part, jumps, change, way, Equations.kinked)
+        far = self._asked(part, jumps, change, self.far, Equations.smooth)
         rows, reaction = (
             difference([one[i] for one in near], way) + difference([one[i] for one in far], self.far)
             for i in (0, 1)
         )
         return rows, reaction
+
+    def _asked(self, part: Accepted, jumps: Sequence[Steps], change: Change, way: float, ask: Any) -> Any:
+        """What the part's equations answer at the places along its states, `way` apart."""
+        found = []
+        for place in PLACES:
+            begun = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
+            found.append(ask(begun, moved(part.new, change, place * way)))
+        return found
 
     def _way(self, part: Accepted, change: Change, reach: float = np.inf) -> float:
         """How far places are apart along the states: no node moves further than it may, and all stay within
@@ -295,16 +290,10 @@ class Line:
         """The derivatives at a part's end: what it leaves behind, its books, how far its statuses hold."""
         step, way = self.step, self._way(part, change)
         by_parameter = changes([one.ended(part.new) for one in equations], step)
-        near, far, margins = [], [], []
-        for place in PLACES:
-            at = self.centre.begin(part, jumps, moved(part.old, self.state, place * way))
-            new = moved(part.new, change, place * way)
-            margins.append(at.margins(new))
-            near.append(at.ended(new))
-            at = self.centre.begin(part, jumps, moved(part.old, self.state, place * self.far))
-            far.append(at.ended(moved(part.new, change, place * self.far)))
-        along = changes(far, self.far)
-        along |= {name: value for name, value in changes(near, way).items() if name in NEARBY}
+        near = self._asked(part, jumps, change, way, lambda at, new: (at.ended(new), at.margins(new)))
+        ends, margins = zip(*near, strict=True)
+        along = changes(self._asked(part, jumps, change, self.far, Equations.ended), self.far)
+        along |= {name: value for name, value in changes(ends, way).items() if name in NEARBY}
         state = added(by_parameter, along) | change
         with np.errstate(invalid="ignore"):
             rate = difference(margins, way) + difference([one.margins(part.new) for one in equations], step)
@@ -363,7 +352,12 @@ class Line:
             one.run.rows.append({**row, **{n: row[n] + one.way * value for n, value in found.items()}})
 
 
-def _shift(one: Beside, points: Floats) -> float:
-    """How far (mm) the nodes of a finger are from `points` (N, dim) at most; 0 for other meshes."""
-    own = one.run.model.mesh.points
-    return float(np.abs(own - points).max()) if own.shape == points.shape else 0.0
+def _shift(one: Beside, model: Model) -> float:
+    """How far nodes of a finger are from those of `model`, over how far they may; 0 for other meshes."""
+    own, points = one.run.model.mesh.points, model.mesh.points
+    if own.shape != points.shape:
+        return 0.0
+    most = np.full(len(points), INSIDE * model.equilibrium.interface.length)
+    if model.attraction is not None or not model.surface.is_flat:
+        most[model.pad.nodes] = SHIFT
+    return float((np.abs(own - points).max(axis=1) / most).max())

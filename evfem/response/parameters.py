@@ -21,7 +21,9 @@ from evfem.common.checks import fields_of
 from evfem.errors import InputError, quoted, unknown
 from evfem.mesh.mesh import Mesh, raised
 from evfem.planning.plan import scene_mesh
+from evfem.scene import file as scenefile
 from evfem.scene.scene import Scene
+from evfem.simulation.result import Result
 
 #: keys of [electrostatics] -> where the scene has them
 ELECTRIC = {
@@ -137,6 +139,8 @@ class Keyed:
             return self._electric(*rest)
         if (table, rest[0]) == ("surface", "friction_law"):
             return tuple(rest)
+        if (table, rest[0], len(rest)) == ("surface", "points", 3):
+            return (table, {"0": "x", "1": "samples"}.get(rest[2], rest[2]), rest[1])
         return (table, *rest)
 
     def _electric(self, name: str, *rest: str) -> tuple[str, ...]:
@@ -175,6 +179,19 @@ class Keyed:
 
 
 Parameter = Keyed | ShapeChange
+
+
+def scene_of(source: Any) -> Scene:
+    """The scene given as such, as the path of its file, or by its `Result`, if a file can hold it."""
+    if isinstance(source, Scene):
+        return source
+    if not isinstance(source, Result):
+        return scenefile.scene_at(source)
+    try:
+        return scenefile.loads(source.provenance.get("parameters", ""))
+    except InputError as error:
+        given = f"a result of a scene that no file holds ({error})"
+        raise InputError("scene", given, "the scene itself") from None
 
 
 def parameter_of(scene: Scene, given: Any) -> Parameter:
@@ -235,8 +252,11 @@ def _with(owner: Any, path: tuple[str, ...], value: float, key: str) -> Any:
         return type(owner)(part if i == int(step) else one for i, one in enumerate(owner))
     attribute = _field(owner, step)
     assert attribute is not None
-    if is_dataclass(owner) and not isinstance(owner, type):
-        return replace(owner, **{attribute: part})
+    if is_dataclass(owner) and vars(type(owner))["__dataclass_params__"].init:
+        return replace(owner, **{attribute: part})  # type: ignore[type-var]
     changed = copy(owner)
-    setattr(changed, attribute, part)
+    if is_dataclass(owner):  # made from other names than its fields' own; what is cached is not kept
+        for name in vars(owner).keys() - {spec.name for spec in fields(owner)}:
+            del vars(changed)[name]
+    object.__setattr__(changed, attribute, part)
     return changed

@@ -13,7 +13,8 @@ of w, z, p. With :math:`' = d/dp`
 what a part leaves behind, of works and rows, by the run's own code, with no equilibrium solved
 (`evfem.response.lines`). By the parameter, states fixed, over models of changed scenes
 :math:`\epsilon = 10^{-3}` of the parameter apart (of Poisson's ratio of its distance to 1/2; of shapes so
-that no node moves by more than 5e-6 mm). Along the derivative of the states: of tissue, bone and gaps 4e-3
+that no node moves by more than 1/250 of the distance of pad nodes, and these, where there is an attraction or
+a profile, by 5e-6 mm). Along the derivative of the states: of tissue, bone and gaps 4e-3
 apart; of attraction and friction so far that no gap changes by more than 1/1000 of the length over which the
 attraction does, or passes a kink of it, and that no node goes on by more than 1e-5 mm along a profile. For a
 function that varies over a scale L of its argument the error is :math:`12 (\epsilon/L)^4`, about 1e-11, and
@@ -57,7 +58,7 @@ from evfem.newton.control import FollowFriction, Target, Unsupported
 from evfem.newton.state import State
 from evfem.planning.plan import scene_mesh
 from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
-from evfem.response.parameters import Parameter, parameter_of
+from evfem.response.parameters import Parameter, parameter_of, scene_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
@@ -93,8 +94,6 @@ class _Differentiated:
 
     def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
         self.run = Run(scene, None)
-        if self.run.model.equilibrium.interface.bed is not None:
-            raise InputError("surface.elastic", "an elastic surface", "a rigid one, to be differentiated")
         self.ledger = self.run.ledger = _Followed(self.run.model)
         self.ledger.told = self._accepted
         self.centre = Beside.of(scene, None, 0.0)
@@ -335,7 +334,7 @@ class Elasticity:
 
 
 def sensitivities(
-    scene: Scene | str | PathLike[str],
+    scene: Scene | Result | str | PathLike[str],
     parameters: Any,
     columns: Sequence[str] | None = None,
     progress: bool = False,
@@ -345,7 +344,8 @@ def sensitivities(
     Parameters
     ----------
     scene
-        A `Scene`, or the path of a scene file. Its `tolerance` limits the digits: forces that are known to
+        A `Scene`, the path of a scene file, or a result, whose scene is run again. Its
+        `tolerance` limits the digits: forces that are known to
         1e-8 have derivatives known to about as much.
     parameters
         A dotted key of the scene, a `ShapeChange`, or several of them.
@@ -376,12 +376,8 @@ def sensitivities(
     >>> round(float(found.elasticity["electrostatic_force", "electrostatics.voltage"][0]), 5)
     2.00005
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
-    if scene.ground.elastic is not None:
-        raise InputError("surface.elastic", "an elastic surface", "a rigid one: derivatives know no other")
+    scene = scene_of(scene)
+    _check(scene)
     given = (
         [parameters] if isinstance(parameters, str) or hasattr(parameters, "applied") else list(parameters)
     )
@@ -397,6 +393,15 @@ def sensitivities(
         finally:
             bar.close()
     return _gathered(run, known, wanted)
+
+
+def _check(scene: Scene) -> None:
+    """Refuse what is not differentiated as a whole."""
+    if scene.ground.elastic is not None:
+        raise InputError("surface.elastic", "an elastic surface", "a rigid one: derivatives know no other")
+    if scene.coupling == "staggered_once" and scene.law is not None:
+        given = "staggered_once, whose forces are those of another place"
+        raise InputError("electrostatics.coupling", given, "monolithic or staggered, to be differentiated")
 
 
 def _columns(dim: int, columns: Sequence[str] | None) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Within, real
 from evfem.errors import InputError, quoted, unknown
 from evfem.response.lines import differentiable
-from evfem.response.parameters import parameter_of
+from evfem.response.parameters import parameter_of, scene_of
 from evfem.response.sensitivities import Sensitivities, sensitivities
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
@@ -76,7 +76,7 @@ class Uncertainty:
 
 
 def uncertainty(
-    scene: Scene | str | PathLike[str],
+    scene: Scene | Result | str | PathLike[str],
     sd: Mapping[str, float],
     columns: Sequence[str] | None = None,
     progress: bool = False,
@@ -86,7 +86,7 @@ def uncertainty(
     Parameters
     ----------
     scene
-        A `Scene`, or the path of a scene file.
+        A `Scene`, the path of a scene file, or a result, whose scene is run again.
     sd
         {dotted key of the scene: standard deviation of its number}.
     columns
@@ -114,10 +114,7 @@ def uncertainty(
     >>> round(float(found.sd["electrostatic_force"][0] / found.result.electrostatic_force[0]), 3)
     0.1
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
+    scene = scene_of(scene)
     if not isinstance(sd, Mapping) or not sd:
         raise InputError("sd", quoted(sd), "{key of the scene: standard deviation}")
     for key, value in sd.items():

@@ -16,7 +16,7 @@ from evfem.common.checks import Values
 from evfem.electrostatics.dielectrics import seen_at
 from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
-from evfem.electrostatics.relaxation import Sandwich, stack_of
+from evfem.electrostatics.relaxation import Sandwich
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
@@ -69,17 +69,22 @@ class Electrics:
         """The same below so much skin (mm)."""
         return replace(self, skin=(self.drive or Drive()).skin_layer(thickness, self.eps_r))
 
+    @property
+    def resolved(self) -> bool:
+        """Whether charges flow in time."""
+        return self.drive is not None and self.drive.resolved
+
     @cached_property
     def voltage(self) -> Any:
         """The scene's voltage in the run: constant, instantaneous (resolved drive) or rms (mean over the
         cycle of a periodic signal).
         """
         drive = self.drive
-        if drive is not None and not drive.resolved and (found := powers(self.given)) is not None:
-            return found[0]
-        if drive is None or not drive.resolved or not isinstance(self.given, float):
+        if drive is None:
             return self.given
-        return drive.signal(self.given)
+        if drive.resolved:
+            return drive.signal(self.given) if isinstance(self.given, float) else self.given
+        return self.given if (found := powers(self.given)) is None else found[0]
 
     @cached_property
     def frequency(self) -> float | None:
@@ -131,7 +136,7 @@ class Electrics:
         """The layers of a resolved drive as its charges see them."""
         assert self.drive is not None
         gap = {"gap_conductivity": self.drive.gap_conductivity, "gap_eps_r": self.gap_eps_r}
-        return stack_of(self.skin, self.insulator, frequency=self.frequency, **gap)
+        return Sandwich.of(self.skin, self.insulator, frequency=self.frequency, **gap)
 
     @property
     def conducts(self) -> bool:

@@ -54,11 +54,13 @@ def load(path: str | Path) -> Scene:
     return loads(read_text("scene", path), path.parent, path.stem)
 
 
-def scene_at(path: object) -> Scene:
-    """The scene in the file at a path, where a scene or a path was asked for."""
-    if not isinstance(path, (str, PathLike)):
-        raise InputError("scene", path, "a Scene, or the path of a scene file")
-    return load(Path(path))
+def scene_at(given: object) -> Scene:
+    """A scene itself, or the one in the file at a path."""
+    if isinstance(given, Scene):
+        return given
+    if not isinstance(given, (str, PathLike)):
+        raise InputError("scene", given, "a Scene, or the path of a scene file")
+    return load(Path(given))
 
 
 def read_text(key: str, path: Path) -> str:
@@ -153,7 +155,6 @@ def _motions(tables: list[Any]) -> list[Motion]:
 def _surface(
     table: Mapping[str, Any], folder: Path, insulator: Any = None, electrodes: Any = None
 ) -> dict[str, Any]:
-    """The surface, and what its table says of the scene."""
     mistakes, found = Mistakes(), dict[str, Any]()
     with mistakes.of_a_part():
         kind, kinds, more = kind_of(table, "surface", SURFACES), SURFACES, {"insulator": insulator}
@@ -187,7 +188,6 @@ def _elastic(table: Any) -> Any:
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """The finger, and what its table says of the scene."""
     mistakes, found = Mistakes(), dict[str, Any]()
     with mistakes.of_a_part(), at("finger"):
         if "depth" in table:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import SimpleNamespace
 from typing import Annotated, Any
 
@@ -26,6 +27,7 @@ from evfem.mesh.faces import ON, crossings, inverted
 from evfem.mesh.mesh import Mesh
 from evfem.scene.keys import read
 from evfem.tensor import det, identity
+from evfem.tissue.space import shape_functions
 
 #: points of all probes at most
 MOST_POINTS = 10_000
@@ -169,7 +171,6 @@ class ProbeHistory:
 
 
 def _components(dim: int) -> dict[str, tuple[str, ...]]:
-    """The components of every quantity in so many dimensions."""
     return {**QUANTITIES, **{name: QUANTITIES[name][:dim] for name in ("position", "displacement")}}
 
 
@@ -280,8 +281,7 @@ class Probes:
 
     def at(self, u: Floats, inner: Floats | None = None) -> Floats:
         """The numbers (P, K) of `columns` at displacements u (N, d) and the branches' variables `inner`."""
-        from evfem.tissue.forms import Field
-        from evfem.tissue.splitlaw import embed
+        from evfem.tissue.forms import Field, embed
         from evfem.tissue.weakform import cauchy_stress
 
         moved, dim = u[self.nodes], self.space.dim
@@ -350,19 +350,11 @@ class Cells:
     """Finds points in the cells of a space."""
 
     def __init__(self, space: Any) -> None:
-        from evfem.tissue.space import shape_functions as of_kind
-
         self.mesh, self.nodes = space.mesh, space.mesh.points[space.nodes]
         low, high = self.nodes.min(axis=1), self.nodes.max(axis=1)
         margin = 0.2 * (high - low)  # curved sides bulge
         self.low, self.high = low - margin, high + margin
-        self.functions = of_kind(space.mesh.kind)
-
-    def shape(self, xi: Floats) -> tuple[Floats, Floats]:
-        """Shape functions (C, n) and their derivatives (C, n, d) at places xi (C, d) in reference cells."""
-        both = [self.functions.lbasis(xi.T, i) for i in range(self.nodes.shape[1])]
-        value = np.stack([np.broadcast_to(value, len(xi)) for value, _ in both], axis=1)
-        return value, np.stack([np.broadcast_to(slope, xi.T.shape).T for _, slope in both], axis=1)
+        self.shape = partial(shape_functions, space.mesh.kind)
 
     def at(self, name: str, point: Floats, layer: str | None) -> tuple[int, Floats]:
         """The cell of a point, and the place (d,) in it."""

@@ -129,6 +129,7 @@ class Scene:
             _check_elastic,
             _check_hand,
             _check_motion,
+            _check_speeds,
             _check_time,
         )
         for check in (*checks, _check_dynamics):
@@ -188,6 +189,17 @@ class Scene:
     def total_steps(self) -> int:
         """Number of requested steps, which is the number of rows of the history."""
         return sum(motion.steps for motion in self.motion)
+
+    @property
+    def time_needed_by(self) -> tuple[str, ...]:
+        """What of it resists by the speed, in words."""
+        friction = self.friction_law
+        found = (
+            self.solver.timed and f"dynamics = {self.solver.dynamics}",
+            getattr(self.hand, "timed", False) and "a hand that has a damping or a mass",
+            getattr(friction, "timed", False) and type(friction).__name__,
+        )
+        return tuple(filter(None, found))
 
     def with_term(self, form: Form, on: Region | Boundary) -> Scene:
         """A copy of the scene with `form` added to the internal residual over the region or boundary `on`."""
@@ -265,15 +277,14 @@ def _check_hand(scene: Scene) -> None:
         raise InputError("hand", quoted(hand), "a Hand, or None")
     if isinstance(scene.voltage, FollowForce):
         raise InputError("hand", "a hand together with a target friction force", "one of the two")
-    if hand.timed:
-        _check_speeds(scene, "a hand that has a damping or a mass")
 
 
-def _check_speeds(scene: Scene, timed: str) -> None:
-    """Raise InputError for a slide that takes no time beside something `timed`."""
-    for i, course in enumerate(scene.courses):
+def _check_speeds(scene: Scene) -> None:
+    """Raise InputError for a slide that takes no time beside something that needs it."""
+    needing = " and ".join(scene.time_needed_by)
+    for i, course in enumerate(scene.courses if needing else ()):
         if course.distance and not course.takes_time:
-            raise InputError(f"motion[{i}].speed", ABSENT, f"a speed in mm/s, needed with {timed}")
+            raise InputError(f"motion[{i}].speed", ABSENT, f"a speed in mm/s, needed with {needing}")
 
 
 def _check_field(scene: Scene) -> None:
@@ -291,8 +302,6 @@ def _check_friction(scene: Scene) -> None:
     if isinstance(law, type) or not isinstance(law, FrictionLaw):
         allowed = "Coulomb() or another law of friction, or an object with bound(pressure, mu, speed, age)"
         raise InputError("surface.friction_law", quoted(law), allowed)
-    if getattr(law, "timed", False):
-        _check_speeds(scene, type(law).__name__)
 
 
 def _check_elastic(scene: Scene) -> None:
@@ -324,9 +333,7 @@ def _check_motion(scene: Scene) -> None:
 
 
 def _check_time(scene: Scene) -> None:
-    timed = isinstance(scene.electrics.voltage, TimeSignal) or (
-        scene.drive is not None and scene.drive.resolved
-    )
+    timed = isinstance(scene.electrics.voltage, TimeSignal) or scene.electrics.resolved
     if timed and scene.motion and not any(motion.timed for motion in scene.motion):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
@@ -339,7 +346,6 @@ def _check_dynamics(scene: Scene) -> None:
         raise InputError("solver.penalty_tangential", ABSENT, allowed)
     if not solver.timed:
         return
-    _check_speeds(scene, f"dynamics = {solver.dynamics}")
     givers = (scene.finger, *scene.finger.materials.values())
     timed = any(getattr(one, "viscosity", None) or getattr(one, "relaxation", None) for one in givers)
     if not solver.inertial and not timed:

@@ -186,10 +186,11 @@ def schema() -> Schema:
         tables.setdefault(one.name, []).append(one)
     one_of = {name: {"oneOf": [one.schema() for one in found]} for name, found in tables.items()}
     electrical = tables["finger.electrical"][0].schema()
-    fingers = [
-        one.schema(materials=_by_region("material" if one.kind == "mesh" else "layer"), electrical=electrical)
-        for one in tables["finger"]
-    ]
+    fingers = []
+    for one in tables["finger"]:
+        law = {"$ref": f"#/definitions/{'material' if one.kind == 'mesh' else 'layer'}"}
+        laws_by_region = {"type": "object", "additionalProperties": law}
+        fingers.append(one.schema(materials=laws_by_region, electrical=electrical))
     friction, layer = {"$ref": "#/definitions/friction"}, tables["surface.elastic"][0].schema()
     beside: dict[str, Schema] = {"friction_law": friction}
     beside["elastic"] = {"anyOf": [layer, {"type": "array", "minItems": 1, "items": layer}]}
@@ -218,10 +219,6 @@ def schema() -> Schema:
         "signal": {"oneOf": [_modulated(one) for one in tables["electrostatics.signal"]]},
     }
     return {"$schema": DRAFT, "title": "evfem scene", **top.schema(**told), "definitions": definitions}
-
-
-def _by_region(definition: str) -> Schema:
-    return {"type": "object", "additionalProperties": {"$ref": f"#/definitions/{definition}"}}
 
 
 def _without_law(neo_hookean: Section) -> Schema:

@@ -7,10 +7,12 @@ solver needs.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
+from evfem.surface.skin import make_skin
 
 SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
 #: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, which grow with the
@@ -22,37 +24,32 @@ PACKAGES, BODY, BODY_GROWTH, CONTACT = 0.13e9, 0.0226e9, 1.1, 27.0
 def check_space(scene: Scene, mesh: Mesh) -> None:
     """Raise InputError for what a finger of this mesh cannot do."""
     mistakes = Mistakes()
-    for key, given, allowed in (_check_solid if mesh.dim == 3 else _check_plane)(scene):
-        with mistakes.of_a_part():
-            raise InputError(key, given, allowed)
+    beyond = _beyond_space(scene, mesh) if mesh.dim == 3 else _beyond_plane(scene)
+    mistakes.found = [InputError(*one) for one in beyond]
     mistakes.report()
 
 
-def _check_plane(scene: Scene) -> list[tuple[str, str, str]]:
-    found = [
-        (f"motion[{i}].angle", f"{course.angle:g} degrees {PLANE}", "0, or a Fingertip")
-        for i, course in enumerate(scene.courses)
-        if course.angle != 0.0
-    ]
+def _beyond_plane(scene: Scene) -> Iterator[tuple[str, str, str]]:
+    for i, course in enumerate(scene.courses):
+        if course.angle != 0.0:
+            yield f"motion[{i}].angle", f"{course.angle:g} degrees {PLANE}", "0, or a Fingertip"
     if scene.ground.crosses:
         allowed = "a surface at angle 0 whose height and friction are the same along z, or a Fingertip"
-        found.append(("surface", f"heights or friction over x and z {PLANE}", allowed))
-    return found
+        yield "surface", f"heights or friction over x and z {PLANE}", allowed
 
 
-def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
-    found = []
-    if scene.ground.elastic is not None:
-        found.append(
-            ("surface.elastic", f"an elastic surface {SOLID}", "a rigid one, or a finger in the plane")
-        )
+def _beyond_space(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, str, str]]:
+    skin = make_skin(mesh)
+    apart, layers = skin.spacing(mesh.points[skin.nodes]), getattr(scene.ground.elastic, "layers", ())
+    if layers and layers[0].thickness < apart:
+        allowed = f"an upper layer at least as thick as the pad's nodes are apart, {apart:.2g} mm"
+        yield "surface.elastic", f"one {layers[0].thickness:g} mm thick {SOLID}", allowed
     if scene.solver.contact != "exact":
-        found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
+        yield "solver.contact", f"{scene.solver.contact} {SOLID}", "exact"
     if scene.law is not None and scene.field != "local":
-        found.append(("electrostatics.field", f"{scene.field} {SOLID}", "local"))
+        yield "electrostatics.field", f"{scene.field} {SOLID}", "local"
     if scene.depth is not None:
-        found.append(("depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"))
-    return found
+        yield "depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"
 
 
 def needed_memory(mesh: Mesh) -> float:

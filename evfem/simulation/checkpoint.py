@@ -27,8 +27,9 @@ from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
+from evfem.tissue.dynamics import Past
 
-CHECKPOINT_FORMAT = "evfem-checkpoint-7"
+CHECKPOINT_FORMAT = "evfem-checkpoint-8"
 ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
@@ -45,25 +46,23 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """Data of the solver for the next step; of the same shapes with and without a factorisation."""
-    at, status = carried.tangent_point, state.status
-    begun = np.zeros_like(state.u)
-    at_rest = (begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status))
-    nowhere = TangentPoint(
-        *at_rest, inner=state.inner, rates=state.rates, given=state.given, strain=state.strain
-    )
-    made_at = {
-        f"factor_{spec.name}": np.asarray(getattr(at or nowhere, spec.name)) for spec in fields(nowhere)
-    }
-    own = {"candidates": carried.candidates, "duration": np.array(carried.duration)}
-    return {**own, "factorised": np.array(at is not None), **made_at}
+    nowhere = TangentPoint(state, state.touching, False, state.u, 0.0, state.inner, state.past)
+    at = carried.tangent_point or nowhere
+    parts = {"candidates": carried.candidates, "duration": carried.duration, "factorised": at is not nowhere}
+    parts |= {f"factor_{name}": part for name, part in state_arrays(at.state).items()}
+    parts |= {"touched": at.touched, "frozen": at.frozen, "begun_u": at.begin, "begun_inner": at.inner}
+    parts |= {"begun_seconds": at.duration, "past_seconds": at.past.seconds, "past_rates": at.past.rates}
+    return {name: np.asarray(part) for name, part in parts.items()}
 
 
 def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
     """The reusable data of the solver, from the arrays of a checkpoint."""
     at = None
     if arrays["factorised"]:
-        parts: dict[str, Any] = {spec.name: arrays[f"factor_{spec.name}"] for spec in fields(TangentPoint)}
-        at = TangentPoint(**{name: plain(part) for name, part in parts.items()})
+        made = state_of({spec.name: arrays[f"factor_{spec.name}"] for spec in fields(State)})
+        past = Past(float(arrays["past_seconds"]), arrays["past_rates"])
+        begun = arrays["begun_u"], float(arrays["begun_seconds"]), arrays["begun_inner"], past
+        at = TangentPoint(made, arrays["touched"], bool(arrays["frozen"]), *begun)
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
 
@@ -147,7 +146,6 @@ class Checkpoint:
         save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
 
     def _text_of(self, rows: Sequence[Row]) -> str:
-        """The rows as JSON."""
         pairs = zip(rows, self._texts, strict=False)
         same = next((i for i, (row, known) in enumerate(pairs) if row is not known[0]), len(self._texts))
         new = [(row, json.dumps({name: plain(v) for name, v in row.items()})) for row in rows[same:]]

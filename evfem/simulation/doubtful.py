@@ -40,7 +40,7 @@ SUNK = 1e-6
 def outside(model: Model) -> Ints:
     """Nodes of the finger's boundary that no contact holds: all but those of `pad` that may touch."""
     mesh, pad = model.mesh, model.pad
-    facets = mesh.outer_edges if mesh.dim == 2 else mesh.outer_faces
+    facets = mesh.outer_sides
     return np.setdiff1d(facets, pad.nodes[pad.free])
 
 
@@ -146,7 +146,6 @@ def _energy(rows: Sequence[Row]) -> float:
 
 
 def _gained(rows: Sequence[Row]) -> Iterator[str]:
-    """A row whose works lack energy."""
     own = _lost(rows, "integrator")
     if own.min() < -GAINED * _energy(rows):
         worst = int(own.argmin())
@@ -158,7 +157,6 @@ def _gained(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _snapped(rows: Sequence[Row]) -> Iterator[str]:
-    """A row in which an attracted finger sets much of the run's energy free."""
     freed = np.where(_column(rows, "electrostatic_force") > 0.0, _lost(rows, "snap"), 0.0) / _energy(rows)
     if freed.max() > SNAPPED:
         worst = int(freed.argmax())
@@ -180,7 +178,6 @@ def _climbed(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
-    """Steps in time that dissipate by themselves."""
     hand = scene.hand is not None and scene.hand.timed
     if not scene.solver.timed and not hand:
         return
@@ -244,7 +241,6 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
 
 
 def _place(model: Model, state: State) -> str:
-    """Position of the bone, its load and the voltage."""
     position, indentation = state.bone[0] + 0.0, model.indentation(state.bone) + 0.0
     load, voltage = -state.reaction[1] + 0.0, state.voltage + 0.0
     return (
@@ -264,7 +260,6 @@ def _may_have_an_energy(scene: Scene) -> bool:
 
 
 def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
-    """Advice for a scene of its kind."""
     pulled = scene.electrics.acts
     finer = "less friction or a finer mesh" if scene.has_friction else "a finer mesh"
     if isinstance(failed, LiftedOff):

@@ -125,7 +125,11 @@ class History:
 
 
 COLUMNS = tuple(spec.name for spec in fields(History))
-INTEGERS = tuple(spec.name for spec in fields(History) if spec.type == "Ints")
+#: what a value of a column is
+KINDS: Mapping[str, type] = {
+    spec.name: {"Words": str, "Ints": int}.get(str(spec.type), float) for spec in fields(History)
+}
+INTEGERS = tuple(name for name, kind in KINDS.items() if kind is int)
 #: columns to which every part of a step adds
 SUMS = tuple(name for name in COLUMNS if name.endswith(("_work", "_dissipation")))
 #: further columns of a finger in three dimensions
@@ -139,13 +143,12 @@ SPATIAL: Mapping[str, Mapping[str, Any]] = {
     "contact_area": column("mm2", "of the convex hull of what touches", "shown"),
     "real_contact_area": column("mm2", "of all that touches", "shown"),
 }
-_ABOUT = {spec.name: spec.metadata for spec in fields(History)}
 #: what is known of each column, of three dimensions too
-ABOUT: Mapping[str, Mapping[str, Any]] = {**_ABOUT, **SPATIAL}
+ABOUT: Mapping[str, Mapping[str, Any]] = {**{spec.name: spec.metadata for spec in fields(History)}, **SPATIAL}
 #: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
-UNITS: Mapping[str, str] = {name: about["unit"] for name, about in _ABOUT.items()}
-WHOLE_UNITS: Mapping[str, str] = {name: about["whole"] for name, about in _ABOUT.items()}
-MEANINGS: Mapping[str, str] = {name: about["meaning"] for name, about in _ABOUT.items()}
+UNITS, WHOLE_UNITS, MEANINGS = (
+    {name: str(ABOUT[name][told]) for name in COLUMNS} for told in ("unit", "whole", "meaning")
+)
 #: columns that a finger in three dimensions leaves empty
 WIDTHS = tuple(name for name in COLUMNS if WHOLE_UNITS[name] == "mm2")
 SPATIAL_UNITS: Mapping[str, str] = {
@@ -228,35 +231,29 @@ def read_rows(text: str) -> list[dict[str, Any]]:
 
 
 def _value_of(name: str, text: str) -> str | int | float:
-    return text if name == "motion" else int(text) if name in INTEGERS else float(text or "nan")
+    kind = KINDS.get(name, float)
+    return kind(text or "nan") if kind is float else kind(text)
 
 
 def _plain_value(name: str, value: Any) -> str | int | float:
-    if name == "motion":
-        return str(value)
-    if name in WIDTHS and np.isnan(value):
-        return ""
-    return int(value) if name in INTEGERS else float(value)
+    return "" if name in WIDTHS and np.isnan(value) else KINDS.get(name, float)(value)
 
 
 def column_of(name: str, values: list[Any]) -> Any:
     """A column from its values in the rows."""
-    if name == "motion":
-        return np.array(values, dtype=str)
-    return np.array(values, dtype=np.int64 if name in INTEGERS else np.float64)
+    return np.array(values, dtype=KINDS.get(name, float))
 
 
-#: column of the history -> its head in the table of forces
+#: column of the history -> its head in the table of forces, its width there, and its decimals
 HEADS = {
-    "position": "position",
-    "indentation": "indent.",
-    "voltage": "voltage",
-    "applied_force": "applied",
-    "normal_force": "normal",
-    "tangential_force": "tangential",
-    "electrostatic_force": "electrost.",
+    "position": ("position", 9, 3),
+    "indentation": ("indent.", 8, 3),
+    "voltage": ("voltage", 8, 0),
+    "applied_force": ("applied", 10, 5),
+    "normal_force": ("normal", 10, 5),
+    "tangential_force": ("tangential", 11, 5),
+    "electrostatic_force": ("electrost.", 11, 5),
 }
-COLUMN_WIDTHS = (9, 8, 8, 10, 10, 11, 11)
 
 
 def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
@@ -270,11 +267,12 @@ def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> st
        1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
     """
     units = UNITS if depth is None and not any("contact_area" in row for row in rows) else WHOLE_UNITS
-    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
+    heads = [head for head, *_ in HEADS.values()]
+    lines = [_line("step", "motion", heads), _line("", "", [units[name] for name in HEADS])]
     for row in (rows[i] for i in chosen(rows, most)):
         row = row if depth is None else over_depth(row, depth)
-        sizes = zip(HEADS, COLUMN_WIDTHS, strict=True)
-        numbers = [_number(float(row[name]), _digits(name), width - 1) for name, width in sizes]
+        sizes = HEADS.items()
+        numbers = [_number(float(row[name]), digits, width - 1) for name, (_, width, digits) in sizes]
         lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
     return "\n".join(line.rstrip() for line in lines)
 
@@ -297,7 +295,8 @@ def chosen(rows: Sequence[Row], most: int) -> list[int]:
 
 
 def _line(step: str, motion: str, values: Sequence[str]) -> str:
-    return f"{step:>4} {motion:<7}" + "".join(f"{v:>{w}}" for v, w in zip(values, COLUMN_WIDTHS, strict=True))
+    columns = zip(values, HEADS.values(), strict=True)
+    return f"{step:>4} {motion:<7}" + "".join(f"{value:>{width}}" for value, (_, width, _) in columns)
 
 
 def _number(value: float, digits: int, width: int) -> str:
@@ -312,7 +311,3 @@ def _number(value: float, digits: int, width: int) -> str:
         if len(text) <= width:
             return text
     return f"{value:.2e}" if width > 8 else f"{value:.0e}"
-
-
-def _digits(name: str) -> int:
-    return {"position": 3, "indentation": 3, "voltage": 0}.get(name, 5)

@@ -14,7 +14,7 @@ from evfem.newton.state import State
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, SubstepWork, tells_source
+from evfem.simulation.works import Books, SubstepWork, source_of
 from evfem.surface.adhesion import ON
 from evfem.surface.pad import Pad, reach, surface_state
 
@@ -84,6 +84,7 @@ class Ledger:
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
         adhesion, kept = self._adhesion(state, withheld)
         real, extent = _extent(model, state, position, contact)
+        source = source_of(model)
         pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
         return {
             "step": step,
@@ -108,7 +109,7 @@ class Ledger:
             **self.sums,
             "stored_energy": end.stored + end.springs,
             "kinetic_energy": end.kinetic,
-            "field_energy": self._field_energy(state),
+            "field_energy": 0.0 if source is None else source.field_energy(model.equilibrium.charged(state)),
         }
 
     def _adhesion(self, state: State, withheld: Floats) -> tuple[Floats, Floats]:
@@ -116,10 +117,13 @@ class Ledger:
         model = self.model
         if model.attraction is None or (adhesive := model.attraction.adhesive) is None:
             return np.zeros(state.bone.size), np.zeros_like(withheld)
-        found = model.equilibrium.adhesion_at(state)
+        electric = model.attraction.electric
+        found = state.attraction  # where nothing else attracts: staggered rounds end within the tolerance
+        if electric is not None and electric.acts(state.voltage):
+            found = model.equilibrium.interface.tilted(state, model.equilibrium.adhesion_at(state))
         own, both = adhesive.restored(ON), model.attraction.restored(state.voltage)
         share = 0.0 if own is None or both is None else own[0] / np.where(both[0] > 0.0, both[0], np.inf)
-        return model.equilibrium.interface.tilted(state, found).sum(axis=0), np.asarray(share * withheld)
+        return found.sum(axis=0), np.asarray(share * withheld)
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
         """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""
@@ -128,18 +132,6 @@ class Ledger:
         courses = self.model.scene.courses[: motion_index + 1]
         slides = [course.direction for course in courses if course.distance]
         return [0, 2], np.array(slides[-1] if slides else (1.0, 0.0))
-
-    def _field_energy(self, state: State) -> float:
-        """Energy of the field where the source's work is told, else 0."""
-        attraction = self.model.attraction
-        if not tells_source(self.model):
-            return 0.0
-        assert attraction is not None
-        assert attraction.charging is not None
-        position = self.model.equilibrium.interface.resting(state)
-        pressing = state.contact_force[:, 0]
-        at = attraction.charged(position, state.voltage, pressing, state.charges)
-        return attraction.charging.field_energy(at)
 
 
 def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
@@ -192,7 +184,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         step=row["step"],
         time=row["time"],
         position=row["position"],
-        displacement=state.u.copy(),
+        displacement=model.body.whole(state.u).copy(),
         gap=on_pad(surface.gap, np.nan),
         contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
         shear_traction=on_pad(_shear(state) / share, 0.0),

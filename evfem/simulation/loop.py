@@ -9,23 +9,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
 from evfem.common import notices
 from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.common.pools import blas_limits, loaded_blas
-from evfem.errors import ABSENT, InputError, StopRun
+from evfem.errors import ABSENT, InputError, NotConverged, StopRun
 from evfem.newton.control import Target
 from evfem.planning.core import Closing
 from evfem.protocols import Observer, TimeSignal
+from evfem.scene.file import scene_at
 from evfem.scene.motion import FORCE, INDENTATION, VOLTAGE, Course, Motion
 from evfem.scene.scene import SIGNALS, Scene
 from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import Request, Run, Start
 from evfem.solver.stepping import Path
+
+#: forces that have an error; those below `FAINT` of the largest have none of their own
+FORCES, FAINT = ("normal_force", "tangential_force", "electrostatic_force"), 1e-3
 
 _PLACE = number("a place in mm between -1000 and 1000", Within(-1000.0, 1000.0), "mm")
 _SECONDS = number("a time in s, not negative, up to 1e6", Within(0.0, 1e6), "s")
@@ -106,6 +113,15 @@ class Loop:
         last, rows = scene.courses[-1:], self._run.rows
         held = any(one.force is not None or one.hold == "force" for one in last)
         self._load: float | None = rows[-1]["applied_force"] if held else None
+        self._true: Loop | None = None
+        self._asked: list[Asked] = []
+
+    def linearised(self) -> Loop:
+        """The same with tissue linear from now on; this one goes on behind it, when its error is read."""
+        loop = copy(self)
+        loop._run, loop._true, loop._reasons = self._run.linearised(), self, self._reasons.copy()
+        self._observers = ()
+        return loop
 
     def step(
         self,
@@ -160,6 +176,8 @@ class Loop:
             self._load = self._run.rows[-1]["applied_force"]
         elif course.indentation is not None:
             self._load = None
+        if self._true is not None:
+            self._asked.append(asked)
         reasons = self._told(frame)
         self._reasons += reasons
         if reasons:
@@ -178,6 +196,26 @@ class Loop:
         self._tell("finished", found)
         return found
 
+    @property
+    def error(self) -> float:
+        """Largest error of a force in any step so far, relative to its largest size; 0 unless linearised.
+
+        Of the normal, the tangential and the electrostatic force. The steps since it was last read are done
+        again without linearisation, which takes as long as that does. Infinite where one of them fails.
+        """
+        if self._true is None:
+            return 0.0
+        try:
+            while self._asked:
+                self._true.step(**vars(self._asked[0]))
+                del self._asked[0]
+        except NotConverged:
+            return math.inf
+        runs = self._run, self._true._run
+        found, true = (np.array([[row[name] for name in FORCES] for row in run.rows]) for run in runs)
+        size = np.abs(true).max(axis=0)
+        return float((np.abs(found - true).max(axis=0) / np.maximum(size, FAINT * size.max())).max())
+
     def __repr__(self) -> str:
         """Number of steps, place and forces."""
         rows = self._run.rows
@@ -190,8 +228,10 @@ class Loop:
     def _check(self, asked: Asked) -> None:
         """Raise InputError for what the scene does not have."""
         scene = self.scene
-        if asked.duration is None and (what := _timed(scene)):
-            raise InputError("duration", ABSENT, f"a time in s, needed with {what}")
+        over_time = isinstance(scene.electrics.voltage, TimeSignal) or scene.electrics.resolved
+        needing = scene.time_needed_by or ("a voltage over time",) * over_time
+        if asked.duration is None and needing:
+            raise InputError("duration", ABSENT, f"a time in s, needed with {' and '.join(needing)}")
         if asked.voltage is None:
             return
         if scene.law is None:
@@ -202,18 +242,17 @@ class Loop:
 
     def _check_course(self, course: Course) -> None:
         """Raise InputError for a step that no motion of the scene could be."""
-        scene, dynamic = self.scene, _dynamic(self.scene)
+        scene, needing = self.scene, " and ".join(self.scene.time_needed_by)
         if course.force == 0.0 and scene.law is None and scene.adhesion is None:
             raise InputError("force", 0.0, "larger than 0 when nothing else pulls the finger down")
-        if course.distance and dynamic and not course.duration:
-            raise InputError("duration", 0.0, f"larger than 0 where the finger moves along, with {dynamic}")
+        if course.distance and needing and not course.duration:
+            raise InputError("duration", 0.0, f"larger than 0 where the finger moves along, with {needing}")
         if not course.angle:
             return
         if self._run.model.mesh.dim == 2:
             raise InputError("position_z", "a way across x", "0 with a finger in the plane")
 
     def _start(self) -> Start:
-        """Where the step starts."""
         run = self._run
         start = run.start_of(len(run.rows))
         if self.scene.hand is not None:
@@ -276,6 +315,8 @@ class Loop:
         run, voltage = self._run, abs(course.voltage or 0.0)
         if voltage <= self._largest:
             return
+        if self._true is not None:
+            raise InputError("voltage", voltage, "at most `largest_voltage` of a loop that is linearised")
         scene = self._moved(self._at_will.and_then(course))
         cored = (Closing(scene, run.model.mesh).core is None) != (run.model.closing.core is None)
         if cored or not run.scene.electrics.acts:
@@ -307,25 +348,10 @@ def _exactly(path: Path, asked: Asked) -> Path:
     return exact
 
 
-def _dynamic(scene: Scene) -> str:
-    """What of a scene resists by the speed, in words; empty if nothing does."""
-    if scene.solver.timed:
-        return f"dynamics = {scene.solver.dynamics}"
-    if scene.hand is not None and scene.hand.timed:
-        return "a hand that has a damping or a mass"
-    return type(scene.friction_law).__name__ if getattr(scene.friction_law, "timed", False) else ""
-
-
-def _timed(scene: Scene) -> str:
-    """What of a scene depends on time, in words; empty if nothing does."""
-    signal = isinstance(scene.electrics.voltage, TimeSignal)
-    over_time = "a voltage over time" if signal or (scene.drive is not None and scene.drive.resolved) else ""
-    return _dynamic(scene) or over_time
-
-
 def loop(
     scene: Scene | str | PathLike[str],
     *,
+    linearised: bool = False,
     observers: Sequence[Observer] = (),
     largest_voltage: float | None = None,
 ) -> Loop:
@@ -335,6 +361,10 @@ def loop(
     ----------
     scene
         A `Scene`, whose `motion` may be empty, or the path of a scene file.
+    linearised
+        The tissue is linear from the end of the scene's motion on, which is quicker; contact, friction and
+        attraction stay exact, and `Loop.error` tells what the forces lack. Not in time, and without forms
+        of one's own.
     observers
         Told as in `simulate`: `started` at once, `step` after every step, `finished` with every
         `Loop.result()`.
@@ -359,8 +389,5 @@ def loop(
     >>> steps.step(indentation=0.1).motion, len(steps.result().rows)
     ('step', 3)
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
-    return Loop(scene, observers, largest_voltage)
+    whole = Loop(scene_at(scene), observers, largest_voltage)
+    return whole.linearised() if linearised else whole

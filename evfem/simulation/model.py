@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,13 +21,13 @@ from evfem.mesh.mesh import Mesh
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface, PenaltyInterface
-from evfem.newton.state import Limits
-from evfem.planning.adhesion import softened
+from evfem.newton.state import Limits, State
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
+from evfem.solver.linearbody import LinearBody
 from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.skin import Skin, make_skin
@@ -104,7 +104,35 @@ def make_model(scene: Scene) -> Model:
     if mesh.dim == 2:
         deepest = max(0.0, *(course.indentation or 0.0 for course in scene.courses))
     limits = Limits(solver.tolerance, solver.strategy, solver.threads, deepest)
-    interface = make_interface(scene, mesh, pad, surface)
+    interface = make_interface(closing, pad, surface, attraction)
+    factorised = FactorisedBody(body, interface, attraction, limits)
+    equilibrium = Equilibrium(factorised, interface, attraction, limits)
+    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, closing)
+
+
+def linearised(model: Model, state: State) -> Model:
+    """The same with its tissue linear about `state`; contact, friction and attraction are as before."""
+    scene, attraction, limits = model.scene, model.attraction, model.equilibrium.body.limits
+    if scene.forms or model.body.dynamics is not None:
+        given = "a form of its own" if scene.forms else f"dynamics = {scene.solver.dynamics}"
+        raise InputError("linearised", f"a scene with {given}", "tissue without forms, at rest")
+    body = LinearBody(model.body, model.pad.nodes, state.u, scene.solver.threads)
+    interface = make_interface(model.closing, model.pad, model.surface, attraction)
+    factorised = FactorisedBody(body, interface, attraction, limits)
+    equilibrium = Equilibrium(factorised, interface, attraction, limits)
+    return replace(model, body=body, equilibrium=equilibrium)
+
+
+def make_interface(
+    closing: Closing, pad: Pad | Skin, surface: Any, attraction: Attraction | None
+) -> Interface:
+    """The contact interface: exact or penalty."""
+    scene, points, solver = closing.scene, closing.mesh.points, closing.scene.solver
+    interface = Interface(pad, points, surface, solver.tolerance)
+    if solver.contact != "exact":
+        interface = PenaltyInterface(pad, points, surface, solver.tolerance)
+        normal = float(solver.penalty_normal or 0.0)
+        interface.penalties = (normal, solver.penalty_tangential or normal)
     if interface.bed is not None and attraction is not None:
         interface.bed.reach = np.inf
     cored = closing.core is not None or scene.adhesion is not None
@@ -112,19 +140,6 @@ def make_model(scene: Scene) -> Model:
         interface.restored = attraction.restored
     if cored or not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
-    factorised = FactorisedBody(body, interface, attraction, limits)
-    equilibrium = Equilibrium(factorised, interface, attraction, limits)
-    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, closing)
-
-
-def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:
-    """The contact interface: exact or penalty."""
-    solver = scene.solver
-    if solver.contact == "exact":
-        return Interface(pad, mesh.points, surface, solver.tolerance)
-    interface = PenaltyInterface(pad, mesh.points, surface, solver.tolerance)
-    normal = float(solver.penalty_normal or 0.0)
-    interface.penalties = (normal, solver.penalty_tangential or normal)
     return interface
 
 
@@ -148,7 +163,7 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
         _check_quadratic(scene)
     law, layers = electrics.attraction
     rough, charging = roughness_of(scene.roughness_gap), None
-    if scene.drive is not None and scene.drive.resolved:
+    if electrics.resolved:
         charging = Charging(electrics.sandwich, pad.nodes.size)
     if closing.core is not None:
         law = closing.core.law
@@ -173,7 +188,7 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
 def with_adhesion(closing: Closing, pad: Any, surface: Any, attraction: Attraction | None) -> WithAdhesion:
     """The attraction of the voltage, if there is one, and the scene's adhesion as the mesh resolves it."""
     scene, rough = closing.scene, roughness_of(closing.scene.roughness_gap)
-    law = softened(closing)
+    law = closing.adhesion
     return WithAdhesion.of(attraction, Attraction(law, None, pad, surface, scene.direction, roughness=rough))
 
 

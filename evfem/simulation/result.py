@@ -27,7 +27,7 @@ from evfem.simulation.history import (
     ABOUT,
     COLUMNS,
     DRIFT,
-    INTEGERS,
+    KINDS,
     NEEDED,
     SHOWN,
     SPATIAL,
@@ -41,6 +41,9 @@ from evfem.simulation.history import (
     columns_of,
     load_drift,
     over_depth,
+)
+from evfem.simulation.history import (
+    INTEGERS as INTEGERS,
 )
 from evfem.simulation.provenance import provenance as provenance
 
@@ -183,7 +186,8 @@ class Result(History):
         """
         if self.in_space or WHOLE in self.provenance:
             return self
-        depth = self._known_depth
+        if (depth := self.depth) is None:
+            raise InputError("depth", ABSENT, "a depth in mm, by Scene(depth=...) or depth in [finger]")
         columns = over_depth({name: self[name] for name in COLUMNS}, depth)
         return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
 
@@ -203,13 +207,6 @@ class Result(History):
         return self.in_space["real_contact_area"] if self.in_space else self.total.real_contact_width
 
     @property
-    def _known_depth(self) -> float:
-        if self.depth is None:
-            allowed = "a depth in mm, by Scene(depth=...) or depth in [finger]"
-            raise InputError("depth", ABSENT, allowed)
-        return self.depth
-
-    @property
     def warnings(self) -> list[str]:
         """Warnings of the run about its numbers, one sentence each."""
         return list(self.provenance.get("warnings", []))
@@ -218,8 +215,10 @@ class Result(History):
         """Sizes, the last row, extremes and costs, in plain numbers ready for JSON."""
         scene = self.provenance.get("scene", {})
         steps = len(self.step)
-        extremes = {}
+        last, extremes = dict[str, Any](), dict[str, float]()
         if steps:
+            last = self.rows[-1]
+            last |= {name: None for name, v in last.items() if isinstance(v, float) and not math.isfinite(v)}
             peaks = (*self._shown[3:], "peak_contact_pressure")
             extremes = {name: float(np.max(np.abs(self[name]))) for name in peaks}
         found = {
@@ -230,7 +229,7 @@ class Result(History):
             "nodes": len(self.mesh.points),
             "cells": len(self.mesh.cells),
             "kind": self.mesh.kind,
-            "last": {name: _json(value) for name, value in self.rows[-1].items()} if steps else {},
+            "last": last,
             "largest": extremes,
             "load_drift": self.load_drift,
             "warnings": self.warnings,
@@ -309,9 +308,8 @@ class Result(History):
 
         Raises InputError where xarray is not installed (the extra `xarray`).
         """
-        about = dict(ABOUT)
         variables: dict[str, Any] = {
-            name: ("step", self[name], {"units": self.units[name], "long_name": about[name]["meaning"]})
+            name: ("step", self[name], {"units": self.units[name], "long_name": ABOUT[name]["meaning"]})
             for name in self.columns[1:]
         }
         for name, shape in _SHAPES.items() if self.frames else ():
@@ -391,23 +389,12 @@ def _probes_from(arrays: Mapping[str, np.ndarray], steps: int) -> dict[str, Any]
 
 
 def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:
-    column = arrays.get(f"history/{name}")
-    if column is not None:
-        return _checked_column(name, column)
-    steps = len(arrays["history/step"])
-    return np.zeros(steps, dtype=np.int64) if name in INTEGERS else np.full(steps, np.nan)
-
-
-def _checked_column(name: str, column: np.ndarray) -> Any:
-    kinds = "U" if name == "motion" else "iu" if name in INTEGERS else "f"
-    if column.ndim != 1 or (column.size and column.dtype.kind not in kinds):
+    kind, column = KINDS.get(name, float), arrays.get(f"history/{name}")
+    if column is None:
+        return np.full(len(arrays["history/step"]), 0 if kind is int else np.nan, dtype=kind)
+    if column.ndim != 1 or (column.size and column.dtype.kind not in {str: "U", int: "iu", float: "f"}[kind]):
         raise ValueError(f"column {name}")
-    return column.astype(str) if name == "motion" else column
-
-
-def _json(value: Any) -> Any:
-    """The value itself, or None for a number that JSON does not know."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return column.astype(str) if kind is str else column
 
 
 @dataclass(frozen=True)

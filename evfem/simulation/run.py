@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -35,8 +36,9 @@ from evfem.newton.control import (
 )
 from evfem.newton.hand import HandControl, at_rest
 from evfem.newton.state import State, StepFailed
-from evfem.planning.pathdependence import allowed_error
+from evfem.planning.resolution import allowed_error
 from evfem.protocols import Observer, TimeSignal
+from evfem.scene.file import scene_at
 from evfem.scene.motion import Course
 from evfem.scene.scene import Scene
 from evfem.simulation.barrier import rise
@@ -52,7 +54,7 @@ from evfem.simulation.checkpoint import (
 )
 from evfem.simulation.doubtful import advice, deepest, doubtful, off, outside, through, unheld
 from evfem.simulation.ledger import Ledger, frame_of
-from evfem.simulation.model import Model, make_model
+from evfem.simulation.model import Model, linearised, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.simulation.works import SubstepWork
 from evfem.solver.stepping import Path, Stepper
@@ -117,10 +119,7 @@ def simulate(
     InputError
         The scene cannot be run.
     """
-    if not isinstance(scene, Scene):
-        from evfem.scene.file import scene_at
-
-        scene = scene_at(scene)
+    scene = scene_at(scene)
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
     # scene's threads are those of the factorisation
     with blas_limits(), notices.shown(progress):
@@ -164,13 +163,9 @@ class Run:
         self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
-        self.stepper = Stepper(
-            self.model.equilibrium,
-            scene.coupling,
-            body=self.model.body,
-            allowed=allowed_error(scene),
-            rise=lambda old, new, target: rise(SubstepWork(self.model, old, new), target),
-        )
+        allowed, body = allowed_error(scene), self.model.body
+        equilibrium = self.model.equilibrium
+        self.stepper = Stepper(equilibrium, scene.coupling, body=body, allowed=allowed, rise=self._rise)
         if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
@@ -189,6 +184,19 @@ class Run:
         if resume is not None:
             self._restore(resume)
 
+    def _rise(self, old: State, new: State, target: Target) -> float:
+        """The climb between two states."""
+        return rise(SubstepWork(self.model, old, new), target)
+
+    def linearised(self) -> Run:
+        """Another run that goes on from here with tissue that is linear about the present state."""
+        run = copy(self)
+        run.model = model = linearised(self.model, self.state)
+        run.ledger = replace(self.ledger, model=model, sums=self.ledger.sums.copy())
+        run.stepper = replace(self.stepper, equilibrium=model.equilibrium, body=model.body, rise=run._rise)
+        run.rows, run.frames, run.probed = self.rows.copy(), self.frames.copy(), self.probed.copy()
+        return run
+
     @property
     def voltage(self) -> Any:
         """The voltage that the run follows."""
@@ -203,14 +211,9 @@ class Run:
             return float(voltage(position))
         return float(voltage(time)) if isinstance(voltage, TimeSignal) else float(voltage)
 
-    def _follows(self, seconds: float) -> bool:
-        """Whether a step of so many seconds follows the scene's voltage on the way."""
-        voltage = self.scene.electrics.voltage
-        return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
-
     def _kept(self, time: float, begin: float) -> KeptCharge | None:
         """Control of the electrode's charge at `time` (s) in a step from `begin`, or None."""
-        voltage = self.scene.electrics.voltage
+        voltage = self.voltage
         if isinstance(voltage, ChargeControl):
             return KeptCharge(NANO * voltage.charge_at(time) / eps_0)
         if isinstance(voltage, OpenCircuit) and begin >= voltage.after:
@@ -240,16 +243,25 @@ class Run:
                 yield Request(first + k, index, motion.kind, path, seconds)
 
     def path(self, course: Course, start: Start, shares: tuple[float, float], seconds: float) -> Path:
-        """The path of the next step, between two `shares` (0 to 1) of a motion that began at `start`."""
-        now = self.time
-        begin = self._target(course, start, shares[0], now)
-        end = self._target(course, start, shares[1], now + seconds)
-        if not self.rows and not self._follows(seconds):
-            # the voltage acts in full; only a first step in parts raises it on the way
-            begin = replace(begin, voltage=GivenVoltage(0.0))
-        if (kept := self._kept(now + seconds, now)) is not None:
-            begin, end = (replace(one, voltage=kept) for one in (begin, end))
-        return self._path(begin, end, now, seconds)
+        """The path of the next step, between two `shares` (0 to 1) of a motion that began at `start`.
+
+        The voltage acts in full from the first step on; only a first step in parts raises it on the way.
+        """
+        now, (begun, reached), voltage = self.time, shares, self.voltage
+        given = isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
+        raised = not self.rows and not given
+
+        def target(done: float, fraction: float) -> Target:
+            time, share = now + fraction * seconds, begun + fraction * (reached - begun)
+            at = self._target(course, start, reached if fraction == 1.0 else share, time)
+            if (kept := self._kept(time, now)) is not None:
+                at = replace(at, voltage=kept)
+            elif raised and fraction < 1.0 and not at.voltage.follows:
+                end = self._target(course, start, reached, now + seconds).voltage
+                at = replace(at, voltage=end if end.free else GivenVoltage(fraction * end.voltage))
+            return replace(at, duration=(fraction - done) * seconds)
+
+        return target
 
     def start_of(self, rows_before: int) -> Start:
         """Where a motion starts: bone, indentation, force, voltage, and whether the finger is loose."""
@@ -298,8 +310,10 @@ class Run:
         along = position_z if bone.size == 3 else None
         if isinstance(self.voltage, FollowForce) and course.distance:
             way = course.direction if bone.size == 3 else (1.0,)
-            drive = self._following(self.voltage, way, (position, position_z))
-        return Target(position, height, drive, z=along, hand=self._hand)
+            wish = float(self.voltage(position * way[0] + sum(way[1:]) * position_z))
+            drive = FollowFriction(wish, self.voltage.largest_voltage, way)
+        hand = None if self.scene.hand is None else HandControl(self.scene.hand)
+        return Target(position, height, drive, z=along, hand=hand)
 
     def _loose(self, course: Course, start: Start, voltage: float, time: float) -> bool:
         """Whether a held force is that of any height: the finger is loose, not attracted at `time` (s)."""
@@ -308,48 +322,6 @@ class Run:
         if isinstance(self.voltage, ChargeControl):
             voltage = self.voltage.charge_at(time)
         return bool(start["loose"]) and voltage == 0.0
-
-    @property
-    def _hand(self) -> HandControl | None:
-        return None if self.scene.hand is None else HandControl(self.scene.hand)
-
-    @staticmethod
-    def _following(
-        wish: FollowForce, way: tuple[float, ...], place: tuple[float, float | None]
-    ) -> FollowFriction:
-        """The wish at a place of the bone (x, z), and in a direction of the display."""
-        along = sum(each * (at or 0.0) for each, at in zip(way, place, strict=False))
-        return FollowFriction(float(wish(along)), wish.largest_voltage, way)
-
-    def _path(self, start: Target, end: Target, begin: float, seconds: float) -> Path:
-        """Linearly from one target, at time `begin`, to the next, with profile, signal or given force."""
-
-        def target(done: float, fraction: float) -> Target:
-            duration = (fraction - done) * seconds
-            if fraction == 1.0:
-                return replace(end, duration=duration)
-            x = start.x + fraction * (end.x - start.x)
-            z = None
-            if start.z is not None and end.z is not None:
-                z = start.z + fraction * (end.z - start.z)
-            height = start.height.towards(end.height, fraction)
-            return Target(x, height, drive(x, z, fraction), duration, z, end.hand)
-
-        def drive(x: float, z: float | None, fraction: float) -> VoltageControl:
-            wanted = self.scene.electrics.voltage
-            if isinstance(end.voltage, KeptCharge):
-                return self._kept(begin + fraction * seconds, begin) or end.voltage
-            if isinstance(wanted, FollowForce) and isinstance(end.voltage, FollowFriction):
-                return self._following(wanted, end.voltage.way, (x, z))
-            if isinstance(end.voltage, GivenGap):
-                gap = start.voltage.gap if isinstance(start.voltage, GivenGap) else end.voltage.gap
-                return GivenGap(gap + fraction * (end.voltage.gap - gap))
-            if self._follows(seconds):
-                return GivenVoltage(self.voltage_at(x, begin + fraction * seconds))
-            first, last = start.voltage.voltage, end.voltage.voltage
-            return GivenVoltage(first + fraction * (last - first))
-
-        return target
 
     # -- one requested step
 
@@ -375,7 +347,7 @@ class Run:
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if self.probes is not None:
-            self.probed.append(self.probes.at(self.state.u, self.state.inner))
+            self.probed.append(self.probes.at(self.model.body.whole(self.state.u), self.state.inner))
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
@@ -431,7 +403,7 @@ class Run:
     def _restore(self, saved: Saved) -> None:
         arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
         self.state = state_of(arrays)
-        self.model.equilibrium.body.resume(self.state, reusable_of(arrays))
+        self.model.equilibrium.body.resume(reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows, self.probed = list(saved.rows), list(arrays.get(PROBES, ()))

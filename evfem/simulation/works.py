@@ -86,7 +86,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.quadrature import ENDS, FINE_SHARE, FINE_WAY, LEGENDRE, PART, SEEN, SHARE, SLIDE, WAY
 from evfem.contact.attraction import Attraction
-from evfem.contact.charging import Charging, Flow
+from evfem.contact.charging import Charging
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
@@ -110,6 +110,11 @@ class Books:
     springs: float
     kinetic: float
 
+    @property
+    def energy(self) -> float:
+        """All of it."""
+        return self.stored + self.springs + self.kinetic
+
     @classmethod
     def nothing(cls, shape: tuple[int, ...]) -> Books:
         """Before the first part, displacements of this shape."""
@@ -117,12 +122,10 @@ class Books:
         return cls(none, none, 0.0, 0.0, 0.0)
 
 
-def tells_source(model: Model) -> bool:
-    """Whether the source's work is computed: for a voltage resolved in time and Strong and Troxel's law."""
-    attraction = model.attraction
-    if attraction is None or attraction.charging is None:
-        return False
-    return bool(getattr(attraction.law, "of_a_field", False))
+def source_of(model: Model) -> Charging | None:
+    """The charges whose source's work is known: of a voltage resolved in time and Strong and Troxel's law."""
+    known = model.attraction is not None and getattr(model.attraction.law, "of_a_field", False)
+    return model.attraction.charging if model.attraction is not None and known else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,28 +151,24 @@ class SubstepWork:
     def works(self, begin: Books, end: Books) -> dict[str, float]:
         """Contributions of the part to `SUMS`, N mm per mm of depth."""
         old, new, body = self.old, self.new, self.model.body
-        moved = new.u - old.u
-        given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
+        moved, turned = new.u - old.u, self._turned()
+        given = _mean_work(old.reaction, new.reaction, new.bone - old.bone) + turned
         given -= _mean_work(begin.given, end.given, moved)
-        given += (turned := self._turned())
         (electrostatic, adhesive), friction = self.pulled(), self.friction()
-        pulled = electrostatic + adhesive
         viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
-        lost = _mean_work(begin.forces, end.forces, moved) - viscous
-        lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
-        lost -= self._contact() + friction
-        lost += turned + pulled - _mean_work(old.attraction, new.attraction, self.way) + self._sunk()
+        lost = turned + electrostatic + adhesive - friction
         if (hand := self.model.scene.hand) is not None:
-            more, damped = hand.given(old, new), hand.dissipation(old, new, self._seconds)
-            given, viscous, lost = given + more, viscous + damped, lost + more - damped
-        drag = body.drag_dissipation(new.u)
-        lost -= drag
+            driven = hand.given(old, new)
+            given, lost = given + driven, lost + driven
+            viscous += hand.dissipation(old, new, self._seconds)
+        lost += _mean_work(begin.forces, end.forces, moved) - (end.energy - begin.energy) - viscous
+        lost -= _mean_work(*self._on_surface, moved[self.model.pad.nodes])
+        lost -= (drag := body.drag_dissipation(new.u))
         snap = drag + lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost))
         snapped = (0.0, drag + lost) if snap else (drag + lost, 0.0)
-        flow, stretched = Flow(0.0, 0.0), 0.0
-        if tells_source(self.model):
-            flow, stretched = self._flow(), self._stretching()
-        source = (flow.source_work, flow.leakage, stretched)
+        source = (0.0, 0.0, 0.0)
+        if (charging := source_of(self.model)) is not None:
+            source = (*self._flow(charging), self._stretching(charging))
         added = (given, electrostatic, adhesive, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
 
@@ -246,43 +245,35 @@ class SubstepWork:
     @contextmanager
     def charges_held(self) -> Iterator[None]:
         """Within, the charges are those of the end."""
-        attraction, new = self.model.attraction, self.new
+        attraction = self.model.attraction
         if attraction is None or (charging := attraction.charging) is None:
             yield
             return
         begin, seconds = charging.old, charging.seconds
-        position = self.model.equilibrium.interface.resting(new)
-        charging.begin(attraction.charged(position, new.voltage, new.contact_force[:, 0], new.charges), 0.0)
+        charging.begin(self.model.equilibrium.charged(self.new), 0.0)
         try:
             yield
         finally:
             charging.begin(begin, seconds)
 
-    def _flow(self) -> Flow:
+    def _flow(self, charging: Charging) -> tuple[float, float]:
         """Work of the source and leakage; the first voltage is raised before anything moves."""
-        attraction, new = self.model.attraction, self.new
-        assert attraction is not None
-        assert attraction.charging is not None
-        charging = attraction.charging
-        position = self.model.equilibrium.interface.resting(new)
-        flow = charging.flow(attraction.charged(position, new.voltage, new.contact_force[:, 0], new.charges))
-        if self.old.voltage == charging.old.voltage:
-            return flow
-        return Flow(flow.source_work + charging.field_energy(charging.old), flow.leakage)
+        flow = charging.flow(self.model.equilibrium.charged(self.new))
+        raised = self.old.voltage != charging.old.voltage
+        return flow.source_work + (charging.field_energy(charging.old) if raised else 0.0), flow.leakage
 
-    def _stretching(self) -> float:
+    def _stretching(self, charging: Charging) -> float:
         """Work of the field on the tributary lengths on the way of `_work_of_charged`."""
-        attraction = self.model.attraction
+        attraction, interface = self.model.attraction, self.model.equilibrium.interface
         assert attraction is not None
-        assert attraction.charging is not None
-        charging = attraction.charging
-        begin, end = (self.model.equilibrium.interface.resting(state) for state in (self.old, self.new))
-        grown = attraction.pad.tributary(end) - attraction.pad.tributary(begin)
+        begin, end = (interface.resting(state) for state in (self.old, self.new))
+        lengths = attraction.pad.tributary
+        grown = lengths(end) - lengths(begin)
         pressed = self.old.contact_force[:, 0], self.new.contact_force[:, 0]
         work = 0.0
         for way, share in zip(WAY, SHARE, strict=True):
             position, pressing = begin + way * (end - begin), pressed[0] + way * (pressed[1] - pressed[0])
-            carried = charging.carried(attraction.pad.tributary(position))
+            carried = charging.carried(lengths(position))
             at = attraction.charged(position, charging.old.voltage, pressing, carried)
             work += share * float(charging.energy_density(at) @ grown)
         return work
@@ -308,7 +299,7 @@ class SubstepWork:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
         places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
         pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
-        forces = attraction.way_forces(places, volts, old.touching, pressing)
+        forces = attraction.column_law.forces_along(places, volts, old.touching, pressing)
         return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:
@@ -328,11 +319,13 @@ class SubstepWork:
         """Ways (P,) along an elastic surface, as long as it is stretched."""
         if not self.new.strain.size:
             return length
-        return np.asarray(length * (1.0 - 0.5 * (self.old.strain + self.new.strain)[:, 0]))
+        way = self.places[1] - self.places[0]
+        along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        stretch = 0.5 * (self.old.strain + self.new.strain)[:, :, ::2]
+        return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
     @property
     def _seconds(self) -> float:
-        """Of this part."""
         return float(self.model.equilibrium.interface.duration)
 
     @cached_property
@@ -358,16 +351,10 @@ class SubstepWork:
 
     @property
     def _on_surface(self) -> tuple[Floats, Floats]:
-        """Forces between finger and surface (P, dim) before and after."""
+        """Forces of contact and attraction (P, dim) before and after."""
         contact = self.model.equilibrium.interface.contact_forces
         before, after = (contact(state) + state.attraction for state in (self.old, self.new))
         return before, after
-
-    def _sunk(self) -> float:
-        """Trapezoidal work of the forces on what an elastic surface gives way by."""
-        if not self.new.given.size:
-            return 0.0
-        return _mean_work(*self._on_surface, self.new.given - self.old.given)
 
     @cached_property
     def compliance(self) -> Floats:
@@ -398,12 +385,6 @@ class SubstepWork:
     def _coefficient(self, place: Floats) -> Floats:
         """Friction coefficient of the pad nodes (P,) at the places (P, d)."""
         return self.model.equilibrium.interface.friction(self.old, np.arange(len(place)), place)
-
-    def _contact(self) -> float:
-        """Trapezoidal work of the contact forces, N mm per mm of depth."""
-        equilibrium = self.model.equilibrium
-        before, after = (equilibrium.interface.contact_forces(state) for state in (self.old, self.new))
-        return _mean_work(before, after, self.way)
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
         """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
@@ -443,5 +424,4 @@ class SubstepWork:
 
 
 def _mean_work(before: Floats, after: Floats, moved: Floats) -> float:
-    """Work of the mean of two forces."""
     return float(0.5 * np.sum((before + after) * moved))

@@ -1,7 +1,8 @@
 r"""From a lost equilibrium to the next one: the body is released from where it is, and held back only
 by drag.
 
-Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of the part held::
+Algorithm (`Relaxation.follow`), pseudo-transient continuation ([4] of `evfem.solver`) with the loads of the
+part held::
 
     rate <- 1
     repeat, at most `DRAG_STEPS` times
@@ -28,9 +29,6 @@ friction on slopes may go round in circles until the steps are used up.
 
 A prescribed friction force is not followed during a release, where drag would be part of it: the
 voltage stays as it is until the end.
-
-Source: C. T. Kelley and D. E. Keyes, SIAM J. Numer. Anal. 35 (1998) 508,
-doi:10.1137/S0036142996304796 (pseudo-transient continuation).
 """
 
 from __future__ import annotations

@@ -1,24 +1,13 @@
-"""Adaptive steps: a requested step is reached exactly, in as many substeps as its equilibria need.
-
-Algorithm (`Stepper.follow`)::
-
-    substep <- the one that worked last
-    repeat until the end of the path
-        solve one equilibrium at `done + substep`
-        if it failed: halve the substep; from `RELEASED` of a step on, release the body, which comes to
-            rest at another equilibrium (`evfem.solver.relaxation`); if it does not, halve on, and fail
-            at the strategy's smallest
-        else: accept; if it took few iterations, the next substep is longer
+"""Adaptive steps: a requested step is reached exactly, in as many parts as its equilibria need (1. of
+`evfem.solver`).
 
 A body that is released from the begin of a long part lags the loads of its end by all of it, and its edge
-peels on the way: so the part is halved first.
+peels on the way: so the part is halved first. After a release the step goes on with the part that worked
+before; its next release comes at a part `COARSER` times as long, so that a step in which the finger snaps
+again and again comes to its end.
 
 Where the error of the path is limited, a part is solved as two halves and accepted if one whole part
 ends close enough to them; its length follows that error (`evfem.solver.path`).
-
-Nothing that has not converged is kept. After a release the step goes on with the substep that worked
-before; its next release comes at a part `COARSER` times as long, so that a step in which the finger
-snaps again and again comes to its end.
 
 Staggered rounds have the same equilibria as the monolithic coupling, but may not converge to them: the
 attraction of one round, held, can pull a node down the slope of a texture. If they do not settle, the
@@ -39,7 +28,7 @@ from evfem.newton.control import ConstrainedVoltage, Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.newton.strategy import stuck
-from evfem.solver.hold import Hold
+from evfem.solver.hold import held
 from evfem.solver.path import length_factor, relative_difference
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.tissue.body import Body
@@ -65,15 +54,6 @@ class Accounts(Protocol):
 
     def back(self, mark: Any) -> None:
         """Discards the substeps accepted since `mark`."""
-
-
-@dataclass(frozen=True)
-class Substep:
-    """A fraction of a step, from `begin` to `end` (0 to 1), and the target there."""
-
-    begin: float
-    end: float
-    target: Target
 
 
 @dataclass
@@ -131,8 +111,9 @@ class Stepper:
             try:
                 parts, error = self._part(state, path, done, fraction)
             except StepFailed as failed:
-                part = Substep(done, fraction, path(done, fraction))
-                rest = self._shortened(state, part, accounts, failed)
+                left, target = 1.0 - done, path(done, fraction)
+                self.substep = 0.5 * (fraction - done)
+                rest = self._shortened(state, target, left, accounts, failed)
                 if rest is not None:
                     state, done, substeps = rest, fraction, substeps + 1
                 continue
@@ -151,23 +132,24 @@ class Stepper:
             done = fraction
         return state, substeps
 
-    def _shortened(self, state: State, part: Substep, accounts: Accounts, failed: StepFailed) -> State | None:
-        """Halve the part that failed, or release the body at one that is short enough: its rest is
-        returned, and the part that worked before is tried next. Raises `failed` at the smallest part
-        of what was left of the step, or `LiftedOff`.
+    def _shortened(
+        self, state: State, target: Target, left: float, accounts: Accounts, failed: StepFailed
+    ) -> State | None:
+        """Go on with half of the part that failed, or release the body where that is short enough: its rest
+        is returned, and the part that worked before is tried next. Raises `failed` at the smallest part of
+        what was `left` of the step, or `LiftedOff`.
         """
-        release, least = self._release, self._least(part.target)
+        release, half, least = self._release, self.substep, self._least(target) * left
         self.cuts += 1
         release.unstable = failed.unstable = release.unstable or failed.unstable
-        self.substep = half = 0.5 * (part.end - part.begin)
         if half >= release.least:
             return None
-        rest = self._released(state, part.target, accounts, failed)
+        rest = self._released(state, target, accounts, failed)
         if rest is None:
-            if half < least * (1.0 - part.begin):
-                self._refuse_flight(state, part.target, failed)
+            if half < least:
+                self._refuse_flight(state, target, failed)
                 raise failed
-            self.substep, release.least = half, least * (1.0 - part.begin)
+            self.substep, release.least = half, least
             return None
         self.substep, release.unstable = min(1.0, max(release.trusted, release.least)), False
         release.least *= COARSER
@@ -213,7 +195,6 @@ class Stepper:
             self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
 
     def _relaxation(self, body: Body) -> Relaxation:
-        """The release of `body`."""
         attraction = self.equilibrium.attraction
         return Relaxation(body, self.solve, attraction is not None and attraction.charging is not None)
 
@@ -273,7 +254,7 @@ class Stepper:
             return new
         if self.body is None or timed or self.releasing:
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
-        new = Hold(self.body, self._reached, self.equilibrium.strategy.hold).follow(state, target)
+        new = held(self.body, self._reached, self.equilibrium.strategy.hold, state, target)
         self.held += 1
         return new
 
@@ -296,13 +277,9 @@ class Stepper:
         attraction = self.equilibrium.attraction
         if attraction is None or attraction.charging is None:
             return self._coupled(state, target, start)
-        interface = self.equilibrium.interface
-        pressing = state.contact_force[:, 0]
-        old = attraction.charged(interface.resting(state), state.voltage, pressing, state.charges)
-        attraction.charging.begin(old, target.duration)
+        attraction.charging.begin(self.equilibrium.charged(state), target.duration)
         new = self._coupled(state, target, start)
-        end = attraction.charged(interface.resting(new), new.voltage, new.contact_force[:, 0])
-        return replace(new, charges=end.charges)
+        return replace(new, charges=self.equilibrium.charged(new, kept=False).charges)
 
     def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Key, keys_of
-from evfem.common.tables import csv_text
+from evfem.common.checks import Key, choice, keys_of
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.electrostatics.signalfile import write_signal
-from evfem.errors import InputError
 from evfem.estimate.display import Device, Rendering, playback, render, render_exact, spectrum_of
-from evfem.estimate.estimate import estimate
-from evfem.estimate.touch import FrictionCurve, touch_scene
+from evfem.estimate.estimate import Estimate, estimate
+from evfem.estimate.touch import touch_scene
 from evfem.scene.file import dump
 from evfem.scene.keys import read
 from evfem.studio.state import State, rows
@@ -40,9 +38,7 @@ LOST = 0.02
 
 
 def with_choices(content: bytes) -> bytes:
-    """The page with what there is to choose from: force laws without parameters, insulators, and the
-    options of importers.
-    """
+    """The page with force laws without parameters, insulators and options of importers to choose from."""
     laws = {name: name for name, law in FORCE_LAWS.items() if not any(key.required for key in keys_of(law))}
     insulators = {name: f"{name}, {1e3 * one.thickness:g} um" for name, one in INSULATORS.items()}
     options = {key.name: key for one in IMPORTERS.values() for key in keys_of(one) if key.name != "name"}
@@ -73,14 +69,19 @@ def _control(key: Key) -> str:
 
 def answer(state: State) -> dict[str, Any]:
     """Profile, friction with its band, voltage, spectrum, numbers and warnings of a state."""
-    curve, notes = _curve(state)
-    found = _rendering(state, curve)
+    found, notes = _rendered(state)
+    curve = found.curve
     x = np.linspace(0.0, min(state.touch.length, float(curve.x[-1])), POINTS)
     voltage = np.asarray(found.signal.profile(x))
     heights = np.interp(x, *state.texture.over(0.0, float(x[-1])))
     wish, felt = (np.interp(x, found.curve.x, one) for one in (found.curve.friction, found.felt))
     frequency, wished = spectrum_of(x, wish, state.touch.speed)
     given = spectrum_of(x, felt, state.touch.speed)[1]
+    layers = state.device.encoding.layers
+    lost = {
+        "is slipperier than the display: it cannot be rendered": found.signal.share_not_renderable,
+        "is too fast for the amplifier": found.signal.share_limited,
+    }
     return {
         "quantity": state.texture.quantity,
         "x": _short(x),
@@ -95,26 +96,24 @@ def answer(state: State) -> dict[str, Any]:
         "frequency": _short(frequency),
         "wish": _short(wished),
         "given": _short(given),
-        "numbers": _numbers(found) | {"laws": _ratio_of_laws(state)},
+        "numbers": _numbers(found) | {"laws": float(layers.thickness / layers.reduced)},
         "bands": [[None if value != value else round(value, 6) for value in band] for band in found.bands],
-        "notes": [*notes, *_warnings(found)],
+        "notes": [
+            *notes,
+            *(f"{share:.0%} of the slide {text}" for text, share in lost.items() if share > LOST),
+        ],
         "texture": repr(state.texture),
         "licence": state.texture.licence,
         "provenance": list(state.texture.provenance),
     }
 
 
-def _curve(state: State) -> tuple[FrictionCurve, tuple[str, ...]]:
-    if state.model is not None:
-        return state.model, ()
-    found = estimate(state.texture, state.touch)
-    return found.curve, found.notes
-
-
-def _rendering(state: State, curve: FrictionCurve) -> Rendering:
+def _rendered(state: State) -> tuple[Rendering, tuple[str, ...]]:
+    """The rendering of the model's friction curve, or else of the estimated one, and notes on that."""
+    found = estimate(state.texture, state.touch) if state.model is None else Estimate(state.model, ())
     if state.exact is not None:
-        return render_exact(curve, state.exact, state.touch, state.device)
-    return render(curve, state.touch, state.device)
+        return render_exact(found.curve, state.exact, state.touch, state.device), found.notes
+    return render(found.curve, state.touch, state.device), found.notes
 
 
 def _numbers(found: Rendering) -> dict[str, float | None]:
@@ -132,37 +131,19 @@ def _numbers(found: Rendering) -> dict[str, float | None]:
     return {name: None if value != value else value for name, value in told.items()}
 
 
-def _ratio_of_laws(state: State) -> float:
-    """How many times as hard as Kaczmarek's law Strong and Troxel's attracts touching skin."""
-    layers = state.device.encoding.layers
-    return float(layers.thickness / layers.reduced)
-
-
-def _warnings(found: Rendering) -> list[str]:
-    notes = []
-    if found.signal.share_not_renderable > LOST:
-        share = found.signal.share_not_renderable
-        notes.append(f"{share:.0%} of the slide is slipperier than the display: it cannot be rendered")
-    if found.signal.share_limited > LOST:
-        notes.append(f"the amplifier cannot follow on {found.signal.share_limited:.0%} of the slide")
-    return notes
-
-
 def _short(values: Floats) -> list[float]:
     return [float(f"{value:.5g}") for value in values]
 
 
 def file(state: State, kind: str) -> bytes:
     """The file of a button, as bytes."""
-    if kind not in FILES:
-        raise InputError("file", repr(kind), ", ".join(FILES))
+    choice("file", kind, FILES)
     if kind == "toml":
         return dump(touch_scene(state.texture, state.touch)).encode()
-    curve, _ = _curve(state)
+    found, _ = _rendered(state)
     if kind == "friction":
-        both = zip(curve.x.tolist(), curve.friction.tolist(), strict=True)
-        return csv_text([["x", "friction"], *both]).encode()
-    profile = _rendering(state, curve).signal.profile
+        return found.curve.rows().encode()
+    profile = found.signal.profile
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"file.{kind}"
         write_signal(path, profile, playback(profile, state.touch, state.device))
@@ -170,9 +151,7 @@ def file(state: State, kind: str) -> bytes:
 
 
 def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
-    """The texture in an uploaded file, as the page keeps it; `options` are those of the importers, and
-    `mean` and `rms` of the friction of a recording.
-    """
+    """The texture in an uploaded file as the page keeps it; `options` are an importer's, `mean` and `rms`."""
     safe = "".join(c for c in Path(name).name if c.isalnum() or c in "._- ")[-80:] or "file"
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / safe

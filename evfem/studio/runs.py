@@ -13,7 +13,7 @@ import os
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -31,35 +31,23 @@ _PLACES = threading.BoundedSemaphore(MOST_RUNS)
 
 
 def run(text: str, exact: bool, send: Callable[[dict[str, Any]], None]) -> None:
-    """Run the model for a state, and find the `exact` voltage of its display if that is wanted;
-    `send` what is said until it ends or `send` raises OSError.
-    """
+    """Run the model for a state, and find the `exact` voltage; `send` lines until that raises OSError."""
     parse(text)
-    with _place():
-        worker = Worker(_work, text, exact)
-        try:
-            ended = False  # signs of life may follow the last line while the process goes
-            with suppress(EOFError):
-                while True:
-                    line = worker.line.recv() if worker.line.poll(EVERY) else {"alive": True}
-                    ended = ended or not LAST.isdisjoint(line)
-                    send(line)
-            if not ended:
-                send({"error": "the run ended without a result; perhaps the memory was not enough"})
-        finally:
-            worker.end()
-
-
-@contextmanager
-def _place() -> Iterator[None]:
     if not _PLACES.acquire(blocking=False):
-        raise InputError(
-            "run", f"one more beside {MOST_RUNS}", f"{MOST_RUNS} at a time: wait until one has ended"
-        )
-    try:
-        yield
-    finally:
-        _PLACES.release()
+        allowed = f"{MOST_RUNS} at a time: wait until one has ended"
+        raise InputError("run", f"one more beside {MOST_RUNS}", allowed)
+    with ExitStack() as stack:
+        stack.callback(_PLACES.release)
+        worker = Worker(_work, text, exact)
+        stack.callback(worker.end)
+        ended = False  # signs of life may follow the last line while the process goes
+        with suppress(EOFError):
+            while True:
+                line = worker.line.recv() if worker.line.poll(EVERY) else {"alive": True}
+                ended = ended or not LAST.isdisjoint(line)
+                send(line)
+        if not ended:
+            send({"error": "the run ended without a result; perhaps the memory was not enough"})
 
 
 class _Steps:
@@ -79,7 +67,6 @@ class _Steps:
 
 
 def _work(line: Connection, text: str, exact: bool) -> None:
-    """In the process: run, and send what is found."""
     os.environ["MPLBACKEND"] = "agg"
     try:
         for found in _found(parse(text), exact, _Steps(line.send)):
@@ -89,7 +76,6 @@ def _work(line: Connection, text: str, exact: bool) -> None:
 
 
 def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, Any]]:
-    """The friction curve, then the exact voltage or the pictures."""
     from evfem.estimate.display import exact_voltage
     from evfem.estimate.rendering import record
     from evfem.estimate.touch import friction_of, from_texture, touch_scene
@@ -101,12 +87,8 @@ def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, 
     yield {"curve": {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}}
     if exact:
         found = exact_voltage(reference, state.device)[0]
-        columns = {
-            "x": found.x.round(6),
-            "voltage": found.voltage.round(4),
-            "friction": found.friction.round(7),
-        }
-        yield {"exact": {name: column.tolist() for name, column in columns.items()}}
+        digits = {"x": 6, "voltage": 4, "friction": 7}
+        yield {"exact": {name: getattr(found, name).round(n).tolist() for name, n in digits.items()}}
     else:
         shown = from_texture(reference.result)
         yield {"picture": _picture(shown)}
@@ -115,12 +97,11 @@ def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, 
 
 def _picture(result: Any) -> str:
     """The deformed pad near its contact as a PNG in base 64."""
-    from evfem.plotting.figures import whole_figure
     from evfem.plotting.finger import deformed
 
-    axes = deformed(result, near="contact")
+    figure: Any = deformed(result, near="contact").figure
     buffer = io.BytesIO()
-    whole_figure(axes).savefig(buffer, format="png", dpi=110)
+    figure.savefig(buffer, format="png", dpi=110)
     return base64.b64encode(buffer.getvalue()).decode()
 
 

@@ -19,10 +19,11 @@ from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 from evfem.common.checks import real
-from evfem.errors import EvfemError, InputError, StorageError
+from evfem.common.storage import disk
+from evfem.errors import EvfemError, InputError
 from evfem.studio import page, runs
 from evfem.studio.state import parse
-from evfem.textures.library import about, names, reference
+from evfem.textures.library import about, names
 
 ADDRESS = "127.0.0.1"
 #: bytes of a state and of an upload
@@ -61,10 +62,8 @@ class Studio(ThreadingHTTPServer):
     def __init__(self, port: int = 0) -> None:
         allowed = "a port from 0 (any that is free) to 65535"
         number = int(real("port", port, allowed, lambda p: 0 <= p <= 65535 and p == int(p)))
-        try:
+        with disk(f"use port {number}"):
             super().__init__((ADDRESS, number), Handler)
-        except OSError as error:
-            raise StorageError(f"cannot use port {number}: {error.strerror or error}") from error
 
     @property
     def url(self) -> str:
@@ -89,11 +88,9 @@ class Handler(BaseHTTPRequestHandler):
         """Nothing is logged."""
 
     def do_GET(self) -> None:
-        """The page and its parts."""
         self._answered(self._get)
 
     def do_POST(self) -> None:
-        """Requests of the page."""
         self._answered(self._post)
 
     def _answered(self, what: Callable[[], None]) -> None:
@@ -103,11 +100,10 @@ class Handler(BaseHTTPRequestHandler):
             what()
         except Refused as error:
             self.close_connection = True  # whatever else it sent is not read
-            self._error(error.status, str(error))
-        except InputError as error:
-            self._error(HTTPStatus.BAD_REQUEST, str(error))
+            self._say({"error": str(error)}, error.status)
         except EvfemError as error:
-            self._error(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
+            wrong, failed = HTTPStatus.BAD_REQUEST, HTTPStatus.INTERNAL_SERVER_ERROR
+            self._say({"error": str(error)}, wrong if isinstance(error, InputError) else failed)
 
     def _check_sender(self) -> None:
         port = self.server.server_address[1]
@@ -123,7 +119,7 @@ class Handler(BaseHTTPRequestHandler):
     def _get(self) -> None:
         path = urlsplit(self.path).path
         if path == "/library":
-            self._send(page.text(_library()), "application/json")
+            self._say([{"name": name, "about": about(name)} for name in names()])
         elif path in ASSETS:
             name, kind = ASSETS[path]
             content = (Path(__file__).parent / "assets" / name).read_bytes()
@@ -135,13 +131,13 @@ class Handler(BaseHTTPRequestHandler):
         path, query = urlsplit(self.path).path, dict(parse_qsl(urlsplit(self.path).query))
         body = self._body(MOST_UPLOAD if path == "/upload" else MOST_STATE)
         if path == "/answer":
-            self._send(page.text(page.answer(parse(body))), "application/json")
+            self._say(page.answer(parse(body)))
         elif path == "/upload":
-            self._send(page.text(page.uploaded(body, query.pop("name", ""), query)), "application/json")
+            self._say(page.uploaded(body, query.pop("name", ""), query))
         elif path == "/file":
             kind = query.get("kind", "")
-            data = page.file(parse(body), kind)
-            self._send(data, page.FILES[kind][1], page.FILES[kind][0])
+            data, (name, media) = page.file(parse(body), kind), page.FILES[kind]
+            self._send(data, media, name)
         elif path == "/run":
             self._stream(body.decode("utf-8", "replace"), query.get("encoding") == "exact")
         else:
@@ -173,7 +169,7 @@ class Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         runs.run(state, exact, send)
 
-    def _head(self, status: HTTPStatus, kind: str, length: int | None) -> None:
+    def _head(self, status: int, kind: str, length: int | None) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
         for name, value in HEADERS.items():
@@ -183,22 +179,15 @@ class Handler(BaseHTTPRequestHandler):
         if length is not None:
             self.send_header("Content-Length", str(length))
 
-    def _send(self, data: bytes, kind: str, name: str | None = None) -> None:
-        self._head(HTTPStatus.OK, kind, len(data))
+    def _send(self, data: bytes, kind: str, name: str | None = None, status: int = HTTPStatus.OK) -> None:
+        self._head(status, kind, len(data))
         if name is not None:
             self.send_header("Content-Disposition", f'attachment; filename="{name}"')
         self.end_headers()
         self.wfile.write(data)
 
-    def _error(self, status: HTTPStatus, sentence: str) -> None:
-        data = page.text({"error": sentence})
-        self._head(status, "application/json", len(data))
-        self.end_headers()
-        self.wfile.write(data)
-
-
-def _library() -> list[dict[str, str]]:
-    return [{"name": name, "about": about(name), "kind": reference(name).kind} for name in names()]
+    def _say(self, told: Any, status: int = HTTPStatus.OK) -> None:
+        self._send(page.text(told), "application/json", status=status)
 
 
 def warm() -> None:

@@ -75,10 +75,7 @@ def _table(key: str, given: Any, keys: tuple[str, ...]) -> Mapping[str, Any]:
 def _texture(given: Any) -> Texture:
     """A reference texture, one by three knobs, or one by its rows."""
     if isinstance(given, dict) and "reference" in given:
-        name = _table("texture", given, ("reference",))["reference"]
-        if not isinstance(name, str):
-            raise InputError("texture", quoted(name), "the name of a reference texture")
-        return reference(name)
+        return reference(_table("texture", given, ("reference",))["reference"])
     if isinstance(given, dict) and "generator" in given:
         return make(given["generator"], read(Knobs, given, "texture", tag="generator"), "dialled")
     table = _table("texture", given, ROWS)
@@ -98,16 +95,8 @@ def rows(texture: Texture) -> dict[str, Any]:
         few = np.linspace(x[0], x[-1], MOST_ROWS)
         x, values = few, np.interp(few, x, values)
         notes.append(f"{MOST_ROWS} of {texture.x.size} rows kept by the studio.")
-    return {
-        "name": texture.name,
-        "kind": texture.kind,
-        "x": np.round(x, 6).tolist(),
-        "values": np.round(values, 8).tolist(),
-        "licence": texture.licence,
-        "quantity": texture.quantity,
-        "period": texture.period,
-        "provenance": notes,
-    }
+    numbers = {"x": np.round(x, 6).tolist(), "values": np.round(values, 8).tolist()}
+    return {name: getattr(texture, name) for name in ROWS} | numbers | {"provenance": notes}
 
 
 def _curve(key: str, state: Mapping[str, Any], names: tuple[str, ...], kind: Callable[..., Any]) -> Any:

@@ -17,8 +17,8 @@ In space that are kernels of the distance x, which fall off exponentially. Their
 :math:`-2\ln|x|/(\pi E^*)` and :math:`\mathrm{sgn}(x)(1-2\nu)/(4\mu)` with those of the top layer, are known;
 what is left is smooth and tabulated once (`Kernels`). Forces act on strips of given lengths, and
 displacements are means over the strips: second differences of the kernel's second integral. That makes
-the compliance symmetric and positive, as Galerkin's method does. A strip shorter than the table resolves
-takes the mean of the kernel's quadratic instead.
+the compliance symmetric and positive, as Galerkin's method does. Strips far apart take
+the mean of the kernel's quadratic instead.
 
 Sources: K. L. Johnson, Contact Mechanics (1985), doi:10.1017/CBO9781139171731, ch. 2 and 5.8 (half-plane and
 layer). Units: mm, N, MPa; compliances are mm per N/mm.
@@ -36,6 +36,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, number, set_frozen
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
+from evfem.surface.patches import Patches
 
 #: the table of a kernel: so many distances, up to so many lengths over which it falls off
 TABULATED, FARTHEST = 1500, 36.0
@@ -43,9 +44,11 @@ TABULATED, FARTHEST = 1500, 36.0
 SPREAD = 8.0
 #: largest wavenumber (over the top thickness) and layers of it that one exponential resolves
 HIGHEST, RESOLVED = 45.0, 2.0
-#: strips shorter than this share of the top thickness take the kernel's quadratic, and far ones whose
-#: length is this share of their distance
-SHORT, FAR = 0.02, 0.01
+#: strips take the kernel's quadratic that are shorter than these shares of the top thickness and of their
+#: distance: errors of 1e-5 of a strip's own kernel
+SHORT, FAR = 0.25, 0.1
+#: the same two limits of kernels in space
+IN_SPACE, SHORTEST = 24.0, 18.0
 #: step (mm) of the slope of a compliance of one's own
 SLOPE_STEP = 1e-4
 #: most layers of a stack
@@ -58,29 +61,35 @@ ELASTIC = "ElasticLayer, ElasticStack, or an object with compliance(x, lengths)"
 
 
 class Layered:
-    """What layers share: their compliance in plane strain."""
+    """What layers share: their compliance in plane strain and in space."""
 
     layers: tuple[ElasticLayer, ...]
 
     def compliance(self, x: Any, lengths: Any) -> Floats:
-        """Mean displacements of n strips by forces on them.
+        """Mean displacements of n strips, in space of n squares, by forces on them.
 
         Parameters
         ----------
         x, lengths
-            Middles and lengths of the strips (n,) in mm.
+            Middles (n,) and lengths (n,) of the strips in mm; in space x and z (n, 2) and areas (n,) in mm2.
 
         Returns
         -------
         array
             (2n, 2n) in mm per N/mm: first the n displacements into the surface, then the n along +x; columns
-            in the same order, forces on the surface into it and along +x.
+            in the same order, forces on the surface into it and along +x. In space (3n, 3n) in mm per N,
+            last along +z.
         """
-        return _kernels(self.layers).compliance(*strips(x, lengths))
+        return self._kernels(x).compliance(*strips(x, lengths))
 
     def compliance_slope(self, x: Any, lengths: Any) -> Floats:
-        """Derivatives of `compliance` (2n, 2n) by the place of the strip that is displaced, in N^-1 mm."""
-        return _kernels(self.layers).slope(*strips(x, lengths))
+        """Derivatives of `compliance` by the place of what is displaced: (1, 2n, 2n) by x, in space (2, 3n,
+        3n) by x and z.
+        """
+        return self._kernels(x).slope(*strips(x, lengths))
+
+    def _kernels(self, x: Any) -> Kernels | Patches:
+        return (_kernels if np.ndim(x) < 2 else _patches)(self.layers)
 
 
 @dataclass(frozen=True)
@@ -132,10 +141,11 @@ def elastic_of(given: Any, key: str = "surface.elastic") -> Any:
 
 
 def strips(x: Any, lengths: Any) -> tuple[Floats, Floats]:
-    """Middles and lengths of strips (n,) as arrays; InputError for what is none."""
+    """Middles (n,) or (n, 2) and lengths or areas (n,) as arrays; InputError for what is none."""
     found = np.atleast_1d(np.asarray(x, dtype=float))
-    long = np.broadcast_to(np.asarray(lengths, dtype=float), found.shape)
-    if found.ndim != 1 or not np.isfinite(found).all() or not (np.isfinite(long) & (long > 0.0)).all():
+    long = np.broadcast_to(np.asarray(lengths, dtype=float), found.shape[:1])
+    flat = found.ndim == 1 or found.shape[1:] == (2,)
+    if not flat or not np.isfinite(found).all() or not (np.isfinite(long) & (long > 0.0)).all():
         raise InputError("lengths", quoted(lengths), "places in mm, and a length in mm above 0 for each")
     return found, long
 
@@ -154,6 +164,15 @@ def transfer(layers: tuple[ElasticLayer, ...], k: Floats) -> tuple[Floats, Float
     for layer in reversed(layers):
         below = _on_top(layer, k, below)
     return -below[:, 1, 1], -below[:, 0, 0], -below[:, 1, 0]
+
+
+def shear_across(layers: tuple[ElasticLayer, ...], k: Floats) -> Floats:
+    """Compliance a_s (K,) of a stack to shear across waves of these numbers k (K,) in 1/mm."""
+    below = np.zeros(k.size)
+    for layer in reversed(layers):
+        stiff, grown = 0.5 * layer.E / (1.0 + layer.nu) * k, np.tanh(k * layer.thickness)
+        below = (below + grown / stiff) / (1.0 + below * stiff * grown)
+    return below
 
 
 def _on_top(layer: ElasticLayer, k: Floats, below: Floats) -> Floats:
@@ -190,7 +209,7 @@ class Kernel:
     jump: float | None = None
 
     def odd(self, order: int) -> bool:
-        """Whether the kernel's integral of this order, 0 for itself, -1 for its derivative, is odd."""
+        """Whether the kernel's integral of this order is odd."""
         return (order % 2 == 1) != (self.jump is not None)
 
     def singular(self, x: Floats, log: Floats, order: int) -> Floats:
@@ -199,17 +218,6 @@ class Kernel:
             return np.asarray(self.jump * (x if order == 1 else 0.5 * x**2))
         return np.asarray(x - x * log if order == 1 else 0.75 * x**2 - 0.5 * x**2 * log)
 
-    def quadratic(self, x: Floats, share: Floats, order: int) -> Floats:
-        """Kernel (order 0) or slope (-1) at x, and `share` times its second derivative."""
-        size = np.minimum(np.abs(x), self.rest.x[-1])
-        found = self.rest(size, -order) + share * self.rest(size, 2 - order)
-        if self.jump is None:
-            near = np.maximum(size, 1e-300)
-            found = found - (1.0 / near + 2.0 * share / near**3 if order else np.log(near) - share / near**2)
-        elif order == 0:
-            found = found + self.jump
-        return np.asarray(np.sign(x) * found if self.odd(order) else found)
-
 
 class Kernels:
     """Normal, tangential and coupling kernels of a stack over the distance in thicknesses of its top layer,
@@ -217,8 +225,11 @@ class Kernels:
     """
 
     def __init__(self, unit: float, kernels: tuple[Kernel, ...], sizes: Floats, spread: float) -> None:
+        from scipy.interpolate import PPoly
+
         self.unit, self.kernels, self.sizes, self.spread = unit, kernels, sizes, spread
         self.places = kernels[0].rest.x
+        self.rests = PPoly(np.stack([one.rest.c for one in kernels], axis=2), self.places)
         # polynomials of all first and second integrals, (pieces, 3 kernels x 2 orders) for each power
         integrals = [one.rest.antiderivative(order).c for one in kernels for order in (1, 2)]
         self._powers = [
@@ -245,7 +256,7 @@ class Kernels:
         found[1, i, 1, j], found[1, j, 1, i] = tangent, -tangent
         found[0, i, 1, j] = found[0, j, 1, i] = cross
         found[1, i, 0, j] = found[1, j, 0, i] = -cross
-        return found.reshape(2 * x.size, 2 * x.size)
+        return found.reshape(1, 2 * x.size, 2 * x.size)
 
     def _means(self, x: Floats, lengths: Floats) -> Floats:
         """Slopes and means of the three kernels over each pair of strips, (3, 2, pairs); the last kept."""
@@ -259,16 +270,25 @@ class Kernels:
 
     def _over_strips(self, x: Floats, a: Floats, b: Floats) -> Floats:
         """Slopes and means (3, 2, k) of the kernels over strips a and b whose middles are x apart."""
-        middle, half = 0.5 * np.abs(a - b), 0.5 * (a + b)
-        ends = ((x + half, 1.0), (x + middle, -1.0), (x - middle, -1.0), (x - half, 1.0))
-        found = np.asarray(sum(sign * self._integrals(at) for at, sign in ends)) / (a * b)
-        short = half < SHORT
-        for kernel, both in zip(self.kernels, found, strict=True):
-            small = np.flatnonzero(short & ((half < FAR * np.abs(x)) | (kernel.jump is not None)))
-            if small.size:
-                share = (a[small] ** 2 + b[small] ** 2) / 24.0
-                both[:, small] = [kernel.quadratic(x[small], share, order) for order in (-1, 0)]
-        return np.where(np.abs(x) - half > self.places[-1], 0.0, found)
+        half, found = 0.5 * (a + b), np.empty((3, 2, x.size))
+        far = half < np.minimum(SHORT, FAR * np.abs(x))
+        found[:, :, far] = self._quadratic(x[far], (a[far] ** 2 + b[far] ** 2) / 24.0)
+        x, a, b = x[~far], a[~far], b[~far]
+        middle, end = 0.5 * np.abs(a - b), 0.5 * (a + b)
+        ends = ((x + end, 1.0), (x + middle, -1.0), (x - middle, -1.0), (x - end, 1.0))
+        found[:, :, ~far] = sum(sign * self._integrals(at) for at, sign in ends) / (a * b)
+        return found
+
+    def _quadratic(self, x: Floats, share: Floats) -> Floats:
+        """Slopes and kernels (3, 2, k) at x, and `share` times their second derivatives."""
+        size, share = np.minimum(np.abs(x), self.places[-1]), share[:, None]
+        value, slope, *more = (self.rests(size, order) for order in range(4))
+        found = np.stack([slope + share * more[1], value + share * more[0]])
+        log = np.array([-1.0 / size - 2.0 * share[:, 0] / size**3, share[:, 0] / size**2 - np.log(size)])
+        found[:, :, :2] += log[:, :, None]
+        found[1, :, 2] += self.kernels[2].jump
+        found[[0, 0, 1], :, [0, 1, 2]] *= np.sign(x)
+        return np.where(np.abs(x) > self.places[-1], 0.0, found.transpose(2, 0, 1))
 
     def _integrals(self, x: Floats) -> Floats:
         """First and second integrals (3, 2, k) of the kernels from 0 to x of either sign."""
@@ -296,11 +316,9 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     differs from a part of known transform that falls off as fast.
     """
     top, unit = layers[0], layers[0].thickness
-    soft = min(one.E for one in layers)
-    reach = sum(one.thickness * (one.E / soft) ** (1.0 / 3.0) for one in layers) / unit
-    end, mu, free = FARTHEST * reach, 0.5 * top.E / (1.0 + top.nu), 1.0 - 2.0 * top.nu
+    end, mu, free = _end(layers) / unit, 0.5 * top.E / (1.0 + top.nu), 1.0 - 2.0 * top.nu
     step = np.pi / (1.5 * end)
-    s = step * (np.arange(int(np.ceil(HIGHEST / step))) + 0.5)
+    s = np.asarray(step * (np.arange(int(np.ceil(HIGHEST / step))) + 0.5), dtype=np.float64)
     normal, tangent, cross = (each * mu * s / unit for each in transfer(layers, s / unit))
     rests = np.stack([normal / (1.0 - top.nu) - np.tanh(s), tangent / (1.0 - top.nu) - np.tanh(s)])
     turned = 2.0 * cross - free * (1.0 - 1.0 / np.cosh(s))
@@ -316,6 +334,24 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     kernels = (_kernel(x, even[0]), _kernel(x, even[1]), _kernel(x, odd, 0.5 * np.pi * free))
     own = (1.0 - top.nu) / (np.pi * mu)
     return Kernels(unit, kernels, np.array([own, own, 0.5 / (np.pi * mu)]), SPREAD)
+
+
+@lru_cache(maxsize=32)
+def _patches(layers: tuple[ElasticLayer, ...]) -> Patches:
+    """The kernels of a stack in space."""
+    top = layers[0]
+
+    def compliances(k: Floats) -> Floats:
+        return np.stack([*transfer(layers, k), shear_across(layers, k)])
+
+    end = IN_SPACE / FARTHEST * _end(layers)
+    return Patches(0.5 * top.E / (1.0 + top.nu), top.nu, compliances, SHORTEST / top.thickness, end)
+
+
+def _end(layers: tuple[ElasticLayer, ...]) -> float:
+    """Distance (mm) beyond which nothing is left of a stack's kernels."""
+    soft = min(one.E for one in layers)
+    return FARTHEST * sum(one.thickness * (one.E / soft) ** (1.0 / 3.0) for one in layers)
 
 
 def _kernel(x: Floats, rest: Floats, jump: float | None = None) -> Kernel:

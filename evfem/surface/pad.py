@@ -36,7 +36,7 @@ def outline_nodes(mesh: Mesh) -> Ints:
     """
     if mesh.dim == 3:
         raise InputError("finger.mesh", "a finger in three dimensions", "a plane finger")
-    edges = mesh.edges_of("pad")
+    edges = mesh.sides_of("pad")
     follow = {int(edge[0]): [int(node) for node in (*edge[2:], edge[1])] for edge in edges}
     starts = set(follow) - {nodes[-1] for nodes in follow.values()}
     if len(starts) != 1:
@@ -102,26 +102,16 @@ class Pad:
         return self.length(position[..., 0])
 
     def tributary_gradient(self, position: Floats) -> tuple[Ints, Ints, Floats]:
-        """`length_gradient` with respect to the unknowns, 2 j + a for component a of node j."""
-        of, moved, value = self.length_gradient(position[:, 0])
-        return of, 2 * moved, value
+        """Derivative of the tributary lengths as triplets (node, moved unknown 2 j + a, value)."""
+        x, (start, end) = position[:, 0], np.split(self.edges[:, :2], 2, axis=1)
+        facing = (x[end] > x[start]) * self.shares
+        of, *moved = (np.broadcast_to(one, facing.shape).ravel() for one in (self.edges, start, end))
+        return np.tile(of, 2), 2 * np.concatenate(moved), np.concatenate([-facing.ravel(), facing.ravel()])
 
     def tributary_curvature(self, position: Floats, weight: Floats) -> tuple[Ints, Ints, Floats]:
         """Second derivatives of the lengths, none: they are linear in x (`evfem.surface.skin.Skin`)."""
         none = np.zeros(0, dtype=np.int64)
         return none, none, np.zeros(0)
-
-    def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
-        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node, value)."""
-        start, end = self.edges[:, :1], self.edges[:, 1:2]
-        facing = (x[end] > x[start]) * self.shares
-        of = np.broadcast_to(self.edges, facing.shape).ravel()
-        moved = [np.broadcast_to(node, facing.shape).ravel() for node in (start, end)]
-        return (
-            np.concatenate([of, of]),
-            np.concatenate(moved),
-            np.concatenate([-facing.ravel(), facing.ravel()]),
-        )
 
     def spacing_at(self, position: Floats) -> Floats:
         """Distance in x (P,) from node to node, the mean of both sides where the outline faces down."""
@@ -246,10 +236,9 @@ def make_pad(mesh: Mesh) -> Pad:
 
 def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
     """Pad nodes (P,), edges or faces among them, and who follow no bone (P,); InputError without a pad."""
-    of, side = (mesh.edges_of, "edge") if mesh.dim == 2 else (mesh.faces_of, "face")
-    sides = of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
+    sides = mesh.sides_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
     if not len(sides):
-        given = f"no outer {side} whose nodes are all on `pad`"
+        given = f"no outer {'edge' if mesh.dim == 2 else 'face'} whose nodes are all on `pad`"
         raise InputError("finger.mesh", given, "point data or a physical group `pad`")
     nodes, local = np.unique(sides, return_inverse=True)
     free = ~np.isin(nodes, mesh.node_sets.get("bone", np.zeros(0, dtype=np.int64)))

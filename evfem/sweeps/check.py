@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 from warnings import catch_warnings, simplefilter
@@ -36,9 +37,8 @@ SMALL = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """What came out. Each of the `rows` has a `way`, the forces (N/mm) and the indentation (mm) at its end,
-    and its `difference` from the scene's own end; where it did not get there `why` says it, and the
-    difference is inf.
+    """A row per `way`: the forces (N/mm) and the indentation (mm) at its end, and its `difference` from the
+    scene's own end; inf where it did not get there, and `why`.
     """
 
     rows: list[dict[str, Any]]
@@ -97,19 +97,15 @@ def check(scene: Scene | str | Path) -> Checked:
     given = scene if isinstance(scene, Scene) else load(scene)
     with notices.status("the scene"):
         own = simulate(given)
-    rows = [_row("the scene", own, own)]
-    for way, other in _others(given, own):
-        with notices.status(way):
-            rows.append(_ended(way, other, own))
+    rows = [_row("the scene", own, own), *(_ended(way, other, own) for way, other in _others(given, own))]
     with other_solver() as name:
-        if name:
-            rows.append(_ended(f"sparse solver {name}", given, own))
+        rows += [_ended(f"sparse solver {name}", given, own)] if name else []
     return Checked(rows)
 
 
 def _ended(way: str, scene: Scene, own: Result) -> dict[str, Any]:
     """How a way ends; its warnings are the scene's own, said once."""
-    with catch_warnings():
+    with notices.status(way), catch_warnings():
         simplefilter("ignore", UserWarning)
         try:
             return _row(way, simulate(scene), own)
@@ -119,30 +115,18 @@ def _ended(way: str, scene: Scene, own: Result) -> dict[str, Any]:
 
 def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
     """The ways but for the other sparse solver, each with its scene."""
-    twice = [_in_twice(motion) for motion in scene.motion]
-    yield "twice the steps", replace(scene, motion=twice)
+    motions: tuple[Any, ...] = scene.motion
+    yield "twice the steps", replace(scene, motion=[replace(one, steps=2 * one.steps) for one in motions])
     strategy = scene.solver.strategy
     for share in HOLDS if own.provenance["solver"]["barriers"] else ():
         hold = replace(strategy, hold=share * strategy.hold)
         yield f"held by {share:g} of the drag", replace(scene, solver=replace(scene.solver, strategy=hold))
-    if (changed := _changed(scene)) is not None:
-        yield f"an input changed by {PERTURBATION:g}", changed
-
-
-def _in_twice(motion: Any) -> Any:
-    """The motion in twice the steps."""
-    return replace(motion, steps=2 * motion.steps)
-
-
-def _changed(scene: Scene) -> Scene | None:
-    """The scene with the first target of its motions changed a little, None where it has none."""
-    motion: Any
-    for i, motion in enumerate(scene.motion):
-        for name in ("indentation", "force", "gap", "distance", "voltage"):
-            if isinstance(value := getattr(motion, name, None), float | int) and value:
-                other = replace(motion, **{name: value * (1.0 + PERTURBATION)})
-                return replace(scene, motion=(*scene.motion[:i], other, *scene.motion[i + 1 :]))
-    return None
+    for i, name in product(range(len(motions)), ("indentation", "force", "gap", "distance", "voltage")):
+        if isinstance(value := getattr(motions[i], name, None), float | int) and value:
+            other = replace(motions[i], **{name: value * (1.0 + PERTURBATION)})
+            changed = replace(scene, motion=(*motions[:i], other, *motions[i + 1 :]))
+            yield f"an input changed by {PERTURBATION:g}", changed
+            return
 
 
 def _row(way: str, found: Result, own: Result) -> dict[str, Any]:

@@ -9,6 +9,7 @@ reader (`evfem.scene.file`) judges the values.
 from __future__ import annotations
 
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -24,7 +25,7 @@ from evfem.errors import InputError, quoted, unknown
 from evfem.scene import schema as scenes
 from evfem.scene.file import read_text, tables_of
 from evfem.scene.format import SceneTable, names
-from evfem.scene.keys import VERSION, at, read, shown
+from evfem.scene.keys import VERSION, read, shown
 from evfem.scene.scene import Scene
 from evfem.scene.schema import DRAFT, Schema, Section, section
 from evfem.scene.serialiser import dump
@@ -115,29 +116,37 @@ class Sweep:
     outputs: Sequence[str] = OUTPUTS
     name: str = "sweep"
     folder: Path = Path()
+    axes: list[list[tuple[dict[str, str], Row]]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        grid = {name: _entry(name, entry) for name, entry in self.grid.items()}
+        axes, grid = {name: _axis(name, entry) for name, entry in self.grid.items()}, {}
+        for name, rows in axes.items():  # in Python's own types
+            named = {label[name]: row for label, row in rows if label}
+            grid[name] = named or [row[name] for _, row in rows]
         set_frozen(self, grid=grid, outputs=tuple(self.outputs), folder=Path(self.folder).resolve())
+        set_frozen(self, axes=list(axes.values()))
         motions = len(self.tables.get("motion", ()))
         for output in self.outputs:
             check_output(output, motions)
         for key in self.samples.parameters if self.samples else ():
             check_key(f"samples.parameters.{key}", key)
-        count = prod(len(axis) for axis in self._axes) * (self.samples.count if self.samples else 1)
+        count = prod(map(len, axes.values())) * (self.samples.count if self.samples else 1)
         if not self.grid and self.samples is None:
             raise InputError("sweep", "nothing that varies", "a grid or samples")
         if count > MOST_POINTS:
             raise InputError("sweep", f"{count} points", f"at most {MOST_POINTS} points")
-        columns = [*FIRST, *self.labels, *self.parameters, *self.outputs, *LAST]
-        for i, column in enumerate(columns):
-            if column in columns[:i]:
-                raise InputError(column, "the same column twice", "different names of rows, keys and outputs")
+        twice = [column for column, number in Counter(self.columns).items() if number > 1]
+        if twice:
+            raise InputError(twice[0], "the same column twice", "different names of rows, keys and outputs")
 
     @property
     def tables(self) -> dict[str, Any]:
         """The base scene as the tables of a scene file."""
         return scene_tables(self.scene)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return (*FIRST, *self.labels, *self.parameters, *self.outputs, *LAST)
 
     @property
     def labels(self) -> list[str]:
@@ -148,34 +157,26 @@ class Sweep:
     def parameters(self) -> list[str]:
         """All keys that vary, those of the grid first."""
         sampled = [] if self.samples is None else list(self.samples.parameters)
-        return [*(key for axis in self._axes for key in axis[0][1]), *sampled]
-
-    @property
-    def _axes(self) -> list[list[tuple[dict[str, str], Row]]]:
-        return [_axis(name, entry) for name, entry in self.grid.items()]
+        return [*(key for axis in self.axes for key in axis[0][1]), *sampled]
 
     def points(self) -> list[Point]:
         """All points, the samples varying fastest and then the grid's last entry."""
-        return list(self._points())
-
-    def _points(self) -> Iterator[Point]:
-        tables, axes = self.tables, self._axes
-        drawn: dict[str, list[float]] = {}
+        tables, axes, points = self.tables, list(self.axes), []
         if self.samples is not None:
             drawn = {key: values.tolist() for key, values in self.samples.draw().items()}
-        samples = [dict(zip(drawn, row, strict=True)) for row in zip(*drawn.values(), strict=True)] or [{}]
-        combinations = product(product(*axes), samples)
-        for index, (chosen, sample) in enumerate(combinations):
+            rows = zip(*drawn.values(), strict=True)
+            axes.append([({}, dict(zip(drawn, row, strict=True))) for row in rows])
+        for index, chosen in enumerate(product(*axes)):
             labels: dict[str, str] = {}
             parameters: dict[str, Any] = {}
             for label, row in chosen:
                 labels |= label
                 parameters |= row
-            parameters |= sample
             scene = deepcopy(tables)
             for key, value in parameters.items():
                 put_in(scene, key, value)
-            yield Point(index, labels, parameters, tomli_w.dumps(scene))
+            points.append(Point(index, labels, parameters, tomli_w.dumps(scene)))
+        return points
 
 
 def scene_tables(scene: Scene | Mapping[str, Any]) -> dict[str, Any]:
@@ -183,15 +184,9 @@ def scene_tables(scene: Scene | Mapping[str, Any]) -> dict[str, Any]:
     return tomllib.loads(dump(scene)) if isinstance(scene, Scene) else deepcopy(dict(scene))
 
 
-def _entry(name: str, entry: Any) -> list[Any] | dict[str, Row]:
-    """An entry of the grid, checked and in Python's own types."""
-    entry = entry.tolist() if hasattr(entry, "tolist") else entry  # numpy
-    rows = _axis(name, entry)
-    return {label[name]: row for label, row in rows} if rows[0][0] else [row[name] for _, row in rows]
-
-
 def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
     """One entry of the grid: (label, keys and values) of each of its rows."""
+    entry = entry.tolist() if hasattr(entry, "tolist") else entry  # numpy
     if not isinstance(entry, (Mapping, Sequence)) or isinstance(entry, str) or not entry:
         given = "no values" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
         raise InputError(f"grid.{name}", given, "a list of values, or a table of named rows {key = value}")
@@ -227,22 +222,20 @@ def plain_value(place: str, value: Any) -> Any:
     return value
 
 
-def put_in(tables: dict[str, Any], key: str, value: Any) -> None:
+def put_in(tables: Any, key: str, value: Any) -> None:
     """Replace one dotted key of the tables of a scene; tables that are not there are made."""
-    *path, last = key.split(".")
-    here: Any = tables
-    for depth, name in enumerate([*path, last], 1):
-        so_far = ".".join([*path, last][:depth])
+    here, names = tables, key.split(".")
+    for depth, name in enumerate(names, 1):
+        place: Any = name
+        so_far = ".".join(names[:depth])
         if isinstance(here, list):
             if not (name.isdecimal() and int(name) < len(here)):
                 allowed = f"numbers from 0 to {len(here) - 1} for the entries of this list"
                 raise InputError(so_far, "no such entry", allowed)
-            place: Any = int(name)
-        elif isinstance(here, dict):
-            place = name
-        else:
+            place = int(name)
+        elif not isinstance(here, dict):
             raise InputError(so_far, "a key inside a value that is no table", "a key of a table")
-        if depth > len(path):
+        if depth == len(names):
             here[place] = value
         else:
             here = here.setdefault(place, {}) if isinstance(here, dict) else here[place]
@@ -305,12 +298,21 @@ class DistributionTable:
     normal: Annotated[Pair | None, _pair("[mean, sd]"), "instead: a normal distribution"] = None
     between: Annotated[Pair | None, _pair("[low, high]"), "where a normal distribution is cut off"] = None
 
+    def made(self) -> Distribution:
+        """The distribution."""
+        if self.uniform is not None and self.normal is not None:
+            raise InputError("normal", "normal beside uniform", "exactly one of the two")
+        if self.normal is not None:
+            return Normal(*self.normal, self.between)
+        if self.uniform is None:
+            raise InputError("uniform", "neither uniform nor normal", "exactly one of the two")
+        if self.between is not None:
+            raise InputError("between", "between beside uniform", "between with normal alone")
+        return Uniform(*self.uniform)
+
 
 def load(path: str | Path) -> Sweep:
-    """The sweep in a TOML file, named like the file; paths in it are relative to it.
-
-    Raises InputError for whatever cannot be used, StorageError when the disk refuses.
-    """
+    """The sweep in a TOML file, named like it, and paths in it relative to it; or InputError."""
     path = Path(path)
     return loads(read_text("sweep", path), path.parent, path.stem)
 
@@ -331,14 +333,11 @@ def _grid(table: Mapping[str, Any]) -> dict[str, Any]:
     """The grid with dotted keys, whether the file has them in quotes or as tables in tables."""
     grid: dict[str, Any] = {}
     for name, entry in table.items():
-        if name in TABLES:
-            grid |= _flat({name: entry})
-        elif isinstance(entry, dict):
-            grid[name] = {
-                label: dict(_flat(row)) if isinstance(row, dict) else row for label, row in entry.items()
-            }
+        if name not in TABLES and isinstance(entry, dict):
+            rows = entry.items()
+            grid[name] = {key: dict(_flat(row)) if isinstance(row, dict) else row for key, row in rows}
         else:
-            grid[name] = entry
+            grid |= _flat({name: entry})
     return grid
 
 
@@ -353,21 +352,11 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 def _samples(table: Mapping[str, Any]) -> Samples:
     if isinstance(given := table.get("parameters"), Mapping):
-        table = {**table, "parameters": {key: _distribution(key, value) for key, value in _flat(given)}}
+        found = {}
+        for key, value in _flat(given):
+            place = f"samples.parameters.{key}"
+            if not isinstance(value, Mapping):
+                raise InputError(place, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
+            found[key] = read(DistributionTable, value, place)
+        table = {**table, "parameters": found}
     return read(Samples, table, "samples")
-
-
-def _distribution(key: str, value: Any) -> Distribution:
-    place = f"samples.parameters.{key}"
-    if not isinstance(value, Mapping):
-        raise InputError(place, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
-    table: DistributionTable = read(DistributionTable, value, place)
-    with at(place):
-        if table.uniform is not None and table.normal is None:
-            if table.between is not None:
-                raise InputError("between", "between beside uniform", "between with normal alone")
-            return Uniform(*table.uniform)
-        if table.normal is not None and table.uniform is None:
-            return Normal(*table.normal, table.between)
-    given = "uniform and normal" if table.uniform else "neither uniform nor normal"
-    raise InputError(place, given, "exactly one of the two")

@@ -46,11 +46,6 @@ class Answer:
     message: str
     outputs: dict[str, float | None]
 
-    @property
-    def final(self) -> bool:
-        """Whether computing it again would give the same: not so where a process died or the memory ended."""
-        return self.status != "failed"
-
 
 @dataclass(frozen=True)
 class SweepFolder:
@@ -65,11 +60,7 @@ class SweepFolder:
             raise InputError("overwrite", "resume and overwrite", "one of the two")
 
     def open(self, keys: Collection[str], plan: str) -> None:
-        """Make the folder of the sweep with these keys and the fingerprint `plan`, or clear it.
-
-        Raises InputError, with nothing touched, where files of others are in the way, or points
-        that this sweep does not have.
-        """
+        """Make or clear the folder of the sweep `plan`; InputError where files of others are in it."""
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
             listed, points = self._manifest, self._points()
@@ -106,9 +97,8 @@ class SweepFolder:
             if version not in (None, evfem.__version__):
                 other = f"evfem {version!r}, not of {evfem.__version__!r}"
             given = f"{self.path}, with {others} points of {other}"
-            raise InputError(
-                "--out", given, "another folder, --resume to keep them, --overwrite to remove them"
-            )
+            allowed = "another folder, --resume to keep them, --overwrite to remove them"
+            raise InputError("--out", given, allowed)
 
     def _last(self) -> tuple[str | None, str | None]:
         """Fingerprint of the sweep that was started last in the folder, and the version that did."""
@@ -123,11 +113,11 @@ class SweepFolder:
         write_text(self.path / POINTS / f"{key}.json", text + "\n")
 
     def read(self, key: str) -> Answer | None:
-        """A point that is finished; None for one that is not, and for one whose file is damaged."""
+        """A point that is finished; None for one that is not, that failed (of memory, say) or is damaged."""
         with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
             values = json.loads((self.path / POINTS / f"{key}.json").read_text(encoding="utf-8"))
-            if values.pop("format") == FORMAT and _sound(answer := Answer(**values)) and answer.final:
-                return answer
+            if values.pop("format") == FORMAT and _sound(answer := Answer(**values)):
+                return answer if answer.status != "failed" else None
         return None
 
     def write_table(
@@ -158,19 +148,12 @@ def _refuse_no_points(files: Sequence[Path]) -> None:
 
 def _sound(answer: Answer) -> bool:
     numbers = [answer.seconds, *(value for value in answer.outputs.values() if value is not None)]
-    return (
-        answer.status in STATUS
-        and isinstance(answer.message, str)
-        and all(type(number) in (int, float) for number in numbers)
-    )
+    words = answer.status in STATUS and isinstance(answer.message, str)
+    return words and all(type(number) in (int, float) for number in numbers)
 
 
 def sweep_csv(columns: Sequence[str], rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> str:
-    """The table of a sweep as csv, with units behind the names: lists and truth values as in JSON.
-
-    >>> sweep_csv(["point", "motion.0.gap"], [{"point": 0, "motion.0.gap": 0.5}], {"motion.0.gap": "mm"})
-    'point,motion.0.gap (mm)\\n0,0.5\\n'
-    """
+    """The table of a sweep as csv, with units behind the names: lists and truth values as in JSON."""
     heads = [f"{name} ({units[name]})" if units.get(name) else name for name in columns]
     return csv_text([heads, *([cell_of(row.get(name)) for name in columns] for row in rows)])
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import sys
 import time as clock
 from collections import Counter
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from evfem.scene.scene import Scene
 from evfem.simulation.provenance import origin
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
-from evfem.sweeps.file import FIRST, LAST, Sweep, load
+from evfem.sweeps.file import LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder
 from evfem.sweeps.table import SweepResult, Units, table_units, units_of
 
@@ -119,26 +118,24 @@ class _Run:
     """A sweep on its way: its points, the key of each, and the answers so far."""
 
     def __init__(self, plan: Sweep, folder: SweepFolder | None, progress: bool) -> None:
-        from tqdm.auto import tqdm
-
         self.plan, self.folder, self.began = plan, folder, clock.perf_counter()
         self.points = plan.points()
         self.answers: dict[str, Answer] = {}
         self.refusals: list[InputError] = []
         self.found: list[Units] = []
-        quiet = not (progress and sys.stderr.isatty())
-        reading = tqdm(self.points, "reading", unit="point", leave=False, delay=2.0, disable=quiet)
-        self.keys = [self._key(point.text) for point in reading]
+        with notices.status("reading the points") if progress else nullcontext():
+            self.keys = [self._key(point.text) for point in self.points]
         refused = dict(self.answers)
         if len(refused) == len(set(self.keys)):
-            raise self._no_scene()
+            if len({str(error) for error in self.refusals}) == 1:
+                raise self.refusals[0]
+            raise InputError("sweep", f"no valid point: {self.refusals[0]}", "at least one valid scene")
         self.units = table_units(plan.outputs, plan.parameters, self.found)
         self.digest = digest(sorted(set(self.keys)))
         if folder is not None:
             folder.open(set(self.keys), self.digest)
-            for key in set(self.keys) - set(self.answers):
-                if (kept := folder.read(key)) is not None:
-                    self.answers[key] = kept
+            kept = {key: folder.read(key) for key in set(self.keys) - set(self.answers)}
+            self.answers |= {key: answer for key, answer in kept.items() if answer is not None}
         self.reused = len(self.answers) - len(refused)
         if progress and refused:
             count = sum(key in refused for key in self.keys)
@@ -148,13 +145,9 @@ class _Run:
         self.written = clock.perf_counter()
         if folder is not None:
             folder.write_provenance(self.result().provenance)
-        self.bar = _Progress(len(set(self.keys)), self.answers, progress)
-
-    def _no_scene(self) -> InputError:
-        """The error of all points where they have the same one; else one that tells the first."""
-        if len({str(error) for error in self.refusals}) == 1:
-            return self.refusals[0]
-        return InputError("sweep", f"no valid point: {self.refusals[0]}", "at least one valid scene")
+        bar = progress and notices.drawable()
+        self.total, self.lines = len(set(self.keys)), progress and not bar
+        self.bar = notices.bar(self.total, "point", len(self.answers), bar)
 
     def _key(self, text: str) -> str:
         """Fingerprint of a point's scene and outputs, or of its text when it is no scene."""
@@ -180,7 +173,12 @@ class _Run:
         if self.folder is not None:
             self.folder.write(key, answer)
         self.answers[key] = answer
-        self.bar.step(self.answers)
+        done, wrong = len(self.answers), sum(one.status != "done" for one in self.answers.values())
+        self.bar.set_postfix_str(f"{wrong} without result" if wrong else "", refresh=False)
+        self.bar.update(1)
+        LOG.debug("point %d of %d", done, self.total)
+        if self.lines:
+            notices.milestone("point", done, self.total)
         if self.folder is not None and clock.perf_counter() - self.written > EVERY:
             self._write()
 
@@ -200,15 +198,13 @@ class _Run:
     def result(self) -> SweepResult:
         """The table; points that are not finished are left out."""
         plan = self.plan
-        columns = (*FIRST, *plan.labels, *plan.parameters, *plan.outputs, *LAST)
         rows = []
         for point, key in zip(self.points, self.keys, strict=True):
-            answer = self.answers.get(key)
-            if answer is not None:
+            if (answer := self.answers.get(key)) is not None:
                 found = {name: answer.outputs.get(name) for name in plan.outputs}
-                state = {"status": answer.status, "seconds": answer.seconds, "message": answer.message}
+                state = {name: getattr(answer, name) for name in LAST}
                 rows.append({"point": point.index, **point.labels, **point.parameters, **found, **state})
-        return SweepResult(columns, rows, self._provenance(rows), self.units)
+        return SweepResult(plan.columns, rows, self._provenance(rows), self.units)
 
     def _provenance(self, rows: list[dict[str, Any]]) -> dict[str, Any]:
         plan, samples = self.plan, self.plan.samples
@@ -248,23 +244,21 @@ def evaluate(job: Job) -> Answer:
         result = result if result.depth is None else result.total
         return {name: output(result, name) for name in names}
 
-    return answered(text, folder, ask)
+    return answered(text, folder, ask, simulate)
 
 
 def answered(
     text: str,
     folder: str,
     ask: Callable[[Any], dict[str, float | None]],
-    run: Callable[[Scene], Any] | None = None,
+    run: Callable[[Scene], Any] = simulate,
 ) -> Answer:
-    """Run the scene in a text (`simulate`, or another `run`) and `ask` what comes of it; whatever happens is
-    in the answer.
-    """
+    """`run` the scene in a text and `ask` what comes of it; whatever happens is in the answer."""
     began = clock.perf_counter()
     outputs: dict[str, float | None] = {}
     status, message = "done", ""
     try:
-        result = (run or simulate)(loads(text, folder))
+        result = run(loads(text, folder))
         outputs, message = ask(result), "; ".join(result.warnings)
     except NotConverged as error:
         status, message = "not_converged", str(error)
@@ -291,10 +285,7 @@ def compute(
     pool: Pool,
     keep: Callable[[str, Answer], None],
 ) -> None:
-    """Give `function` and every job to a pool, and every answer to `keep` as soon as it is there.
-
-    A job whose process died is tried once more at the end, alone.
-    """
+    """Give every job to a pool, every answer to `keep`; a job whose process died is tried again, alone."""
     again = []
     for key, found in pool(function, waiting):
         if isinstance(found, Died):
@@ -311,28 +302,3 @@ def _answer(found: Answer | Exception) -> Answer:
         return found
     message = str(found) if isinstance(found, Died) else f"{type(found).__name__}: {found}"
     return Answer("failed", 0.0, message, {})
-
-
-class _Progress:
-    """A bar in a terminal; elsewhere a line for every tenth of the points."""
-
-    def __init__(self, total: int, answers: Mapping[str, Answer], shown: bool) -> None:
-        self.total, self.shown = total, shown
-        drawable = notices.drawable()
-        self.lines = shown and not drawable
-        done = len(answers)
-        self.bar = notices.bar(total, "point", done, shown and drawable)
-
-    def step(self, answers: Mapping[str, Answer]) -> None:
-        """One more is finished."""
-        done = len(answers)
-        wrong = sum(answer.status != "done" for answer in answers.values())
-        self.bar.set_postfix_str(f"{wrong} without result" if wrong else "", refresh=False)
-        self.bar.update(1)
-        LOG.debug("point %d of %d", done, self.total)
-        if self.lines:
-            notices.milestone("point", done, self.total)
-
-    def close(self) -> None:
-        """No more to come."""
-        self.bar.close()

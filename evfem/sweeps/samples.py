@@ -82,9 +82,8 @@ Distribution = Uniform | Normal
 
 def _parameters(key: str, given: Any) -> dict[str, Distribution]:
     if not isinstance(given, Mapping) or not given:
-        raise InputError(
-            key, quoted(given) if given else ABSENT, "at least one parameter with a distribution"
-        )
+        said = quoted(given) if given else ABSENT
+        raise InputError(key, said, "at least one parameter with a distribution")
     for name, distribution in given.items():
         if not isinstance(distribution, Distribution):
             raise InputError(f"{key}.{name}", quoted(distribution), "Uniform or Normal")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections import Counter
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.storage import disk, write_text
-from evfem.common.tables import frame
+from evfem.common.tables import csv_rows, frame
 from evfem.errors import InputError, quoted, readable, unknown
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.fingertip import Fingertip
@@ -36,21 +35,12 @@ KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "
 
 
 def unit_of(key: str, force: str = "N/mm") -> str:
-    """Unit of a dotted key of a scene file, "" for a number; `force` is that of forces.
-
-    >>> unit_of("electrostatics.insulator_thickness"), unit_of("motion.0.force"), unit_of("surface.friction")
-    ('mm', 'N/mm', '')
-    """
+    """Unit of a dotted key of a scene file, "" for a number; `force` is that of forces."""
     return (KEY_UNITS | {"force": force}).get(key.split(".")[-1].rsplit("_", 1)[-1], "")
 
 
 def units_of(scene: Scene) -> Units:
-    """Unit of each column of which a sweep of such scenes can have outputs.
-
-    >>> from evfem.scene.scene import default_scene
-    >>> units_of(default_scene())["normal_force"]
-    'N/mm'
-    """
+    """Unit of each column of which a sweep of such scenes can have outputs."""
     finger = scene.finger
     if isinstance(finger, Fingertip) or (isinstance(finger, MeshedFinger) and finger.mesh().dim == 3):
         return SPATIAL_UNITS
@@ -60,11 +50,8 @@ def units_of(scene: Scene) -> Units:
 def table_units(
     outputs: Sequence[str], parameters: Sequence[str], found: Collection[Units]
 ) -> dict[str, str]:
-    """Unit of each output, and of the parameters that have one, where `found` are the units of the
-    scenes, each kind once.
-
-    Raises InputError for an output that not every scene has, or whose unit is not that of all.
-
+    """Unit of each output, and of the parameters that have one, where `found` are the units of the scenes;
+    InputError for an output that not every scene has in one unit.
     >>> table_units(["normal_force.last"], ["motion.0.force"], [OVER_DEPTH])
     {'motion.0.force': 'N/mm', 'normal_force.last': 'N'}
     >>> table_units(["contact_area.last"], [], [UNITS])
@@ -148,12 +135,9 @@ class SweepResult:
             if isinstance(values, list):
                 raise InputError("columns", quoted(name), f"columns of numbers: {', '.join(self._numeric)}")
             values = values[~np.isnan(values)]
-            row = {
-                "column": name,
-                "unit": self.units.get(name, ""),
-                "points": values.size,
-                **_moments(values),
-            }
+            row = {"column": name, "unit": self.units.get(name, ""), "points": values.size}
+            row["mean"] = np.mean(values) if values.size else math.nan
+            row["deviation"] = np.std(values, ddof=1) if values.size > 1 else math.nan
             row |= {f"q{q:g}": np.quantile(values, q) if values.size else math.nan for q in quantiles}
             for key, value in row.items():
                 found.setdefault(key, []).append(value)
@@ -174,14 +158,6 @@ class SweepResult:
         return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
 
 
-def _moments(values: Any) -> dict[str, float]:
-    """Mean and standard deviation of a sample."""
-    if not values.size:
-        return {"mean": math.nan, "deviation": math.nan}
-    deviation = float(np.std(values, ddof=1)) if values.size > 1 else math.nan
-    return {"mean": float(np.mean(values)), "deviation": deviation}
-
-
 def is_table(path: Path) -> bool:
     """Whether a file begins as the table of a sweep does."""
     begin = f"{FIRST[0]},".encode()
@@ -190,21 +166,21 @@ def is_table(path: Path) -> bool:
 
 
 def read(path: Path) -> SweepResult:
-    """The table of a sweep, from its folder, its `sweep.json` or any of its csv files.
-
-    A csv file alone has neither provenance nor the kinds of its values: what looks like a number is one.
-    Raises InputError for what is no table of a sweep.
-    """
+    """The table of a sweep from its folder, `sweep.json`, or a csv file, which alone has no provenance."""
     table = path / TABLE if path.is_dir() else path
     told = table.parent / PROVENANCE
     if table.suffix == ".json":
         told, table = table, table.parent / TABLE
     provenance = _provenance(told) if told.is_file() else {}
-    names, units, body = _cells(table)
+    head, *body = csv_rows(table, "path", f"{TABLE} of a sweep, a point in each line")
+    parts = [cell.removesuffix(")").partition(" (") for cell in head]
+    names, units = [name for name, _, _ in parts], {name: unit for name, _, unit in parts if unit}
+    if names[:1] != [*FIRST] or not set(LAST) <= set(names):
+        given = f"{path.name}, which starts with {','.join(head)[:60]!r}"
+        raise InputError("path", given, f"{TABLE} of a sweep, a point in each line")
     known = {name: _kept(provenance, name) for name in names}
-    rows = [
-        {name: _value(name, cell, known[name]) for name, cell in zip(names, row, strict=True)} for row in body
-    ]
+    cells = (zip(names, row, strict=True) for row in body)
+    rows = [{name: _value(name, cell, known[name]) for name, cell in row} for row in cells]
     counted = Counter(str(row["status"]) for row in rows)
     points = {"requested": len(rows), **{name: counted[name] for name in STATUS}}
     return SweepResult(tuple(names), rows, {"points": points, **provenance}, units)
@@ -220,51 +196,23 @@ def _provenance(path: Path) -> dict[str, Any]:
     return dict(found)
 
 
-def _cells(path: Path) -> tuple[list[str], dict[str, str], list[list[str]]]:
-    """Names, units and rows of text."""
-    allowed = f"{TABLE} of a sweep, a point in each line"
-    try:
-        with path.open(newline="", encoding="utf-8") as lines:
-            head, *body = list(csv.reader(lines, strict=True))
-    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "not a table"
-        raise InputError("path", f"{path.name} ({reason})", allowed) from None
-    parts = [cell.removesuffix(")").partition(" (") for cell in head]
-    names = [name for name, _, _ in parts]
-    odd = [row for row in body if len(row) != len(names)]
-    if odd or names[:1] != [*FIRST] or not set(LAST) <= set(names):
-        raise InputError("path", f"{path.name}, which starts with {','.join(head)[:60]!r}", allowed)
-    return names, {name: unit for name, _, unit in parts if unit}, body
-
-
 def _kept(provenance: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The values of a column that the sweep was given, by their text in the table."""
-    given = (provenance.get("grid") or {}).get(name, ())
-    if isinstance(given, dict):
-        return {str(label): str(label) for label in given}
-    return {str(cell_of(value)): value for value in given}
+    """The values of a column that the sweep was given, or names of its rows, by their text in the table."""
+    return {str(cell_of(value)): value for value in (provenance.get("grid") or {}).get(name, ())}
 
 
 def _value(name: str, cell: str, known: Mapping[str, Any]) -> Any:
     """The value in a cell; None where there is none."""
     if name in ("status", "message"):
         return cell
-    if cell in known:
-        return known[cell]
-    if not cell:
-        return None
     try:
-        return json.loads(cell)
+        return known[cell] if cell in known else json.loads(cell) if cell else None
     except ValueError:
         return cell
 
 
 def told(points: Mapping[str, int]) -> str:
-    """What became of the points, in words.
-
-    >>> told({"requested": 3, "done": 2, "refused": 0, "not_converged": 1, "failed": 0})
-    '2 done, 1 not converged'
-    """
+    """What became of the points, in words."""
     words = [f"{points[name]} {name.replace('_', ' ')}" for name in STATUS if points[name]]
     missing = points["requested"] - sum(points[name] for name in STATUS)
     return ", ".join([*words, *([f"{missing} not computed"] if missing else [])])

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -90,14 +90,11 @@ def _sinusoids(knobs: Knobs) -> tuple[Array, Array]:
 
 def _self_affine(knobs: Knobs) -> tuple[Array, Array]:
     hurst = 1.0 - knobs.irregularity if knobs.hurst is None else knobs.hurst
-    return _power_law(knobs, 1.0 + 2.0 * hurst)
+    return _spectral(replace(knobs, beta=1.0 + 2.0 * hurst))
 
 
 def _spectral(knobs: Knobs) -> tuple[Array, Array]:
-    return _power_law(knobs, 3.0 * (1.0 - knobs.irregularity) if knobs.beta is None else knobs.beta)
-
-
-def _power_law(knobs: Knobs, exponent: float) -> tuple[Array, Array]:
+    exponent = 3.0 * (1.0 - knobs.irregularity) if knobs.beta is None else knobs.beta
     numbers = np.arange(PERIODS, BAND * PERIODS + 1)
     amplitude = numbers ** (-0.5 * exponent)
     amplitude *= knobs.amplitude / np.sqrt(np.sum(amplitude**2))
@@ -112,15 +109,11 @@ def phases(seed: int, size: int) -> Array:
 
 def _sum(waves: list[tuple[Array, Array, Array]], frequency: float) -> tuple[Array, Array]:
     """x (n,) and height (n,) of sines: numbers of waves in the period, amplitudes, phases."""
-    shortest = max(
-        float(numbers[amplitude > 1e-9 * amplitude.max()].max()) for numbers, amplitude, _ in waves
-    )
-    size = int(SAMPLES * shortest)
+    size = SAMPLES * int(max(number[size > 1e-9 * size.max()].max() for number, size, _ in waves))
     turn = 2.0 * np.pi * np.arange(size) / size
     height = np.zeros(size)
-    for numbers, amplitude, phase in waves:
-        for n, a, p in zip(numbers.tolist(), amplitude.tolist(), phase.tolist(), strict=True):
-            height += a * np.sin(n * turn + p)
+    for n, a, p in np.concatenate([np.column_stack(one) for one in waves]).tolist():
+        height += a * np.sin(n * turn + p)
     return np.arange(size) * (PERIODS / frequency / size), height
 
 

@@ -9,7 +9,7 @@ are not known from such a file: `friction_profile` takes them.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,7 +19,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, instance, number, one_of, real
 from evfem.common.pictures import read_grey
-from evfem.common.tables import UNITS, Headed, is_even, read_headed
+from evfem.common.tables import UNITS, is_even, read_headed
 from evfem.electrostatics import wav
 from evfem.errors import InputError, quoted
 from evfem.textures.generate import phases
@@ -28,8 +28,8 @@ from evfem.textures.texture import QUANTITIES, Texture
 
 #: units of length -> mm
 LENGTHS = {name: size for name, (base, size) in UNITS.items() if base == "mm"}
-#: names of columns that mean the same, and those that are no lengths
-OTHER_NAMES, PURE = {"z": "height", "position": "x", "distance": "x"}, ("friction", "frequency", "amplitude")
+#: columns that are no lengths
+PURE = ("friction", "frequency", "amplitude")
 #: endings of texts that may have a header
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".xyz")
 #: what is recorded -> how often it is integrated, and how that is said
@@ -42,9 +42,8 @@ IMAGES = ("PNG", "JPEG", "TIFF", "BMP")
 MOST_PIXELS, MOST_BYTES, MOST_POINTS = 40_000_000, 512_000_000, 50_000_000
 
 Unit = Annotated[str | None, one_of(*LENGTHS), "of lengths for which the file names none; default: mm"]
-Row = Annotated[
-    float, number("a place from 0 to 1", Within(0.0, 1.0)), "which line, from the first to the last"
-]
+_ROW = number("a place from 0 to 1", Within(0.0, 1.0))
+Row = Annotated[float, _ROW, "which line, from the first to the last"]
 
 
 def importer_of(path: Path) -> tuple[str, type[Importer]]:
@@ -120,21 +119,22 @@ class Table(Heights, kind="csv"):
         if quantity is None:
             headers = " | ".join(",".join(header) for header, _ in QUANTITIES.values())
             given = f"{path.name}, which starts with {','.join(table.names)[:60]!r}"
-            refused = InputError("file", given, headers)
-            if table.names[0] != "1":
-                raise refused
-            return self._scanned(path, refused)
-        table = _only(table, quantity)
-        scales = [_scale(name, own, self.unit) for name, own in _units(table)]
-        first, second = (column * scale for column, scale in zip(table.columns, scales, strict=True))
-        notes = _said(table, self.unit)
+            return self._scanned(path, InputError("file", given, headers), table.names[0] == "1")
+        used = [[_usual(name) for name in table.names].index(name) for name in QUANTITIES[quantity][0]]
+        first, second = (table.columns[i] * _scale(table.names[i], table.units[i], self.unit) for i in used)
+        lengths = [(table.names[i], table.units[i]) for i in used if table.names[i] not in PURE]
+        own = [f"{name} in {unit}" for name, unit in lengths if unit]
+        notes = [f"{', '.join(own)}, as the header says."] if own else []
+        if self.unit not in (None, "mm") and len(own) < len(lengths):
+            notes.append(f"{'Other lengths' if own else 'Lengths'} were in {self.unit}.")
+        notes += ["Commas are decimal points."] if table.commas else []
         if quantity != "height":
             return self.texture(path, "measured", (first, second), notes, quantity)
         return self.heights(path, "measured", first, second, notes)
 
-    def _scanned(self, path: Path, error: InputError) -> Texture:
+    def _scanned(self, path: Path, error: InputError, perhaps: bool = True) -> Texture:
         """The texture of another program's text, or the `error` that says what this one has."""
-        if find_spec("SurfaceTopography") is None:
+        if not perhaps or find_spec("SurfaceTopography") is None:
             raise error
         try:
             return Scan(**{spec.name: getattr(self, spec.name) for spec in fields(self)})(path)
@@ -144,30 +144,13 @@ class Table(Heights, kind="csv"):
 
 def _quantity_of(names: list[str]) -> str | None:
     """What columns of these names are, perhaps among others."""
-    usual = [OTHER_NAMES.get(name, name) for name in names]
+    usual = [_usual(name) for name in names]
     found = (q for q, (header, _) in QUANTITIES.items() if all(usual.count(name) == 1 for name in header))
     return next(found, None)
 
 
-def _only(table: Headed, quantity: str) -> Headed:
-    """The columns of a quantity alone."""
-    usual = [OTHER_NAMES.get(name, name) for name in table.names]
-    i, j = map(usual.index, QUANTITIES[quantity][0])
-    names, units, columns = table.names, table.units, table.columns
-    return Headed([names[i], names[j]], [units[i], units[j]], [columns[i], columns[j]], table.commas)
-
-
-def _units(table: Headed) -> list[tuple[str, str | None]]:
-    return list(zip(table.names, table.units, strict=True))
-
-
-def _said(table: Headed, unit: str | None) -> list[str]:
-    """In which units the lengths of a table were."""
-    own = [(name, said) for name, said in _units(table) if said and name not in PURE]
-    told = [f"{', '.join(f'{name} in {said}' for name, said in own)}, as the header says."] if own else []
-    if unit not in (None, "mm") and len(own) < sum(name not in PURE for name in table.names):
-        told.append(f"{'Other lengths' if own else 'Lengths'} were in {unit}.")
-    return [*told, *(["Commas are decimal points."] if table.commas else [])]
+def _usual(name: str) -> str:
+    return {"z": "height", "position": "x", "distance": "x"}.get(name, name)
 
 
 def _scale(name: str, own: str | None, unit: str | None) -> float:
@@ -204,10 +187,8 @@ class Scan(Heights, kind="scan"):
         if topography.dim == 1:
             x = np.asarray(topography.positions()).ravel() * scale
         else:
-            x = (np.arange(heights.shape[0]) + 0.5) * (
-                topography.physical_sizes[0] * scale / heights.shape[0]
-            )
-            line = round(self.row * (heights.shape[1] - 1))
+            step = topography.physical_sizes[0] * scale / heights.shape[0]
+            x, line = (np.arange(heights.shape[0]) + 0.5) * step, round(self.row * (heights.shape[1] - 1))
             note = f"Line {line + 1} of {heights.shape[1]} along x, in {named}."
             heights = heights[:, line]
         return self.heights(path, "scan", x, heights.ravel(), [note])
@@ -303,7 +284,10 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
         if table.names[0] != "time":
             given = f"{path.name}, which starts with {table.names[0]!r}"
             raise InputError("file", given, "a column time first")
-        rate = _rate(table.column("time", 1, ("s",)))
+        time = table.column("time", 1, ("s",))
+        if time.size < 16 or not is_even(time):
+            raise InputError("time", f"{time.size} rows", "at least 16 rows at an even spacing in s")
+        rate = float((time.size - 1) / (time[-1] - time[0]))
         columns, names = table.columns[1:], table.names[1:]
     which = _channel(channel, names, len(columns))
     if not np.isfinite(columns[which]).all():
@@ -312,7 +296,6 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
 
 
 def _channel(given: int | str | None, names: list[str], count: int) -> int:
-    """Which of the channels, from 0."""
     called = [*names, *map(str, range(1, count + 1))]
     if given is None and count == 1:
         return 0
@@ -325,18 +308,12 @@ def _channel(given: int | str | None, names: list[str], count: int) -> int:
 def _recorded(path: Path, given: str | None, column: str) -> str:
     """What a recording holds: what was said, unless its column says another."""
     said = column if column in RECORDED else given
-    if said is None or (given is not None and said != given):
-        wrong = (
-            f"nothing, and {path.name} does not say what it holds" if said is None else f"{given}, of {said}"
-        )
+    if said is None:
+        wrong = f"nothing, and {path.name} does not say what it holds"
         raise InputError("quantity", wrong, " | ".join(RECORDED))
+    if given not in (None, said):
+        raise InputError("quantity", f"{given}, of {said}", " | ".join(RECORDED))
     return said
-
-
-def _rate(time: Floats) -> float:
-    if time.size < 16 or not is_even(time):
-        raise InputError("time", f"{time.size} rows", "at least 16 rows at an even spacing in s")
-    return float((time.size - 1) / (time[-1] - time[0]))
 
 
 def spectrum_of(samples: Floats, rate: float, size: int) -> tuple[Floats, Floats]:
@@ -358,9 +335,7 @@ def spectrum_of(samples: Floats, rate: float, size: int) -> tuple[Floats, Floats
 
 
 def _lines(frequency: Floats, amplitude: Floats, longest: float) -> tuple[Floats, Floats]:
-    """At most `MOST_LINES` lines from waves of `longest` (mm) to `HIGHEST_FREQUENCY`, neighbours put
-    together by their power.
-    """
+    """At most `MOST_LINES` lines from waves of `longest` (mm) on, neighbours put together by their power."""
     lowest = (1.0 - 1e-9) / longest
     kept = (frequency >= lowest) & (frequency <= HIGHEST_FREQUENCY)
     if kept.sum() < 2:
@@ -376,9 +351,7 @@ def _lines(frequency: Floats, amplitude: Floats, longest: float) -> tuple[Floats
 
 
 def friction_profile(spectrum: Texture, mean: float, rms: float, length: float, seed: int = 0) -> Texture:
-    """A friction profile with this spectrum: `mean`, root mean square `rms` of what varies, over
-    `length` (mm), with phases drawn from `seed`; it never falls below 0.
-    """
+    """A profile over `length` (mm) with this spectrum, mean and rms, phases by `seed`, nowhere below 0."""
     if spectrum.quantity != "friction_spectrum":
         raise InputError("texture", f"{spectrum.name}, {spectrum.quantity}", "a friction spectrum")
     real("mean", mean, "a friction coefficient from 0 to 10", lambda mu: 0.0 <= mu <= 10.0)
@@ -390,8 +363,5 @@ def friction_profile(spectrum: Texture, mean: float, rms: float, length: float, 
     waves = np.sin(2.0 * np.pi * np.outer(x, spectrum.x) + phase) @ spectrum.values
     waves *= np.sqrt(2.0) * rms / np.sqrt(np.sum(spectrum.values**2))
     note = f"Friction {mean:g} on average, rms {rms:g}, phases from seed {seed}."
-    values = np.clip(mean + waves, 0.0, None)
-    notes = (*spectrum.provenance, note)
-    return Texture(
-        spectrum.name, spectrum.kind, x, values, spectrum.licence, quantity="friction", provenance=notes
-    )
+    values, notes = np.clip(mean + waves, 0.0, None), (*spectrum.provenance, note)
+    return replace(spectrum, x=x, values=values, quantity="friction", provenance=notes)

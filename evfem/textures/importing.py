@@ -100,7 +100,13 @@ class Heights(Importer):
             given = f"{inside.sum()} of {x.size} points"
             raise InputError("start, stop", given, "a cut that leaves at least four points")
         x, height = x[inside] - x[inside][0], height[inside]
-        height = _filled(x, height, notes)
+        known = np.isfinite(height)
+        if missing := int((~known).sum()):
+            if missing > MOST_GAPS * x.size:
+                given = f"{missing} of {x.size} missing"
+                raise InputError("heights", given, f"at most {MOST_GAPS:.0%} of them")
+            notes.append(f"{missing} of {x.size} values missing, filled by straight lines.")
+            height = np.interp(x, x[known], height[known])
         if self.level != "none":
             degree = LEVELS.index(self.level) - 1
             height = height - np.polynomial.Polynomial.fit(x, height, degree)(x)
@@ -114,21 +120,10 @@ class Heights(Importer):
         """The texture of raw heights; a note says if they are too steep to be meant."""
         x, height, done = self.cleaned(x, height)
         slope = float(np.sqrt(np.mean((np.diff(height) / np.diff(x)) ** 2)))
-        steep = (
-            f"Rms slope {slope:.3g}, steeper than any surface that a finger slides over: is each unit right?"
-        )
-        said = [*notes, *done, *([steep] if slope > STEEP else [])]
-        return self.texture(path, kind, (x, height), said, "height")
-
-
-def _filled(x: Floats, height: Floats, notes: list[str]) -> Floats:
-    known = np.isfinite(height)
-    missing = int((~known).sum())
-    if missing > MOST_GAPS * x.size:
-        raise InputError("heights", f"{missing} of {x.size} missing", f"at most {MOST_GAPS:.0%} of them")
-    if missing:
-        notes.append(f"{missing} of {x.size} values missing, filled by straight lines.")
-    return np.interp(x, x[known], height[known])
+        if slope > STEEP:
+            steeper = "steeper than any surface that a finger slides over: is each unit right?"
+            done.append(f"Rms slope {slope:.3g}, {steeper}")
+        return self.texture(path, kind, (x, height), [*notes, *done], "height")
 
 
 def _smoothed(x: Floats, height: Floats, cutoff: float) -> Floats:

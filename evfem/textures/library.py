@@ -8,6 +8,7 @@ Their names say what they are like in wavelength and roughness; they are synthes
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,11 +45,7 @@ FRICTIONS: dict[str, tuple[str, tuple[float, ...], tuple[float, ...], float]] = 
 
 
 def names() -> list[str]:
-    """The names of the twenty reference textures.
-
-    >>> len(names())
-    20
-    """
+    """The names of the twenty reference textures."""
     return [*REFERENCES, *FRICTIONS]
 
 
@@ -57,17 +54,17 @@ def about(name: str) -> str:
     return (REFERENCES.get(name) or FRICTIONS[name])[0]
 
 
-def reference(name: str) -> Texture:
+def reference(name: Any) -> Texture:
     """The reference texture of this name.
 
     >>> reference("wave-2mm")
     Texture('wave-2mm', sinusoids, 256 heights, period 16 mm, 0.06 mm from lowest to highest)
     """
+    if not isinstance(name, str) or name not in names():
+        raise unknown("texture", str(name), [*names(), "a .json or folder"], str(quoted(name)))
     if name in REFERENCES:
         _, kind, knobs = REFERENCES[name]
         return make(kind, knobs, name)
-    if name not in FRICTIONS:
-        raise unknown("texture", name, [*names(), "a .json or folder"], str(quoted(name)))
     what, x, friction, period = FRICTIONS[name]
     notes = (f"Made by evfem: {what}.",)
     return Texture(name, "table", np.array(x), np.array(friction), FREE, "friction", period, notes)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import above, choice, set_frozen
+from evfem.common.checks import above, choice, real, set_frozen
 from evfem.common.storage import disk, write_text
-from evfem.common.tables import csv_text, numbers, read_columns
+from evfem.common.tables import csv_text, numbers, read_bytes, read_columns
 from evfem.common.views import plus
 from evfem.errors import InputError, quoted
 
@@ -33,11 +34,10 @@ QUANTITIES = {
     "friction_spectrum": (["frequency", "amplitude"], ["1/mm", "1"]),
 }
 KEYS = ("format", "name", "kind", "quantity", "period", "length", "units", "licence", "provenance", "data")
-#: what a texture may be at most: rows, mm of length, mm of height, friction coefficient, letters of
-#: a text, sentences of provenance, bytes of a `.json`
-MOST_ROWS, LONGEST, HIGHEST, ROUGHEST, MOST_LETTERS, MOST_NOTES, MOST_BYTES = (
-    200_000, 1e4, 10.0, 100.0, 400, 200, 200_000,
-)  # fmt: skip
+#: what a texture may be at most: rows, mm of length, letters of a text, sentences of provenance, bytes of a
+#: `.json`; and its least and largest values
+MOST_ROWS, LONGEST, MOST_LETTERS, MOST_NOTES, MOST_BYTES = 200_000, 1e4, 400, 200, 200_000
+ENDS = {"height": (-10.0, 10.0), "friction": (0.0, 100.0), "friction_spectrum": (0.0, 1.5)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,7 @@ class Texture:
             raise InputError("provenance", f"{len(self.provenance)} sentences", f"at most {MOST_NOTES}")
         for note in self.provenance:
             _text("provenance", note)
-        _check_rows(x, values)
-        _check_range(self)
+        _check(self)
         if self.period is not None:
             period = float(above("period", self.period, 0.0, "a length in mm above zero"))
             if self.quantity == "friction_spectrum" or not x[-1] - x[0] < period <= LONGEST:
@@ -89,7 +88,6 @@ class Texture:
             set_frozen(self, period=period)
 
     def __repr__(self) -> str:
-        """Its size."""
         if self.quantity == "friction_spectrum":
             what = f"{self.x.size} frequencies, {self.x[0]:.4g} to {self.x[-1]:.4g} per mm"
             return f"Texture({self.name!r}, {self.kind}, {what})"
@@ -106,10 +104,7 @@ class Texture:
         return float(self.x[-1] - self.x[0]) if self.period is None else self.period
 
     def over(self, start: float, stop: float) -> tuple[Floats, Floats]:
-        """Rows from `start` or before it to `stop` or behind it (mm), periods repeated.
-
-        A texture that ends is continued by its mirror image, so that it neither jumps nor stops.
-        """
+        """Rows from `start` to `stop` (mm) or beyond them, periods repeated, without one mirrored."""
         if self.quantity == "friction_spectrum":
             raise InputError("texture", f"{self.name}, a spectrum", "heights or friction over x")
         x, values, period = self._repeated()
@@ -130,27 +125,6 @@ class Texture:
         back = self.x[-1] + np.cumsum(np.diff(self.x)[::-1])[:-1]
         x, values = np.concatenate([self.x, back]), np.concatenate([self.values, self.values[-2:0:-1]])
         return x, values, 2.0 * float(self.x[-1] - self.x[0])
-
-    def document(self, data: str) -> dict[str, Any]:
-        """Content of its `.json`, whose rows are in the file `data`."""
-        header, units = QUANTITIES[self.quantity]
-        return {
-            "format": FORMAT,
-            "name": self.name,
-            "kind": self.kind,
-            "quantity": self.quantity,
-            "period": self.period,
-            "length": self.length,
-            "units": dict(zip(header, units, strict=True)),
-            "licence": self.licence,
-            "provenance": list(self.provenance),
-            "data": data,
-        }
-
-    def rows(self) -> str:
-        """Content of its `.csv`."""
-        header = QUANTITIES[self.quantity][0]
-        return csv_text([header, *zip(self.x.tolist(), self.values.tolist(), strict=True)])
 
 
 def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
@@ -174,16 +148,18 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
     if data.exists() and not is_data(data):
         given = f"{path}, and {data} is there and no texture's"
         raise InputError("path", given, "a name whose .csv is free, or a texture to replace")
-    write_text(data, texture.rows())
-    write_text(path, json.dumps(texture.document(data.name), indent=1) + "\n")
+    header, units = QUANTITIES[texture.quantity]
+    rows = zip(texture.x.tolist(), texture.values.tolist(), strict=True)
+    write_text(data, csv_text([header, *rows]))
+    document: dict[str, Any] = {"format": FORMAT, "data": data.name}
+    document["units"] = dict(zip(header, units, strict=True))
+    document = {key: document[key] if key in document else getattr(texture, key) for key in KEYS}
+    write_text(path, json.dumps(document, indent=1) + "\n")
     return path, data
 
 
 def read(path: str | Path) -> Texture:
-    """The texture in a `.json` with its `.csv`, or in a folder with both.
-
-    Raises InputError for anything missing, unknown, damaged or beyond the limits of this module.
-    """
+    """The texture in a `.json` with its `.csv`, or in a folder with both; InputError for anything else."""
     path = Path(path)
     path = path / NAME if path.is_dir() else path
     table = _table(path)
@@ -200,39 +176,31 @@ def read(path: str | Path) -> Texture:
     x, values = read_columns(path.with_name(data), header, "data")
     names = ("name", "kind", "licence", "quantity", "period", "provenance")
     found = Texture(x=x, values=values, **{name: table[name] for name in names})
-    if not _near(table["length"], found.length):
+    length = real("length", table["length"], "the length of the rows in mm")
+    if abs(length - found.length) > 1e-6 * max(found.length, 1.0):
         raise InputError("length", quoted(table["length"]), f"that of the rows, {found.length:g} mm")
     return found
 
 
 def is_texture(path: Path) -> bool:
     """Whether a `.json` says that it is a texture."""
-    try:
+    with suppress(InputError):
         return _table(path).get("format") == FORMAT
-    except InputError:
-        return False
+    return False
 
 
 def is_data(path: Path) -> bool:
     """Whether a `.csv` has the rows of the texture beside it."""
-    try:
+    with suppress(InputError):
         return _table(path.with_suffix(".json")).get("data") == path.name
-    except InputError:
-        return False
+    return False
 
 
 def _table(path: Path) -> Mapping[str, Any]:
     allowed = "a readable texture: a .json beside its .csv, or a folder with both"
+    data = read_bytes(path, "texture", allowed, MOST_BYTES, f"at most {MOST_BYTES} bytes")
     try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-        if len(data) > MOST_BYTES:
-            raise InputError("texture", f"{path}, which is too long", f"at most {MOST_BYTES} bytes")
         table = json.loads(data.decode("utf-8"))
-    except OSError as error:
-        raise InputError("texture", f"{path} ({error.strerror or error})", allowed) from None
-    except InputError:
-        raise
     except (ValueError, RecursionError):
         raise InputError("texture", f"{path}, which is no JSON", allowed) from None
     if not isinstance(table, dict):
@@ -240,17 +208,14 @@ def _table(path: Path) -> Mapping[str, Any]:
     return table
 
 
-def _near(given: object, length: float) -> bool:
-    number = isinstance(given, (int, float)) and not isinstance(given, bool)
-    return number and abs(given - length) <= 1e-6 * max(length, 1.0)  # type: ignore[operator]
-
-
 def _text(key: str, value: object) -> None:
     if not isinstance(value, str) or not value.strip() or len(value) > MOST_LETTERS or "\n" in value:
         raise InputError(key, quoted(value), f"a line of 1 to {MOST_LETTERS} letters")
 
 
-def _check_rows(x: Floats, values: Floats) -> None:
+def _check(texture: Texture) -> None:
+    """InputError for rows that do not fit, or beyond what a texture may have."""
+    x, values, quantity = texture.x, texture.values, texture.quantity
     if x.size != values.size or not 2 <= x.size <= MOST_ROWS:
         given = f"{x.size} and {values.size} numbers"
         raise InputError("x", given, f"2 to {MOST_ROWS} rows of two numbers")
@@ -260,13 +225,9 @@ def _check_rows(x: Floats, values: Floats) -> None:
         raise InputError("x", f"{x[n]:g}, then {x[n + 1]:g} (rows {n + 1}, {n + 2})", "rising numbers")
     if np.abs(x).max() > LONGEST:
         raise InputError("x", f"{x[np.argmax(np.abs(x))]:g}", f"numbers within {LONGEST:g}")
-
-
-def _check_range(texture: Texture) -> None:
-    values, quantity = texture.values, texture.quantity
-    low, high = {"height": (-HIGHEST, HIGHEST), "friction": (0.0, ROUGHEST)}.get(quantity, (0.0, 1.5))
+    low, high = ENDS[quantity]
     if values.min() < low or values.max() > high:
         wrong = values[int(np.argmax(np.maximum(low - values, values - high)))]
         raise InputError(quantity, f"{wrong:g}", f"values from {low:g} to {high:g}, lengths in mm")
-    if quantity == "friction_spectrum" and texture.x[0] <= 0.0:
-        raise InputError("frequency", f"{texture.x[0]:g}", "spatial frequencies in 1/mm above zero")
+    if quantity == "friction_spectrum" and x[0] <= 0.0:
+        raise InputError("frequency", f"{x[0]:g}", "spatial frequencies in 1/mm above zero")

@@ -208,7 +208,6 @@ class Integral:
         return 1.0 + float(volume_change(self.state(u).sampled).min())
 
     # -- at the points
-    # ----------------------------------------------------------------------------------------------
 
     def fluxes(self, x: Array) -> Array:
         """s (K, C, Q) at the parts x (K, C, Q) of u."""
@@ -222,7 +221,6 @@ class Integral:
         return complex_step(self.fluxes, x, rank=1)
 
     # -- of the cells
-    # -------------------------------------------------------------------------------------------------
 
     def cell_forces(self, u: Floats) -> Floats:
         """Forces on the nodes of each cell, sum of w B^T s, (C, n, dim)."""
@@ -255,7 +253,6 @@ class Integral:
         return K.reshape(C, n * dim, n * dim)
 
     # -- the pressure: the flux of theta
-    # ------------------------------------------------------------------------------
 
     def pressure(self, u: Floats) -> Floats:
         """Flux q of theta at the points (C, Q)."""
@@ -300,7 +297,6 @@ class Integral:
         return np.swapaxes(products, 2, 3).reshape(C, Q, n * dim)
 
     # -- of the mesh
-    # --------------------------------------------------------------------------------------------------
 
     def forces(self, u: Floats) -> Floats:
         """Nodal forces (N, dim)."""

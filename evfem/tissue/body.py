@@ -20,41 +20,6 @@ from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
 
 
-class Drag:
-    """Kelvin-Voigt stress and mass of a release (docs, Theory), with one rate and no time: nothing to choose.
-
-    The stress holds what deforms, down to single nodes; the mass, by which a shear wave crosses the body's
-    height in the relaxation time, what moves as a whole. Its speed is taken away at each step's beginning, so
-    a release never overshoots. A large rate leaves the body where it is.
-
-    `groups` are laws with a shear modulus and the cells they hold for.
-    """
-
-    def __init__(self, space: Space, groups: Sequence[tuple[Any, Ints]]) -> None:
-        modulus = np.zeros(len(space.nodes))
-        for law, cells in groups:
-            modulus[cells] = law.shear_modulus
-        height = float(np.ptp(space.mesh.points[:, 1]))
-        self._terms = Dynamics(space, modulus, modulus / height**2)
-
-    def begin(self, u: Floats, rate: float) -> None:
-        """Start a step of `rate` > 0 from displacements u (N, dim) at rest."""
-        self._terms.begin(u, np.zeros_like(u), 1.0 / rate)
-
-    def forces(self, u: Floats) -> Floats:
-        """Nodal forces (N, dim)."""
-        return self._terms.forces(u)
-
-    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
-        """Add the tangent to the `data` of a pattern."""
-        self._terms.add_tangent(u, pattern, data)
-
-    def dissipation(self, u: Floats) -> float:
-        """Dissipation by drag in the step that ends at u: N mm, in the plane per mm of depth."""
-        moving = self._terms.kinetic_energy(self._terms.velocity(u))
-        return self._terms.dissipation(u) + 2.0 * moving
-
-
 class Body:
     """Tissue plus user terms on a space, reduced to the free nodes and the bone's translation."""
 
@@ -88,19 +53,29 @@ class Body:
         return Pattern(self.unknowns[self.space.nodes, 0] // dim, dim)
 
     @cached_property
-    def drag(self) -> Drag:
-        """Drag of the body during a release."""
-        return Drag(self.space, self.tissue.groups)
+    def drag(self) -> Dynamics:
+        """Kelvin-Voigt stress and mass of a release (docs, Theory), with one rate and no time.
+
+        The stress holds what deforms, down to single nodes; the mass, by which a shear wave crosses the
+        body's height in the relaxation time, what moves as a whole. Its speed is taken away at each step's
+        beginning, so a release never overshoots. A large rate leaves the body where it is.
+        """
+        modulus = np.zeros(len(self.space.nodes))
+        for law, cells in self.tissue.groups:
+            modulus[cells] = law.shear_modulus
+        return Dynamics(self.space, modulus, modulus / np.ptp(self.space.mesh.points[:, 1]) ** 2)
 
     def release(self, u: Floats, rate: float) -> None:
         """From now on drag of this rate holds the body back at u (N, dim); none if it is 0."""
         self.drag_rate = rate
         if rate > 0.0:
-            self.drag.begin(u, rate)
+            self.drag.begin(u, np.zeros_like(u), 1.0 / rate)
 
     def drag_dissipation(self, u: Floats) -> float:
         """Dissipation by drag in the step that ends at u: N mm, in the plane per mm of depth."""
-        return self.drag.dissipation(u) if self.drag_rate > 0.0 else 0.0
+        if self.drag_rate == 0.0:
+            return 0.0
+        return self.drag.dissipation(u) + 2.0 * self.drag.kinetic_energy(self.drag.velocity(u))
 
     def reduce(self, nodal: Floats) -> Floats:
         """Nodal forces (N, dim) to reduced forces (n,): sums over the bone."""
@@ -139,6 +114,10 @@ class Body:
         for term in self._acting:
             term.add_tangent(u, self.pattern, data)
         return self.pattern.finish(data)
+
+    def whole(self, u: Floats) -> Floats:
+        """Displacements (N, dim) of all nodes in a state that has u: here the same."""
+        return u
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) at the end of a step that ends at u."""

@@ -178,8 +178,12 @@ def kelvin_voigt(u: Any, v: Any, w: Any) -> Any:
     return ddot(mul(F, S), grad(v))
 
 
-def in_space(F: Array) -> Array:
-    """F (3, 3, ...) in three dimensions of F (dim, dim, ...); F33 = 1 in the plane."""
+def embed(F: Array) -> Array:
+    """F (3, 3, ...) in three dimensions of F (dim, dim, ...); F33 = 1 in the plane.
+
+    >>> embed(np.array([[2.0, 0.0], [0.5, 1.0]])).tolist()
+    [[2.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
     if len(F) == 3:
         return F
     whole = np.zeros((3, 3, *F.shape[2:]), dtype=F.dtype)
@@ -189,7 +193,7 @@ def in_space(F: Array) -> Array:
 
 def isochoric(F: Array) -> Array:
     """(det F)^(-2/3) F^T F (3, 3, ...) of F (dim, dim, ...)."""
-    whole = in_space(F)
+    whole = embed(F)
     return det(F) ** (-2.0 / 3.0) * mul(transpose(whole), whole)
 
 

@@ -27,7 +27,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from evfem.common.checks import Within, check_fields, number
-from evfem.tensor import Array, ddot, det, identity, inv, outer, transpose
+from evfem.tensor import Array, ddot, det, identity, outer, transpose
 from evfem.tissue.ogden import (
     POSITIVE,
     Branches,
@@ -41,7 +41,7 @@ from evfem.tissue.ogden import (
     bulk_modulus,
     check_volumetric,
 )
-from evfem.tissue.splitlaw import SplitLaw, split
+from evfem.tissue.splitlaw import Hyperelastic, SplitLaw, split
 
 __all__ = ["LAWS", "LinearElastic", "NeoHookean", "Ogden", "SplitLaw", "Yeoh", "split"]
 
@@ -63,13 +63,11 @@ def _first_invariant(F: Array) -> Array:
     return squares + 1.0 if len(F) == 2 else squares
 
 
-class _InvariantLaw:
+class _InvariantLaw(Hyperelastic):
     """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln J.
 
-    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and `_slopes`.
+    With w_I, w_t the derivatives of w: S = 2 w_I F, q = w_t. A law supplies `_energy` and `_slopes`.
     """
-
-    volume_measure: Literal["log", "trace"] = "log"
 
     def _energy(self, I1: Array, theta: Array) -> Array:
         raise NotImplementedError
@@ -77,24 +75,6 @@ class _InvariantLaw:
     def _slopes(self, I1: Array, theta: Array) -> tuple[Array, Array, Array, Array, Array]:
         """w_I, w_t, w_II, w_It, w_tt."""
         raise NotImplementedError
-
-    def psi(self, F: Array) -> Array:
-        """Energy per reference volume (...) in MPa at F (3, 3, ...)."""
-        return self._energy(ddot(F, F), np.log(det(F)))
-
-    def P(self, F: Array) -> Array:
-        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at F (3, 3, ...)."""
-        w_I, w_t, *_ = self._slopes(ddot(F, F), np.log(det(F)))
-        return 2.0 * w_I * F + w_t * transpose(inv(F))
-
-    def tangent(self, F: Array) -> Array:
-        """dP_ij/dF_kl (3, 3, 3, 3, ...) in MPa at F (3, 3, ...)."""
-        w_I, w_t, w_II, w_It, w_tt = self._slopes(ddot(F, F), np.log(det(F)))
-        G = transpose(inv(F))
-        unit = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3)).reshape((3,) * 4 + (1,) * (F.ndim - 2))
-        A = 2.0 * w_I * unit - w_t * np.einsum("il...,kj...->ijkl...", G, G)
-        A = A + 4.0 * w_II * outer(F, F) + w_tt * outer(G, G)
-        return A + 2.0 * w_It * (outer(F, G) + outer(G, F))
 
     def split_energy(self, F: Array, theta: Array) -> Array:
         """W(F, theta) (...) at F (d, d, ...)."""
@@ -138,10 +118,6 @@ class NeoHookean(Isotropic, _InvariantLaw):
     def _slopes(self, I1: Array, theta: Array) -> tuple[Array, Array, Array, Array, Array]:
         zero = np.zeros(())
         return np.array(0.5 * self.mu), self.lmbda * theta - self.mu, zero, zero, np.array(self.lmbda)
-
-    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
-        """S = mu F (d, d, ...) and q = lambda theta - mu (...)."""
-        return self.mu * F, self.lmbda * theta - self.mu
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
         """A = mu (unit), c = 0, k = lambda: constants, as read-only views of the right shapes."""
@@ -202,7 +178,7 @@ class Yeoh(_InvariantLaw):
 
 
 @dataclass(frozen=True)
-class LinearElastic(Isotropic):
+class LinearElastic(Isotropic, Hyperelastic):
     """Small-strain isotropic elasticity, psi = mu e : e + lambda/2 (tr e)^2, e = (F + F^T)/2 - I.
 
     mu and lambda as in `NeoHookean`. Not objective: rotations of more than a few degrees strain it. Its
@@ -213,21 +189,6 @@ class LinearElastic(Isotropic):
     """
 
     volume_measure: Literal["log", "trace"] = field(default="trace", init=False, repr=False)
-
-    def psi(self, F: Array) -> Array:
-        """Energy per volume (...) in MPa at F (3, 3, ...)."""
-        return self.split_energy(F, np.trace(F) - 3.0)
-
-    def P(self, F: Array) -> Array:
-        """Stress (3, 3, ...) in MPa at F (3, 3, ...)."""
-        S, q = self.split_stress(F, np.trace(F) - 3.0)
-        return S + q * identity(3, F.ndim - 2)
-
-    def tangent(self, F: Array) -> Array:
-        """dP_ij/dF_kl (3, 3, 3, 3, ...) in MPa at F (3, 3, ...), a read-only view."""
-        d = np.eye(3)
-        unit, turned = np.einsum("ik,jl->ijkl", d, d), np.einsum("il,jk->ijkl", d, d)
-        return _spread(self.mu * (unit + turned) + self.lmbda * np.einsum("ij,kl->ijkl", d, d), F[0, 0])
 
     def split_energy(self, F: Array, theta: Array) -> Array:
         """W(F, theta) = mu e : e + lambda/2 theta^2 (...)."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
 from evfem.common.checks import Checked, Within, check_fields, number, real, yes_or_no
 from evfem.errors import InputError, quoted
-from evfem.tensor import Array, complex_step, ddot, det, inv, mul, symmetric_power, transpose
-from evfem.tissue.splitlaw import stepped_tangent
+from evfem.tensor import Array, ddot, det, mul, symmetric_power, transpose
+from evfem.tissue.splitlaw import Hyperelastic, stepped_tangent
 
 POSITIVE = number("a positive number in MPa", Within(0.0, above=True), "MPa")
 _BELOW_HALF = Within(-1.0, 0.5, above=True, below=True)
@@ -130,7 +130,7 @@ _ALPHA = _numbers(f"{_TERMS} or beyond +-{MOST:g}", lambda value: 0.0 < abs(valu
 
 
 @dataclass(frozen=True)
-class Ogden:
+class Ogden(Hyperelastic):
     """Ogden's law with a volumetric part in ln J.
 
     psi = sum over p of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + K/2 (ln J)^2 with l_i =
@@ -150,7 +150,6 @@ class Ogden:
     density: Density = 1e-9
     relaxation: Branches = None
     bulk_relaxation: BulkRelaxes = False
-    volume_measure: Literal["log", "trace"] = field(default="log", init=False, repr=False)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -176,15 +175,16 @@ class Ogden:
         """Bulk modulus K in MPa."""
         return bulk_modulus(self.shear_modulus, self.nu, self.bulk)
 
-    def _energy(self, C: Array, theta: Array, out_of_plane: float) -> Array:
-        energy = 0.5 * self.bulk_modulus * theta * theta
+    def split_energy(self, F: Array, theta: Array) -> Array:
+        """W(F, theta) (...) at F (d, d, ...)."""
+        C, energy = mul(transpose(F), F), 0.5 * self.bulk_modulus * theta * theta
         for m, a in zip(*self._terms, strict=True):
-            powers = np.trace(symmetric_power(C, 0.5 * a)) + out_of_plane
+            powers = np.trace(symmetric_power(C, 0.5 * a)) + 3.0 - len(F)
             energy = energy + m / a * (np.exp(-a / 3.0 * theta) * powers - 3.0)
         return energy
 
-    def _stress(self, F: Array, theta: Array, out_of_plane: float) -> tuple[Array, Array]:
-        """Derivatives of the energy by F (n, n, ...) at fixed theta, and by theta."""
+    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
+        """S = dW/dF (d, d, ...) and q = dW/dtheta (...)."""
         C = mul(transpose(F), F)
         S: Array = np.zeros(())
         q = self.bulk_modulus * theta
@@ -192,29 +192,8 @@ class Ogden:
             scaled = m * np.exp(-a / 3.0 * theta)
             power = symmetric_power(C, 0.5 * a - 1.0)
             S = S + scaled * mul(F, power)
-            q = q - scaled / 3.0 * (ddot(power, C) + out_of_plane)
+            q = q - scaled / 3.0 * (ddot(power, C) + 3.0 - len(F))
         return S, q
-
-    def psi(self, F: Array) -> Array:
-        """Energy per reference volume (...) in MPa at F (3, 3, ...)."""
-        return self._energy(mul(transpose(F), F), np.log(det(F)), 0.0)
-
-    def P(self, F: Array) -> Array:
-        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at F (3, 3, ...)."""
-        S, q = self._stress(F, np.log(det(F)), 0.0)
-        return S + q * transpose(inv(F))
-
-    def tangent(self, F: Array) -> Array:
-        """dP_ij/dF_kl (3, 3, 3, 3, ...) in MPa at real F (3, 3, ...)."""
-        return complex_step(self.P, F, rank=2)
-
-    def split_energy(self, F: Array, theta: Array) -> Array:
-        """W(F, theta) (...) at F (d, d, ...)."""
-        return self._energy(mul(transpose(F), F), theta, 3.0 - len(F))
-
-    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
-        """S = dW/dF (d, d, ...) and q = dW/dtheta (...)."""
-        return self._stress(F, theta, 3.0 - len(F))
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
         """Second derivatives of W at real F and theta: A (d, d, d, d, ...), c (d, d, ...), k (...)."""

@@ -24,16 +24,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
-from evfem.mesh.hexahedron import EDGES, FACES, PLACES
+from evfem.mesh.hexahedron import PLACES
 from evfem.mesh.mesh import CELLS, Mesh
-from evfem.tensor import det
+from evfem.tensor import det, inv
 from evfem.tissue.kernels.blocks import Cells, blocked, loops
 
 #: element -> (mesh kind, order of quadrature, how ln J is sampled)
@@ -72,70 +72,51 @@ def points_per_cell(element: str) -> int:
     >>> points_per_cell("q2p1"), points_per_cell("p2")
     (9, 6)
     """
+    return len(quadrature(element)[1])
+
+
+def quadrature(element: str, facet: bool = False) -> tuple[Floats, Floats]:
+    """scikit-fem's places (Q, dim) and weights (Q,) in the reference cell of an element, or its `facet`."""
     import skfem
 
     kind, intorder, _ = ELEMENTS[element]
-    return int(skfem.quadrature.get_quadrature(shape_functions(kind).refdom, intorder)[1].size)
+    domain = reference(kind)[0].refdom
+    X, W = skfem.quadrature.get_quadrature(domain.brefdom if facet else domain, intorder)
+    return X.T, W
 
 
-def scikit_mesh(mesh: Mesh) -> Any:
-    """The same mesh as a scikit-fem mesh, its nodes where ours are (curved mid-nodes included)."""
+@cache
+def reference(kind: str) -> tuple[Any, Ints]:
+    """scikit-fem's element on cells of a kind, and which of its shape functions each of their nodes has."""
     import skfem
 
-    linear = {3: skfem.MeshTri, 4: skfem.MeshQuad, 8: skfem.MeshHex}[mesh.corners]
-    corners = mesh.cells[:, : mesh.corners]
-    used = np.zeros(len(mesh.points), dtype=bool)
-    used[corners] = True
-    vertices, t = np.flatnonzero(used), (np.cumsum(used) - 1)[corners].T
-    if mesh.corners == 8:  # scikit-fem has its own order of the corners
-        t = t[[int(np.flatnonzero((PLACES[:8] == 2 * p - 1).all(axis=1))[0]) for p in linear.elem.refdom.p.T]]
-    base = linear(np.ascontiguousarray(mesh.points[vertices].T), np.ascontiguousarray(t))
-    if mesh.order == 1:
-        return base
-    raised = {3: skfem.MeshTri2, 4: skfem.MeshQuad2, 8: skfem.MeshHex2}[mesh.corners]
-    quadratic = raised.from_mesh(base)
-    ours = nodes_at(straight_points(mesh), quadratic.doflocs.T)
-    return type(quadratic)(np.ascontiguousarray(mesh.points[ours].T), quadratic.t)
+    element = {
+        "quad": skfem.ElementQuad1,
+        "quad9": skfem.ElementQuad2,
+        "triangle6": skfem.ElementTriP2,
+        "hexahedron": skfem.ElementHex1,
+        "hexahedron27": skfem.ElementHex2,
+    }[kind]()
+    if CELLS[kind].dimension == 2:
+        return element, np.arange(CELLS[kind].nodes)
+    ours = 0.5 * (PLACES[: CELLS[kind].nodes] + 1.0)
+    return element, (ours[:, None] == element.doflocs).all(axis=2).argmax(axis=1)
 
 
-def straight_points(mesh: Mesh) -> Floats:
-    """Where the nodes would be if every edge were straight, (N, dim): tells them apart when curved."""
-    points = mesh.points.copy()
-    if mesh.order == 2 and mesh.corners == 8:
-        corner = mesh.points[mesh.cells[:, :8]]
-        points[mesh.cells[:, 8:20]] = corner[:, EDGES].mean(axis=2)
-        points[mesh.cells[:, 20:26]] = corner[:, FACES].mean(axis=2)
-        points[mesh.cells[:, 26]] = corner.mean(axis=1)
-    elif mesh.order == 2:
-        m = mesh.corners
-        corner = mesh.points[mesh.cells[:, :m]]
-        points[mesh.cells[:, m : 2 * m]] = 0.5 * (corner + np.roll(corner, -1, axis=1))
-        if m == 4:
-            points[mesh.cells[:, 8]] = corner.mean(axis=1)
-    return points
-
-
-def nodes_at(points: Floats, places: Floats) -> Ints:
-    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its unknowns.
-
-    Equally many are paired in their order along an oblique line, which is theirs unless two lie
-    at one place of it; a search tree finds the others. Raises `RuntimeError` where no point lies
-    within 1e-9 of the mesh's size: then the two meshes differ.
+def shape_functions(kind: str, places: Floats) -> tuple[Floats, Floats]:
+    """Values (Q, n) and derivatives (Q, n, dim) of the shape functions of a cell's nodes at places (Q, dim)
+    in the reference cell, whose coordinates go from 0 to 1.
     """
-    allowed = 1e-9 * float(np.ptp(points, axis=0).max())
-    if len(points) == len(places):
-        oblique = np.sqrt([2.0, 3.0, 5.0])[: points.shape[1]]
-        number = np.empty(len(points), dtype=np.int64)
-        number[np.argsort(places @ oblique)] = np.argsort(points @ oblique)
-        if np.abs(points[number] - places).max() <= allowed:
-            return number
-    from scipy.spatial import cKDTree
+    element, order = reference(kind)
+    both = [element.lbasis(places.T, i) for i in order]
+    value = np.stack([np.broadcast_to(value, len(places)) for value, _ in both], axis=1)
+    return value, np.stack([np.broadcast_to(slope, places.T.shape).T for _, slope in both], axis=1)
 
-    distance, number = cKDTree(points).query(places)
-    farthest = float(np.max(distance))
-    if not farthest <= allowed:
-        raise RuntimeError(f"a node of scikit-fem's mesh is {farthest:g} mm away from the nearest of ours")
-    return number
+
+def jacobians(mesh: Mesh, cells: Ints, slope: Floats) -> Floats:
+    """dX/dxi (dim, dim, C, Q) in cells, from derivatives (Q, n, dim) there, or (C, Q, n, dim)."""
+    nodes = np.swapaxes(mesh.points[mesh.cells[cells]], 1, 2)
+    return (nodes[:, None] @ slope).transpose(2, 3, 0, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,24 +233,22 @@ def cells_of(space: Space) -> Cells:
 
 def make_space(mesh: Mesh, element: str) -> Space:
     """Build the space of `element` on `mesh`, whose kind must fit; inverted cells are refused."""
-    import skfem
-
-    kind, intorder, sampling = ELEMENTS[element]
+    kind, _, sampling = ELEMENTS[element]
     if mesh.kind != kind:
         raise InputError("solver.element", element, f"cells of kind {kind}, the mesh has {mesh.kind}")
-    shape = shape_functions(kind)
-    grid = scikit_mesh(mesh)
-    X, W = skfem.quadrature.get_quadrature(shape.refdom, intorder)
-    mapping = grid.mapping()
-    determinant = det(np.asarray(mapping.DF(X)))
+    places, W = quadrature(element)
+    value, slope = shape_functions(kind, places)
+    jacobian = jacobians(mesh, np.arange(len(mesh.cells)), slope)
+    determinant = det(jacobian)
     check_orientation(mesh, determinant)
-    weight = np.abs(determinant) * W
-    points = np.ascontiguousarray(mapping.F(X))
-    at = _gradients(shape, mapping, X)
+    weight = determinant * W
+    points = np.ascontiguousarray((value @ mesh.points[mesh.cells]).transpose(2, 0, 1))
+    at = _gradients(slope, jacobian)
     sampled: Gradients | MeanGradients = at
     modes = psi = None
     if sampling == "centroid":
-        sampled = _gradients(shape, mapping, np.array([[0.5], [0.5]]))
+        _, slope = shape_functions(kind, np.full((1, mesh.dim), 0.5))
+        sampled = _gradients(slope, jacobians(mesh, np.arange(len(mesh.cells)), slope))
         modes, psi = _constant(weight)
     elif sampling == "mean":
         sampled = MeanGradients(_mean(at.of_mesh, weight))
@@ -277,35 +256,12 @@ def make_space(mesh: Mesh, element: str) -> Space:
     elif sampling == "linear":
         modes = _linear(points, weight)
         psi = np.swapaxes(modes * weight[..., None], 1, 2)
-    elif sampling != "point":
-        raise ValueError(f"no such sampling of the volume: {sampling}")
-    # one point is enough for the numbers of the unknowns
-    dofs = skfem.Basis(grid, shape, mapping=mapping, quadrature=(X[:, :1], W[:1]))
-    nodes = np.ascontiguousarray(nodes_at(mesh.points, dofs.doflocs.T)[dofs.element_dofs].T)
-    value = np.stack([shape.lbasis(X, i)[0] for i in range(nodes.shape[1])], axis=1)
-    return Space(mesh, element, nodes, points, value, weight, at, sampled, modes, psi)
+    return Space(mesh, element, mesh.cells, points, value, weight, at, sampled, modes, psi)
 
 
-def _gradients(shape: Any, mapping: Any, X: Floats) -> Gradients:
-    """Gradients of scikit-fem's shape functions at the points X (dim, Q) of the reference cell."""
-    count = shape.doflocs.shape[0]
-    reference = np.stack([np.broadcast_to(shape.lbasis(X, i)[1], X.shape).T for i in range(count)], axis=1)
-    inverse = mapping.invDF(X).transpose(2, 3, 0, 1)
-    return Gradients(np.ascontiguousarray(reference), np.ascontiguousarray(inverse))
-
-
-def shape_functions(kind: str) -> Any:
-    """scikit-fem's shape functions on cells of a kind."""
-    import skfem
-
-    shapes = {
-        "quad": skfem.ElementQuad1,
-        "quad9": skfem.ElementQuad2,
-        "triangle6": skfem.ElementTriP2,
-        "hexahedron": skfem.ElementHex1,
-        "hexahedron27": skfem.ElementHex2,
-    }
-    return shapes[kind]()
+def _gradients(slope: Floats, jacobian: Floats) -> Gradients:
+    """From derivatives (Q, n, dim) of the shape functions in the reference cell, dX/dxi (dim, dim, E, Q)."""
+    return Gradients(np.ascontiguousarray(slope), np.ascontiguousarray(inv(jacobian).transpose(2, 3, 0, 1)))
 
 
 def scatter(nodes: Ints, fe: Floats, size: int) -> Floats:
@@ -314,29 +270,13 @@ def scatter(nodes: Ints, fe: Floats, size: int) -> Floats:
     return np.stack([np.bincount(flat, fe[..., i].ravel(), size) for i in range(fe.shape[2])], axis=1)
 
 
-def shape_values(basis: Any) -> Floats:
-    """Shape functions of a scalar basis as (E, Q, n)."""
-    return np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)], axis=-1)
-
-
-def shape_gradients(basis: Any) -> Floats:
-    """Shape gradients of a scalar basis as (E, Q, n, dim)."""
-    fields = [basis.basis[a][0].grad for a in range(basis.Nbfun)]
-    shape = np.broadcast_shapes(*(f.shape for f in fields))
-    return np.ascontiguousarray(np.stack([np.broadcast_to(f, shape) for f in fields]).transpose(2, 3, 0, 1))
-
-
 def check_orientation(mesh: Mesh, determinant: Floats) -> None:
-    """Refuse inverted cells by the sign of det dX/dxi (E, Q), of which scikit-fem takes the size."""
-    sign = np.sign(determinant)
-    bad = np.flatnonzero((sign * np.median(sign, axis=1, keepdims=True) <= 0).any(axis=1))
+    """Refuse inverted cells by det dX/dxi (E, Q)."""
+    bad = np.flatnonzero((determinant <= 0.0).any(axis=1))
     if bad.size:
         centre = ", ".join(f"{x:.3g}" for x in mesh.points[mesh.cells[bad[0]]].mean(axis=0))
-        raise InputError(
-            "finger.mesh",
-            f"{bad.size} tangled cells, the first near ({centre})",
-            "cells with a positive Jacobian at every quadrature point",
-        )
+        given = f"{bad.size} tangled cells, the first near ({centre})"
+        raise InputError("finger.mesh", given, "cells with a positive Jacobian at every quadrature point")
 
 
 def _constant(weight: Floats) -> tuple[Floats, Floats]:

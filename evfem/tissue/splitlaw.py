@@ -28,10 +28,11 @@ from evfem.tensor import (
     identity,
     inv,
     mul,
+    outer,
     symmetric_power,
     transpose,
 )
-from evfem.tissue.forms import Form, Parts, fluxes
+from evfem.tissue.forms import Form, Parts, embed, fluxes
 
 #: change of F and theta over which the stress of an energy is differenced
 DIFFERENCE_STEP = 4e-3
@@ -39,7 +40,6 @@ DIFFERENCE_STEP = 4e-3
 STRETCH = 1e-4
 
 Stress = Callable[[Array, Array], tuple[Array, Array]]
-Turn = Callable[[float], tuple[Array, Array]]
 
 
 @runtime_checkable
@@ -56,19 +56,35 @@ class SplitLaw(Protocol):
     def split_sigma_zz(self, F: Array, theta: Array) -> Array: ...
 
 
-def embed(F: Array) -> Array:
-    """In-plane F (2, 2, ...) as a plane-strain deformation gradient (3, 3, ...) with F33 = 1; a
-    whole F (3, 3, ...) as it is.
+class Hyperelastic:
+    """The public form of a law, psi, P and tangent, from its split form."""
 
-    >>> embed(np.array([[2.0, 0.0], [0.5, 1.0]])).tolist()
-    [[2.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    """
-    if len(F) == 3:
-        return F
-    out = np.zeros((3, 3, *F.shape[2:]), dtype=F.dtype)
-    out[:2, :2] = F
-    out[2, 2] = 1.0
-    return out
+    volume_measure: Literal["log", "trace"] = "log"
+
+    def _measured(self: Any, F: Array) -> tuple[Array, Array]:
+        """theta (...) at F (3, 3, ...), and dtheta/dF (3, 3, ...)."""
+        if self.volume_measure == "trace":
+            return np.trace(F) - 3.0, identity(3, F.ndim - 2)
+        return np.log(det(F)), transpose(inv(F))
+
+    def psi(self: Any, F: Array) -> Array:
+        """Energy per reference volume (...) in MPa at F (3, 3, ...)."""
+        return np.asarray(self.split_energy(F, self._measured(F)[0]))
+
+    def P(self: Any, F: Array) -> Array:
+        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at F (3, 3, ...)."""
+        theta, G = self._measured(F)
+        S, q = self.split_stress(F, theta)
+        return np.asarray(S + q * G)
+
+    def tangent(self: Any, F: Array) -> Array:
+        """dP_ij/dF_kl (3, 3, 3, 3, ...) in MPa at real F (3, 3, ...)."""
+        theta, G = self._measured(F)
+        A, c, k = self.split_tangent(F, theta)
+        D = A + outer(c, G) + outer(G, c) + k * outer(G, G)
+        if self.volume_measure == "log":
+            D = D - self.split_stress(F, theta)[1] * np.einsum("il...,kj...->ijkl...", G, G)
+        return np.asarray(D)
 
 
 class UserLaw:
@@ -247,12 +263,12 @@ def _scaled(F: Array, theta: Array) -> Array:
 def _work(stress: Stress, F: Array, theta: Array) -> Array:
     """Integral of S : dF + q dtheta from rest along R(t phi) (I + t (U - I)), t theta, where F = R(phi) U."""
     U = symmetric_power(mul(transpose(F), F), 0.5)
-    turn = _turn_in_plane(F) if len(F) == 2 else _turn_in_space(mul(F, inv(U)))
+    turn = _turn(embed(mul(F, inv(U))))
     eye = identity(len(F), F.ndim - 2)
     work = np.zeros(F.shape[2:])
     for node, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True):
         t = 0.5 * (node + 1.0)
-        R, turned = turn(t)
+        R, turned = (part[: len(F), : len(F)] for part in turn(t))
         V = eye + t * (U - eye)
         rate = mul(turned, V) + mul(R, U - eye)
         S, q = stress(mul(R, V), t * theta)
@@ -260,19 +276,10 @@ def _work(stress: Stress, F: Array, theta: Array) -> Array:
     return work
 
 
-def _turn_in_plane(F: Array) -> Turn:
-    """The part t of the rotation (2, 2, ...) in F, and its derivative by t."""
-    phi = np.arctan2(F[1, 0] - F[0, 1], F[0, 0] + F[1, 1])
-
-    def turn(t: float) -> tuple[Array, Array]:
-        c, s = np.cos(t * phi), np.sin(t * phi)
-        return np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]]) * phi
-
-    return turn
-
-
-def _turn_in_space(R: Array) -> Turn:
-    """The same of a rotation (3, 3, ...) by less than half a turn, about its axis (Rodrigues)."""
+def _turn(R: Array) -> Callable[[float], tuple[Array, Array]]:
+    """The part t of a rotation (3, 3, ...) by less than half a turn about its axis (Rodrigues), and its
+    derivative by t.
+    """
     skew = 0.5 * (R - transpose(R))
     sine = np.sqrt(0.5 * ddot(skew, skew))
     phi = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))

@@ -18,11 +18,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
+from evfem.mesh.faces import shape_functions as side_functions
 from evfem.mesh.mesh import Mesh
-from evfem.tensor import Array, complex_step, difference
+from evfem.tensor import Array, complex_step, difference, inv
 from evfem.tissue.assembly import Points, UserIntegral, points_of
 from evfem.tissue.forms import Field, Integrand, Parts, fluxes
-from evfem.tissue.space import ELEMENTS, Space, scikit_mesh, shape_functions, shape_gradients, shape_values
+from evfem.tissue.space import Space, jacobians, quadrature, reference, shape_functions
 
 #: cells or facets that a form is tried on, size of the trial's random displacements and gradients
 PLACES, SIZE = 16, 0.1
@@ -39,7 +40,6 @@ def make_term(space: Space, form: Integrand, on: str, boundary: bool, law: Any =
 
 
 # -- trial
-# --------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -145,14 +145,15 @@ def _cell_places(mesh: Mesh, name: str) -> tuple[Floats, None]:
 
 def _facet_places(mesh: Mesh, name: str) -> tuple[Floats, Floats]:
     """Middles and outward normals (dim, C, 1) of a few outer edges or faces of a boundary."""
-    corner = mesh.points[_few(named_facets(mesh, name))]
+    cells, sides = sides_of(mesh, name)
+    corner = mesh.points[_few(mesh.cell_sides[cells, sides])]
     if mesh.dim == 3:
         normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]).T
     else:
         tangent = corner[:, 1] - corner[:, 0]
         normal = np.stack([tangent[:, 1], -tangent[:, 0]])
     normal = normal / np.linalg.norm(normal, axis=0)
-    return corner.mean(axis=1).T[..., None], normal[..., None]
+    return corner[:, : 2 * mesh.dim - 2].mean(axis=1).T[..., None], normal[..., None]
 
 
 def _few(rows: Ints) -> Ints:
@@ -161,48 +162,42 @@ def _few(rows: Ints) -> Ints:
 
 
 # -- facets
-# --------------------------------------------------------------------------------------------------------
 
 
-def named_facets(mesh: Mesh, name: str) -> Ints:
-    """Corners (K, 2), in space (K, 4), of a boundary's outer sides; raises `InputError` without any."""
+def sides_of(mesh: Mesh, name: str) -> tuple[Ints, Ints]:
+    """Cells (K,) and their sides (K,) of a boundary's outer edges (faces); `InputError` without any."""
     if name not in mesh.node_sets:
         allowed = f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
         raise InputError("boundary", quoted(name), allowed)
-    facets = mesh.faces_of(name)[:, :4] if mesh.dim == 3 else mesh.edges_of(name)[:, :2]
-    if not len(facets):
+    cells, sides = np.nonzero(mesh.in_set(name))
+    if not len(cells):
         facet = "face" if mesh.dim == 3 else "edge"
         raise InputError("boundary", quoted(name), f"a boundary with at least one outer {facet}")
-    return facets
+    return cells, sides
 
 
-def facet_points(space: Space, name: str, quadrature: tuple[Floats, Floats] | None = None) -> Points:
-    """Quadrature points on the outer edges (in space: faces) of a boundary, in the order of
-    scikit-fem's facets; `quadrature` gives places (dim - 1, Q) in [0, 1] along an edge with their
-    weights (Q,) instead of the element's own.
+def facet_points(space: Space, name: str, rule: tuple[Floats, Floats] | None = None) -> Points:
+    """Quadrature points on the outer edges (in space: faces) of a boundary; a `rule` gives places
+    (Q, dim - 1) in [0, 1] along an edge with their weights (Q,) instead of the element's own.
     """
-    import skfem
-
-    kind, intorder, _ = ELEMENTS[space.element]
-    grid = scikit_mesh(space.mesh)
-    facets = _facets(space, grid, name)
-    shape = shape_functions(kind)
-    basis = skfem.FacetBasis(grid, shape, facets=facets, intorder=intorder, quadrature=quadrature)
-    return Points(
-        basis.tind,
-        space.nodes[basis.tind],
-        shape_values(basis),
-        shape_gradients(basis),
-        np.asarray(basis.dx),
-        np.asarray(basis.global_coordinates()),
-        normal=np.asarray(basis.normals),
+    mesh, dim = space.mesh, space.dim
+    places, W = rule or quadrature(space.element, facet=True)
+    cells, sides = sides_of(mesh, name)
+    element, order = reference(mesh.kind)
+    on_side, by_side = side_functions(2 * dim - 2, 2.0 * places - 1.0)
+    corners = element.doflocs[order[mesh.local_sides[:, : 2 * dim - 2]]]
+    both = [shape_functions(mesh.kind, on_side @ corner) for corner in corners]
+    value, slope = (np.stack(part)[sides] for part in zip(*both, strict=True))
+    jacobian = jacobians(mesh, cells, slope)
+    ways = 2.0 * np.einsum("qma,kmj->kqja", by_side, corners)[sides]
+    tangents = np.einsum("ijkq,kqja->aikq", jacobian, ways)
+    normal = (
+        np.cross(tangents[0], tangents[1], axis=0)
+        if dim == 3
+        else np.stack([tangents[0, 1], -tangents[0, 0]])
     )
-
-
-def _facets(space: Space, grid: Any, name: str) -> Ints:
-    """scikit-fem facets of a named boundary: outer edges or faces all of whose nodes belong to it."""
-    named = np.sort(named_facets(space.mesh, name), axis=1)
-    vertices = np.unique(space.mesh.cells[:, : space.mesh.corners])
-    ours = vertices[np.sort(grid.facets, axis=0)].T
-    number = np.unique(np.vstack([named, ours]), axis=0, return_inverse=True)[1].ravel()
-    return np.flatnonzero(np.isin(number[len(named) :], number[: len(named)]))
+    area = np.linalg.norm(normal, axis=0)
+    nodes = mesh.cells[cells]
+    x = np.einsum("kqn,knc->ckq", value, mesh.points[nodes])
+    gradient = slope @ inv(jacobian).transpose(2, 3, 0, 1)
+    return Points(cells, nodes, value, gradient, area * W, x, normal=normal / area)

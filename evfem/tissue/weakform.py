@@ -25,7 +25,7 @@ from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
 from evfem.tissue.assembly import Integral, UserIntegral, gathered, points_of, projected
 from evfem.tissue.forms import Field, Parts, deformation_gradient, hyperelastic, neo_hookean
-from evfem.tissue.kernels.blocks import LANES, blocked, loops, padded, unblocked
+from evfem.tissue.kernels.blocks import LANES, loops, padded, unblocked
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter
 from evfem.tissue.splitlaw import nearly_incompressible
@@ -135,8 +135,6 @@ class Tissue:
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
         """Cell means of the Cauchy stress (E, 4) as xx, yy, zz, xy, in space (E, 6) yz, xz; of J (E,)."""
         E = len(self.space.nodes)
-        if self.loops is not None:
-            return self._looped_stress(self.loops, u)
         sigma, J = np.empty((E, 4 if self.space.dim == 2 else 6)), np.empty(E)
         for law, integral in self.regions:
             cells, weight = integral.points.cells, integral.points.weight
@@ -160,16 +158,6 @@ class Tissue:
         out = np.zeros_like(u)
         energy, _ = loops.forces(*self._request(u), out)
         return out, energy
-
-    def _looped_stress(self, loops: Any, u: Floats) -> tuple[Floats, Floats]:
-        """`cell_stress` by the compiled loops."""
-        cells = self.space.cells
-        components = 4 if self.space.dim == 2 else 6
-        means = np.empty((len(cells.weight), components + 1, LANES))
-        filled = blocked(self.pressure(u))
-        loops.stresses(cells, np.ascontiguousarray(u), self._moduli[0], filled, means)
-        found = unblocked(means, len(self.space.nodes))
-        return np.ascontiguousarray(found[:, :-1]), np.ascontiguousarray(found[:, -1])
 
     def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
         """theta (E, Q) at u by the compiled loops, or its change along du (N, dim)."""

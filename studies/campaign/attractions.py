@@ -2,8 +2,6 @@
 over the position or over time, below 60 V/um in the insulator and 3000 V.
 """
 
-from __future__ import annotations
-
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 

@@ -1,7 +1,5 @@
 """Fingers drawn at random: sizes, layers, ridges, materials, participants, and ready-made meshes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .tables import Draw, Tables, six_digits

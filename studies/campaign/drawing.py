@@ -1,14 +1,11 @@
 """Scenes drawn at random from what a scene file can say; each is valid by construction.
 
-Scene `number` of a seed is the same however many are drawn. Lengths in mm, forces in N/mm,
-voltages in V. The ranges are those of coarse fingers: any size, smooth and ridged, ready-made
-meshes, all surfaces, friction from 0 to 1.5, insulators of 5 um to 0.5 mm below 60 V/um and 3000 V.
-Sizes follow the finger's: `scale` is its width over that of Table 2. One scene in ten has a finger
-in three dimensions: smooth coarse tips in few steps, in any direction over flat faces and long waves along
-x, z and askew.
+Scene `number` of a seed is the same however many are drawn. Lengths in mm, forces in N/mm, voltages in V. The
+ranges are those of coarse fingers: any size, smooth and ridged, ready-made meshes, all surfaces, friction
+from 0 to 1.5, insulators of 5 um to 0.5 mm below 60 V/um and 3000 V. Sizes follow the finger's: `scale` is
+its width over that of Table 2. One scene in ten has a finger in three dimensions: smooth coarse tips in few
+steps, in any direction over flat faces and long waves along x, z and askew.
 """
-
-from __future__ import annotations
 
 from copy import deepcopy
 

@@ -1,7 +1,5 @@
 """How a scene ends: run in this process, its invariants checked, put into a class of ends."""
 
-from __future__ import annotations
-
 import re
 import time
 import warnings

@@ -1,7 +1,5 @@
 """The picture of a campaign: how scenes end, and iterations and time against their size."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

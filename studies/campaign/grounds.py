@@ -2,8 +2,6 @@
 0.4 or so, with friction from none to 1.5.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .bodies import width

@@ -1,12 +1,9 @@
 """What holds in every row and frame of a result, whatever the scene; each check names what is broken.
 
-Signs and units are those of the history. `TOLERANCE` is relative to the largest force, traction or
-energy at hand, well above the scene's own tolerance of the residual; forces below `FORCE` and
-energies below `ENERGY` are rounding. What a check asks of a scene before it applies is said where
-it is made.
+Signs and units are those of the history. `TOLERANCE` is relative to the largest force, traction or energy at
+hand, well above the scene's own tolerance of the residual; forces below `FORCE` and energies below `ENERGY`
+are rounding. What a check asks of a scene before it applies is said where it is made.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

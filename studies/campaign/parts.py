@@ -3,8 +3,6 @@
 They have random numbers of their own: the rest of a scene is what it is without them.
 """
 
-from __future__ import annotations
-
 from .tables import Draw, Tables
 
 #: the random numbers of these parts

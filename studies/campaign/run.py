@@ -4,8 +4,6 @@ On disk stand, after every scene, `campaign/ends.csv` with a row per scene, and 
 `campaign/failures/` each scene that ended badly as it was drawn, complete in itself.
 """
 
-from __future__ import annotations
-
 import signal
 import textwrap
 from collections.abc import Mapping, Sequence

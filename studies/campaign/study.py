@@ -1,18 +1,13 @@
-"""Never stuck, never silently wrong: scenes that nobody chose, their invariants, their ends and
-times.
+"""Never stuck, never silently wrong: scenes that nobody chose, their invariants, their ends and times.
 
-Each scene is drawn from its seed and number, run in a process of its own with a limit of CPU time,
-and its invariants are checked in every row. Ends: equilibrium; explained, a step without any
-equilibrium that says so; not_converged; invariants_broken; timeout; refused, a mistake of the
-generator; error. Beside json, csv and picture the folder `campaign` has the table of all ends and
-every scene that failed.
+Each scene is drawn from its seed and number, run in a process of its own with a limit of CPU time, and its
+invariants are checked in every row. Ends: equilibrium; explained, a step without any equilibrium that says
+so; not_converged; invariants_broken; timeout; refused, a mistake of the generator; error. Beside json, csv
+and picture the folder `campaign` has the table of all ends and every scene that failed.
 """
-
-from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -41,23 +36,18 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None, sample: Sample | None = None) -> dict[str, Any]:
+def main(quick: bool, out: Path | None, sample: Sample) -> Study:
     """Run the scenes in processes; numbers, table, failed scenes and figure."""
-    sample = sample or Sample()
     count = sample.scenes or (QUICK if quick else SCENES)
     keys = [(sample.seed, number) for number in range(count)]
     folder = None if out is None else make_folder(out) / "campaign"
     ends = run(keys, folder, min(sample.workers or cores(), count), float(sample.limit))
     kinds = Counter(f"{one.outcome}: {one.kind}" for one in ends if not one.good)
+    said = ASSUMPTIONS | {"time": TIME.format(sample.limit), "kinds": dict(kinds.most_common())}
+    given = {"scenes": count, "seed": sample.seed, "limit": sample.limit}
     return Study(
-        "campaign",
-        numbers(ends),
-        {},
-        ASSUMPTIONS | {"time": TIME.format(sample.limit), "kinds": dict(kinds.most_common())},
-        series(ends),
-        lambda: figure_of(ends, slowness(ends)),
-        {"scenes": count, "seed": sample.seed, "limit": sample.limit},
-    ).finish(out, quick)
+        "campaign", numbers(ends), {}, said, series(ends), lambda: figure_of(ends, slowness(ends)), given
+    )
 
 
 def numbers(ends: list[Ending]) -> dict[str, float]:

@@ -1,7 +1,5 @@
 """The tables of a scene file as plain values: random numbers for them, their text, files beside them."""
 
-from __future__ import annotations
-
 import shutil
 from copy import deepcopy
 from pathlib import Path

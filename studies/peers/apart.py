@@ -3,8 +3,6 @@ node, Newton's iterations, the measured run. Only numpy and the standard library
 plain module by the scripts beside it.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time
@@ -26,10 +24,9 @@ ROUNDING = 1e-9  # a node this close to sliding goes on sliding
 class Problem:
     """The benchmark's scene as `problem.write` leaves it: one array for each field.
 
-    Points (N, 2) in mm, cells (E, 4|9) with corners first and counterclockwise, Lame's constants
-    (E,) in MPa, nodes that may touch, nodes that are held, the path (steps, 2) of the bone in mm;
-    `pull` is eps_0 U^2 / 2 in N, `layers` the two lengths of Kaczmarek's law p = pull / ((g +
-    near)(g + far)) in mm.
+    Points (N, 2) in mm, cells (E, 4|9) with corners first and counterclockwise, Lame's constants (E,) in MPa,
+    nodes that may touch, nodes that are held, the path (steps, 2) of the bone in mm; `pull` is eps_0 U^2 / 2
+    in N, `layers` the two lengths of Kaczmarek's law p = pull / ((g + near)(g + far)) in mm.
     """
 
     points: Any
@@ -63,11 +60,10 @@ def read(path: str) -> Problem:
 
 
 class PenaltyContact:
-    """Nodal penalty against a rigid plane, and Coulomb friction by return mapping on an elastic
-    slip.
+    """Nodal penalty against a rigid plane, and Coulomb friction by return mapping on an elastic slip.
 
-    An open node remembers where it was at the end of the last converged step, a touching one where
-    its tangential spring is relaxed.
+    An open node remembers where it was at the end of the last converged step, a touching one where its
+    tangential spring is relaxed.
     """
 
     def __init__(self, x: Any, plane: float, friction: float) -> None:
@@ -78,12 +74,10 @@ class PenaltyContact:
         self.pressed = self.dragged = np.zeros(len(x))
 
     def update(self, x: Any, y: Any) -> None:
-        """Forces on the nodes at these places: `pressed` upwards, `dragged` against the motion
-        (N/mm).
+        """Forces on the nodes at these places: `pressed` upwards, `dragged` against the motion (N/mm).
 
-        A node that slid one way in the last iteration does not slide the other way in this one: it
-        sticks first, beyond the limit if need be. Plain return mapping would jump between both for
-        ever.
+        A node that slid one way in the last iteration does not slide the other way in this one: it sticks
+        first, beyond the limit if need be. Plain return mapping would jump between both for ever.
         """
         self.pressed = PENALTY * np.maximum(self.plane - y, 0.0)
         trial, limit = PENALTY * (x - self.reference), self.friction * self.pressed
@@ -116,9 +110,8 @@ class PenaltyContact:
 def newton(
     residual: Callable[[], float], correct: Callable[[bool], None], contact: PenaltyContact, tolerance: float
 ) -> int:
-    """Correct, the first time with True, until the residual is small and no node turns round; then
-    the state of friction is kept. The number of iterations; raises RuntimeError after
-    `MOST_ITERATIONS`.
+    """Correct, the first time with True, until the residual is small and no node turns round; then the state
+    of friction is kept. The number of iterations; raises RuntimeError after `MOST_ITERATIONS`.
     """
     for iteration in range(1, MOST_ITERATIONS + 1):
         correct(iteration == 1)
@@ -141,8 +134,7 @@ def followed(peer: Any) -> dict[str, Any]:
 def resident_MB() -> float:
     """The largest resident memory of this process so far.
 
-    Linux's own mark of the process where there is one: `ru_maxrss` starts at the mark of the
-    parent.
+    Linux's own mark of the process where there is one: `ru_maxrss` starts at the mark of the parent.
     """
     status = Path("/proc/self/status")
     if status.exists():

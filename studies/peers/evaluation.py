@@ -5,8 +5,6 @@ steps are cheaper and, for what does not remember the way, as exact: the normal 
 without friction and, once all slips, the friction force.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,12 +1,8 @@
-"""Where the packages of the study `peers` live, and one measured run of one of them in a process
-of its own.
+"""Where the packages of the study `peers` live, and one measured run of one of them in a process of its own.
 
-evfem and FElupe run in this interpreter; FEniCSx and GetFEM in the first that has them: this one,
-the system's, or another `python3` of the PATH. Distributions install those two outside virtual
-environments.
+evfem and FElupe run in this interpreter; FEniCSx and GetFEM in the first that has them: this one, the
+system's, or another `python3` of the PATH. Distributions install those two outside virtual environments.
 """
-
-from __future__ import annotations
 
 import json
 import os

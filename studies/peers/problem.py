@@ -1,11 +1,8 @@
-"""The press-and-slide benchmark as every package gets it: laws, motion, what is read off,
-reference values.
+"""The press-and-slide benchmark as every package gets it: laws, motion, what is read off, reference values.
 
-Scene A: frictionless, indentation 0.1 ... 1.5 mm; B: friction 0.3, then 3 mm of slide in steps of
-0.1 mm; C: A under 1000 V with Kaczmarek's law, acting vertically on the current projected outline.
+Scene A: frictionless, indentation 0.1 ... 1.5 mm; B: friction 0.3, then 3 mm of slide in steps of 0.1 mm; C:
+A under 1000 V with Kaczmarek's law, acting vertically on the current projected outline.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ the last step without the imports, CPU seconds of the whole process, resident me
 imports and at its largest.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """How the study `peers` is shown: its tables and its figure."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from ..common import Series, markdown

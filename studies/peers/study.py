@@ -1,14 +1,11 @@
-"""evfem beside FElupe, FEniCSx and GetFEM: time, iterations, memory, error in the press-and-slide
-benchmark.
+"""evfem beside FElupe, FEniCSx and GetFEM: time, iterations, memory, error in the press-and-slide benchmark.
 
-Same nodes, laws, steps and tolerance (the largest free residual over the largest force on the
-bone), one thread. Every run has a process of its own, in the interpreter that has the package; the
-packages alternate, and the least of the rounds counts; the finest level has one. A package that is
-not there is named and left out. Only the ratios mean anything on another machine. Beside json, csv
-and picture the table is written as peers.md.
+Same nodes, laws, steps and tolerance (the largest free residual over the largest force on the bone), one
+thread. Every run has a process of its own, in the interpreter that has the package; the packages alternate,
+and the least of the rounds counts; the finest level has one. A package that is not there is named and left
+out. Only the ratios mean anything on another machine. Beside json, csv and picture the table is written as
+peers.md.
 """
-
-from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping
@@ -16,7 +13,6 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from ..common import Study
 from .evaluation import CONTENDERS, FEWER, Run, numbers, race, series
@@ -93,8 +89,7 @@ def compete(
 def warm_up(
     scenes: str, level: int, present: Iterable[tuple[str, str]], compiled: Path
 ) -> dict[str, dict[str, float]]:
-    """Runs that are not timed, until files have been read and forms are compiled; what the first
-    ones cost.
+    """Runs that are not timed, until files have been read and forms are compiled; what the first ones cost.
 
     The cost is kept of packages that say what they compile, by the key of the run.
     """
@@ -113,7 +108,7 @@ def warm_up(
     return cold
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """All runs, their numbers, tables and figure; a package that is not installed is named."""
     absent = missing()
     for name in absent:
@@ -130,8 +125,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     said = {"missing": absent, "failed": failed, "peers": versions(runs)}
     found = numbers(runs, cold) | ({} if quick else race(runs))
     curves, shown = series(runs), tables(runs, failed, found)
-    study = Study("peers", found, {}, ASSUMPTIONS | said, curves, lambda: draw(runs), tables=shown)
-    return study.finish(out, quick)
+    return Study("peers", found, {}, ASSUMPTIONS | said, curves, lambda: draw(runs), tables=shown)
 
 
 def versions(runs: Iterable[Run]) -> dict[str, str]:

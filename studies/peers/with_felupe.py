@@ -1,14 +1,10 @@
-"""The press-and-slide benchmark with FElupe: its solids and its Newton method, and a contact
-written for it.
+"""The press-and-slide benchmark with FElupe: its solids and its Newton method, and a contact written for it.
 
-Fully integrated Q1 or Q2 elements on the nodes of `benchmark_mesh`; nodal penalty contact with
-Coulomb friction by return mapping; PARDISO by pypardiso, symmetric in scene A. FElupe 11.3 has a
-rigid plane with friction of its own: as fast in scene A, but in scene B on L1 its Newton
-iterations jump between two states, as plain return mapping does and `Plane` does not. Whoever
-imports this module needs FElupe.
+Fully integrated Q1 or Q2 elements on the nodes of `benchmark_mesh`; nodal penalty contact with Coulomb
+friction by return mapping; PARDISO by pypardiso, symmetric in scene A. FElupe 11.3 has a rigid plane with
+friction of its own: as fast in scene A, but in scene B on L1 its Newton iterations jump between two states,
+as plain return mapping does and `Plane` does not. Whoever imports this module needs FElupe.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any

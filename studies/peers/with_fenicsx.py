@@ -1,13 +1,10 @@
 """The press-and-slide benchmark with FEniCSx (DOLFINx 0.5): `python3 with_fenicsx.py PROBLEM.npz`.
 
-Lagrange elements of the mesh's own order; Newton's method on PETSc's matrices, factorised by
-MUMPS, Cholesky where the tangent is symmetric (scene A). Contact is a penalty in the form
-language, integrated with the Gauss-Lobatto rule whose points are the nodes; which way a node
-slides is kept beside the form, because plain return mapping jumps between two states. Needs
-DOLFINx and numpy only.
+Lagrange elements of the mesh's own order; Newton's method on PETSc's matrices, factorised by MUMPS, Cholesky
+where the tangent is symmetric (scene A). Contact is a penalty in the form language, integrated with the
+Gauss-Lobatto rule whose points are the nodes; which way a node slides is kept beside the form, because plain
+return mapping jumps between two states. Needs DOLFINx and numpy only.
 """
-
-from __future__ import annotations
 
 from typing import Any
 

@@ -6,8 +6,6 @@ Gauss-Lobatto rule whose points are the nodes; which way a node slides is kept b
 because plain return mapping jumps between two states. Needs GetFEM and numpy only.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import getfem as gf
@@ -110,11 +108,9 @@ class Peer:
                 self.model.set_variable(name, values)
 
     def residual(self) -> float:
-        """The largest free residual over the largest force on the bone, which plane and field
-        balance.
+        """The largest free residual over the largest force on the bone, which plane and field balance.
 
-        GetFEM has assembled it at the current displacement; where there is friction, its state has
-        changed.
+        GetFEM has assembled it at the current displacement; where there is friction, its state has changed.
         """
         self.update_friction()
         if self.problem.friction:

@@ -1,5 +1,4 @@
-"""The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them
-again.
+"""The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them again.
 
 Those of the studies come from `evfem study NAME --out docs/pictures`.
 """

@@ -1,12 +1,9 @@
-"""What follows from the runs of the study `work_precision`: references, errors, the cheapest way
-to an error.
+"""What follows from the runs of the study `work_precision`: references, errors, the cheapest way to an error.
 
-The reference of a problem is extrapolated from the finest two meshes with Q2-P1, second order in
-the width of a cell; its uncertainty is the whole difference between the two, because nodal contact
-makes forces jump a little from mesh to mesh.
+The reference of a problem is extrapolated from the finest two meshes with Q2-P1, second order in the width of
+a cell; its uncertainty is the whole difference between the two, because nodal contact makes forces jump a
+little from mesh to mesh.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The picture of `work_precision`: a panel for each problem, one for growth, one for shares."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from ..common import Series

@@ -1,11 +1,8 @@
-"""How time and memory of a step grow with the nodes: the benchmark's finger on finer and finer
-meshes.
+"""How time and memory of a step grow with the nodes: the benchmark's finger on finer and finer meshes.
 
-Four steps of press by 0.1 mm, then four of slide by 0.1 mm at friction 0.3, each size in a process
-of its own. The first step, which analyses the matrix, counts as set-up.
+Four steps of press by 0.1 mm, then four of slide by 0.1 mm at friction 0.3, each size in a process of its
+own. The first step, which analyses the matrix, counts as set-up.
 """
-
-from __future__ import annotations
 
 import time
 from collections.abc import Mapping

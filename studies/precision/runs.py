@@ -4,8 +4,6 @@ Every run counts from the mesh to the last step, without imports, in CPU seconds
 that has run everything once on the coarsest mesh; cheap runs are repeated and the least counts.
 """
 
-from __future__ import annotations
-
 import gc
 import sys
 import time

@@ -1,12 +1,9 @@
 """The problems of the study `work_precision`, every one as a scene, and what each is judged by.
 
-A, B, C: the press-and-slide benchmark (`peers.problem`). hover: its finger 0.25 mm above the
-display at 2000 V. ramp: pressed 0.5 mm, then 0 to 2000 V in ten steps. smooth, ridged: Table 2's
-finger pressed to 0.05 N/mm at 1000 V in five steps and slid 0.5 mm in five, friction 0.3.
-Kaczmarek's law throughout.
+A, B, C: the press-and-slide benchmark (`peers.problem`). hover: its finger 0.25 mm above the display at 2000
+V. ramp: pressed 0.5 mm, then 0 to 2000 V in ten steps. smooth, ridged: Table 2's finger pressed to 0.05 N/mm
+at 1000 V in five steps and slid 0.5 mm in five, friction 0.3. Kaczmarek's law throughout.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any

@@ -6,8 +6,6 @@ one LDL^T factorisation (PARDISO, symmetric indefinite, float64, no Schur comple
 out) of the tangent at the end of the run, in the same process.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager

@@ -1,15 +1,10 @@
-"""Error against CPU seconds: elements, meshes, contact schemes, couplings, steps, back ends,
-models.
+"""Error against CPU seconds: elements, meshes, contact schemes, couplings, steps, back ends, models.
 
-Also how time and memory of a step grow with the nodes, and where a step's time goes. Beside json,
-csv and picture the tables are written as work_precision.md.
+Also how time and memory of a step grow with the nodes, and where a step's time goes. Beside json, csv and
+picture the tables are written as work_precision.md.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 from ..common import Study, alone
 from ..peers.problem import TOLERANCE
@@ -43,7 +38,7 @@ ASSUMPTIONS = {
 }
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """All measurements, their numbers, tables and figure."""
     runs = measured_runs(quick_cases() if quick else full(), 1 if quick else ROUNDS)
     parts = shares.measured(0) if quick else alone(shares.measured_alone, 2)
@@ -59,5 +54,4 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     }
     picture = partial(draw, curves, known, sizes, found)
     series_of_all = curves + growth.series(sizes)
-    study = Study("work_precision", found, {}, ASSUMPTIONS, series_of_all, picture, tables=tables)
-    return study.finish(out, quick)
+    return Study("work_precision", found, {}, ASSUMPTIONS, series_of_all, picture, tables=tables)

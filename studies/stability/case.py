@@ -1,11 +1,8 @@
 """What a case of the study of stability is, how it is run, and what is recorded of it.
 
-A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and
-balances, and returns whether the physics is as expected and a sentence with the numbers. What it
-raises is recorded.
+A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and balances,
+and returns whether the physics is as expected and a sentence with the numbers. What it raises is recorded.
 """
-
-from __future__ import annotations
 
 import time
 import warnings
@@ -17,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.errors import InputError, NotConverged
+from evfem.errors import NotConverged
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
@@ -26,8 +23,6 @@ from evfem.simulation.run import simulate
 FORCE, ENERGY = 1e-6, 1e-9
 KEPT = ("stored_energy", "kinetic_energy", "friction_dissipation")
 KEPT += ("viscous_dissipation", "integrator_dissipation", "snap_dissipation")
-#: outcomes that count as passed
-PASSED = ("passed", "refused", "stopped")
 #: warnings of what some cases are about: walls and noise finer than the nodes, loads that may drift, steps
 #: longer than what swings, attractions beyond the load, plates of 1 mm
 EXPECTED = (
@@ -57,9 +52,6 @@ class Costs:
 class Log(Costs):
     """Costs and balances of everything a case has simulated so far."""
 
-    refused: bool = False
-    stopped: bool = False
-
     def simulate(self, scene: Scene) -> Result:
         """The result of a scene; a step that does not converge is logged and raised again."""
         try:
@@ -70,24 +62,6 @@ class Log(Costs):
             raise
         self._add(result, scene)
         return result
-
-    def refusal(self, make: Callable[[], object]) -> str:
-        """The sentence with which something is refused; raises AssertionError if it is not."""
-        try:
-            make()
-        except InputError as error:
-            self.refused = True
-            return str(error)
-        raise AssertionError("accepted, though it cannot be computed")
-
-    def stop(self, scene: Scene) -> NotConverged:
-        """The message of a scene that cannot be finished; raises AssertionError if it can."""
-        try:
-            self.simulate(scene)
-        except NotConverged as error:
-            self.stopped = True
-            return error
-        raise AssertionError("finished, though it should not have been possible")
 
     def _add(self, result: Result, scene: Scene) -> None:
         solver = result.provenance["solver"]
@@ -177,7 +151,7 @@ class Found(Costs):
     @property
     def good(self) -> bool:
         """Whether the outcome is the expected one."""
-        return self.outcome in PASSED
+        return self.outcome == "passed"
 
 
 def judge(case: Case) -> Found:
@@ -190,12 +164,9 @@ def judge(case: Case) -> Found:
             for text in EXPECTED:
                 warnings.filterwarnings("ignore", text)
             passed, said = case.function(log)
-        outcome = "refused" if log.refused else "stopped" if log.stopped else "passed"
-        outcome = outcome if passed else "wrong"
+        outcome = "passed" if passed else "wrong"
     except NotConverged as error:
         outcome, said = "not converged", str(error)
-    except AssertionError as error:
-        outcome, said = "wrong", str(error)
     except Exception as error:  # an outcome like others: the table names it, the other cases go on
         outcome, said = "error", f"{type(error).__name__}: {error}"
     costs = {one.name: getattr(log, one.name) for one in fields(Costs)}

@@ -1,7 +1,5 @@
 """Cases of contact and friction: reversals, jumps, texture, deep and light, steps too large."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -9,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from evfem.electrostatics.laws import Kaczmarek
-from evfem.errors import NotConverged
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.scene.motion import Hover, Motion, Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import Result
 from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
@@ -48,20 +45,6 @@ for _mu in (0.0, 0.3, 1.0, 2.0):
 FRICTION.case("ridges that fold", "mu = 1.5 drags ridges over and back: F_t = +mu, -mu, +mu F_n")(
     partial(_reversals, mu=1.5, ridges=True)
 )
-
-
-@FRICTION.case(
-    "start from stick", "F_t rises at most with the stuck stiffness, stick falls to zero, then mu F_n", True
-)
-def _stick(log: Log) -> Verdict:
-    slide = Slide(3.0, steps=30)
-    result = log.simulate(scene(pad(), Flat(friction=0.5), Press(force=0.05, steps=3), slide))
-    force = np.concatenate([[0.0], result.tangential_force[3:]])
-    rises = np.diff(force)
-    slowing = bool((rises[1:] < rises[:-1] + 1e-3 * rises[0]).all() and rises[0] > 0.0)
-    below = bool((force[1:] <= 0.5 * result.normal_force[3:] * (1.0 + 1e-7)).all())
-    end = _ratio(result, -1)
-    return slowing and below and abs(end - 0.5) < 1e-6, f"F_t rises ever more slowly to {end:.7f} F_n"
 
 
 def _jump(log: Log, table: list[list[float]]) -> Verdict:
@@ -118,9 +101,8 @@ def _textured(surface: Any, ridges: bool, dynamics: str, distance: float = 2.0, 
 
 
 def _slides_over(log: Log, asked: Scene, mu: float, finer: Scene | None = None) -> Verdict:
-    """Mean friction at least mu (slopes only dissipate), no node below the surface, energy not
-    gained. With a `finer` scene, of more steps: what is gained is an error of the works, which falls
-    with the step.
+    """Mean friction at least mu (slopes only dissipate), no node below the surface, energy not gained. With a
+    `finer` scene, of more steps: what is gained is an error of the works, which falls with the step.
     """
     result = log.simulate(asked)
     later = result.position > 0.5 * result.position[-1]
@@ -200,21 +182,6 @@ _add(
 )
 
 
-@TEXTURE.case(
-    "equation 25 quasi-static", "jumps from equilibrium to equilibrium and loses energy, or says what to try"
-)
-def _snap(log: Log) -> Verdict:
-    motion = Press(indentation=0.3, steps=5), Slide(2.0, steps=100)
-    asked = scene(pad(), Sinusoid(friction=0.1), *motion)
-    try:
-        return _slides_over(log, asked, 0.1)
-    except NotConverged as error:
-        log.stopped, kept = True, error.result
-        assert isinstance(kept, Result)
-        good = len(kept.step) == error.step - 1 and "viscous" in str(error)
-        return good, f"at x = {kept.position[-1]:.2f} mm: {error}"
-
-
 # -- near and far
 
 
@@ -255,15 +222,6 @@ def _unload(log: Log) -> Verdict:
     off = abs(float(result.normal_force[8]) - 1e-6)
     good = off < 2e-8 and abs(result.normal_force[-1]) < 1e-12 and result.min_gap[-1] > 0.0999
     return good, f"F_n within {off:.0e} N/mm of 1e-6, then open with {result.min_gap[-1]:.4f} mm"
-
-
-@MOTION.case("attraction fades under no load", "no load and no voltage left: F_n and F_e go to zero together")
-def _fades(log: Log) -> Verdict:
-    motion = Press(force=0.0, steps=2), VoltageRamp(0.0, steps=10, hold="force")
-    result = log.simulate(scene(pad(), Display(friction=0.0), *motion, law=Kaczmarek(), voltage=1000.0))
-    off = float(np.abs(result.normal_force - result.electrostatic_force).max())
-    left = float(result.normal_force[-1])
-    return off < 1e-8 and left < 1e-6, f"F_n = F_e within {off:.0e} N/mm, {left:.0e} N/mm at 0 V"
 
 
 @MOTION.case(

@@ -1,7 +1,5 @@
 """The picture of the study of stability: a row per case, in two columns of groups."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..plots import COLOURS, Axes, Figure, new_figure
@@ -10,8 +8,6 @@ from .case import Found
 #: outcome -> marker, colour, label
 MARKS = {
     "passed": ("o", COLOURS["kaczmarek"], "passed"),
-    "refused": ("s", COLOURS["fe"], "refused with a sentence, as expected"),
-    "stopped": ("D", COLOURS["fe"], "stopped with a sentence, as expected"),
     "wrong": ("P", "#D55E00", "physics not as expected"),
     "not converged": ("X", "#D55E00", "not converged"),
     "error": ("v", "#D55E00", "error"),
@@ -50,32 +46,38 @@ def _height(column: list[Found]) -> int:
 
 
 def _column(axes: list[Axes], column: list[Found], rows: int) -> None:
-    y, previous = 0.0, ""
+    names, iterations, cuts, seconds = axes
+    y, previous = -1.0, ""
     for one in column:
-        if one.group != previous:
-            y += 1.0 if previous else 0.0
-            _heading(axes[0], [each for each in column if each.group == one.group], y)
-            y, previous = y + 1.0, one.group
-        _row(axes, one, y)
         y += 1.0
+        if one.group != previous:
+            group = [each for each in column if each.group == one.group]
+            good = sum(each.good for each in group)
+            y += 1.0 if previous else 0.0
+            look = {"fontsize": 8, "fontweight": "bold", "va": "center"}
+            colour = "black" if good == len(group) else BAD
+            names.text(0.0, y, f"{one.group}: {good} of {len(group)}", color=colour, **look)
+            y, previous = y + 1.0, one.group
+        marker, colour, _ = MARKS[one.outcome]
+        names.plot(0.04, y, marker, color=colour, markersize=5 if one.good else 6, clip_on=False)
+        names.text(0.08, y, one.name, fontsize=7, va="center", color="black" if one.good else BAD)
+        bar = COLOURS["kaczmarek"] if one.good else BAD
+        # a run that never got to the end of a step has spent everything on the first one
+        iterations.barh(y, one.iterations / max(one.steps, 1), height=0.62, color=bar, alpha=0.55)
+        cuts.barh(y, one.cuts, height=0.62, color=COLOURS["neutral"])
+        look = {"fontsize": 6.5, "va": "center", "ha": "right", "color": COLOURS["neutral"]}
+        seconds.text(1.0, y, f"{one.cpu_s:.1f}", **look)
     for ax in axes:
         ax.set(ylim=(rows - 0.3, -0.8), yticks=[])
         ax.spines[["top", "right", "left"]].set_visible(False)
         ax.tick_params(labelsize=7)
         ax.set_axisbelow(True)
-    for ax in (axes[0], axes[3]):
+    for ax in (names, seconds):
         ax.set(xlim=(0.0, 1.0), xticks=[])
         ax.spines["bottom"].set_visible(False)
-    _scale(axes[1], "iterations per step")
-    _scale(axes[2], "cuts")
-    axes[3].set_xlabel("CPU s", fontsize=8)
-
-
-def _heading(ax: Axes, group: list[Found], y: float) -> None:
-    good = sum(one.good for one in group)
-    colour = "black" if good == len(group) else BAD
-    title = f"{group[0].group}: {good} of {len(group)}"
-    ax.text(0.0, y, title, fontsize=8, fontweight="bold", color=colour, va="center")
+    _scale(iterations, "iterations per step")
+    _scale(cuts, "cuts")
+    seconds.set_xlabel("CPU s", fontsize=8)
 
 
 def _scale(ax: Axes, label: str) -> None:
@@ -85,17 +87,6 @@ def _scale(ax: Axes, label: str) -> None:
     ax.set_xticks(ticks, [str(tick) for tick in ticks])
     ax.grid(axis="x", color="#DDDDDD", linewidth=0.5)
     ax.set_xlabel(label, fontsize=8)
-
-
-def _row(axes: list[Axes], one: Found, y: float) -> None:
-    marker, colour, _ = MARKS[one.outcome]
-    axes[0].plot(0.04, y, marker, color=colour, markersize=5 if one.good else 6, clip_on=False)
-    axes[0].text(0.08, y, one.name, fontsize=7, va="center", color="black" if one.good else BAD)
-    bar = COLOURS["kaczmarek"] if one.good else BAD
-    # a run that never got to the end of a step has spent everything on the first one
-    axes[1].barh(y, one.iterations / max(one.steps, 1), height=0.62, color=bar, alpha=0.55)
-    axes[2].barh(y, one.cuts, height=0.62, color=COLOURS["neutral"])
-    axes[3].text(1.0, y, f"{one.cpu_s:.1f}", fontsize=6.5, va="center", ha="right", color=COLOURS["neutral"])
 
 
 def _legend(figure: Figure, found: list[Found]) -> None:

@@ -1,7 +1,5 @@
 """The same answer: twice, in a mirror, other units, other numbers of nodes, other steps."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from functools import partial

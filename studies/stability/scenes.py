@@ -1,14 +1,12 @@
 """Small bodies and meshes of the study of stability; tests use them too."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import Layer
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.mesh.mesh import Mesh
@@ -56,9 +54,9 @@ def block(columns: int = 8, rows: int = 4, width: float = 4.0, height: float = 2
 
 def shaken(mesh: Mesh, share: float, seed: int = 7) -> Mesh:
     """Inner nodes moved at random by up to that share of the shortest edge at hand."""
-    outer = np.unique(mesh.outer_edges[:, :2])
+    outer = np.unique(mesh.outer_sides[:, :2])
     inner = np.setdiff1d(np.arange(len(mesh.points)), outer)
-    edges, _ = mesh.edges
+    edges, _ = mesh.sides
     length = np.linalg.norm(np.diff(mesh.points[edges], axis=1)[:, 0], axis=1)
     shortest = np.full(len(mesh.points), np.inf)
     np.minimum.at(shortest, edges.ravel(), np.repeat(length, 2))
@@ -87,21 +85,6 @@ def mirrored(mesh: Mesh) -> Mesh:
 def scaled(mesh: Mesh, factor: float) -> Mesh:
     """All lengths times `factor`."""
     return replace(mesh, points=mesh.points * factor)
-
-
-def joined(first: Mesh, second: Mesh, away: Floats) -> Mesh:
-    """Two meshes in one, the second moved by `away` (mm): separate parts, or double nodes."""
-    n = len(first.points)
-    sets: dict[str, Ints] = {
-        name: np.concatenate([nodes, n + second.node_sets[name]]) for name, nodes in first.node_sets.items()
-    }
-    return replace(
-        first,
-        points=np.vstack([first.points, second.points + away]),
-        cells=np.vstack([first.cells, n + second.cells]),
-        region=np.concatenate([first.region, second.region]),
-        node_sets=sets,
-    )
 
 
 def finger(mesh: Mesh, E: float = 0.1, nu: float = 0.4, viscosity: float = 0.0) -> MeshedFinger:

@@ -1,16 +1,12 @@
 """Hard cases: does it converge to the right physics, or say why not, and what does it cost?
 
 Every case states its expected physics and is judged by a number; one that does not converge is
-listed with its message. Outcomes: passed; refused or stopped with a sentence, where that is right;
-wrong; not converged; error. Beside json, csv and picture the table is written as stability.md.
+listed with its message. Outcomes: passed; wrong; not converged; error. Beside json, csv and picture the
+table is written as stability.md.
 """
-
-from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 from ..common import Series, Study, markdown, side_by_side
 from . import contact, electric, same, tissue
@@ -33,7 +29,7 @@ HEAD = (
     "found",
 )
 ASSUMPTIONS = {
-    "outcomes": "passed; refused, stopped: with a sentence, as expected; wrong; not converged; error",
+    "outcomes": "passed; wrong; not converged; error",
     "steps": "requested steps; parts: as many as were accepted; cuts: attempts that failed and were halved",
     "force": "largest sum of all forces in any step over the largest force; left out with inertia",
     "energy": "largest energy of any step that no column has, over the largest column of that step",
@@ -43,16 +39,15 @@ ASSUMPTIONS = {
 MEASURED = ("steps", "substeps", "cuts", "iterations", "cpu_s", "force_error", "energy_error")
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Judge all cases, or the quick ones, in two processes; numbers, table and figure."""
     chosen = [key for key, case in CASES.items() if case.quick or not quick]
     found = side_by_side(judge_by_key, chosen, 1 if quick else 2)
     said = {one.key: {"expected": one.expected, "outcome": one.outcome, "found": one.said} for one in found}
     rest = ASSUMPTIONS | {"cases": said, "groups": by_group(found)}
-    study = Study(
+    return Study(
         "stability", numbers(found), {}, rest, series(found), lambda: draw(found), tables=tables(found)
     )
-    return study.finish(out, quick)
 
 
 def judge_by_key(key: str) -> Found:

@@ -1,8 +1,5 @@
 """Cases of the tissue: incompressible and unequal layers, meshes good and bad."""
 
-from __future__ import annotations
-
-import warnings
 from dataclasses import replace
 from functools import partial
 
@@ -11,10 +8,9 @@ from evfem.meshes import FOLDER
 
 import evfem as ev
 from evfem.mesh.file import read
-from evfem.mesh.quality import check
 
 from .case import Group, Log, Verdict, alike
-from .scenes import benchmark, block, finger, grid, joined, layered, pad, scene, shaken
+from .scenes import benchmark, block, finger, grid, layered, pad, scene, shaken
 
 INCOMPRESSIBLE = Group("incompressible")
 CONTRAST = Group("contrast")
@@ -147,37 +143,3 @@ def _slivers(log: Log) -> Verdict:
     ratio = float(result.tangential_force[-1] / result.normal_force[-1])
     least = float(result.frames[-1].J.min())
     return abs(ratio - 0.3) < 1e-6 and least > 0.0, f"F_t/F_n = {ratio:.7f}, smallest cell J {least:.2f}"
-
-
-for _name, _away, _said in (
-    ("separate parts", 10.0, "2 separate parts"),
-    ("double nodes", 4.0, "nodes in the same place"),
-):
-
-    @MESHES.case(_name, "refused with a sentence", quick=True)
-    def _refused(log: Log, away: float = _away, expected: str = _said) -> Verdict:
-        said = log.refusal(lambda: check(joined(block(), block(), np.array([away, 0.0]))))
-        return expected in said, said
-
-
-def _sharper(surface: object) -> Verdict:
-    """A warning of Python's or a sentence of the plan that compares the profile with the nodes."""
-    asked = scene(finger(block(8, 3)), surface, ev.Press(indentation=0.02, steps=1))
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        said = str(ev.plan(asked))
-        ev.simulate(asked)
-    texts = [str(one.message) for one in caught] + said.splitlines()
-    found = [text for text in texts if "node" in text and "spacing" in text]
-    return bool(found), found[0] if found else "neither the plan nor a warning says so"
-
-
-@MESHES.case("profile sharper than the nodes", "a warning: nodes 0.5 mm apart miss grooves of 0.1 mm")
-def _unresolved(_: Log) -> Verdict:
-    x = np.arange(-5.0, 5.001, 0.05)
-    return _sharper(ev.Profile(x, np.where(np.round(x / 0.05) % 10 < 2, -0.05, 0.0), friction=0.0))
-
-
-@MESHES.case("wave shorter than the nodes", "a warning: nodes 0.5 mm apart miss waves of 0.2 mm")
-def _short_wave(_: Log) -> Verdict:
-    return _sharper(ev.Sinusoid(terms=[[0.005, 2.0 * np.pi / 0.2, 0.0]], friction=0.0))

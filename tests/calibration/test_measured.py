@@ -165,10 +165,7 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (
-            lambda: MeasuredCurve("motion", "indentation", [0.1], [1.0]),
-            r'data\.column: given "motion", no column',
-        ),
+        (lambda: MeasuredCurve("motion", "indentation", [0.1], [1.0]), r'data\.column: given "motion", no'),
         (lambda: MeasuredCurve("time", "depth", [0.1], [1.0]), r'data\.over: given "depth", no column'),
         (lambda: MeasuredCurve("time", "position", [0.1], [1.0, 2.0]), "given 2 values; allowed: as many"),
         (lambda: MeasuredCurve("time", "position", [], []), "given 0 values"),

@@ -1,6 +1,4 @@
-"""A folder is locked by one process at a time, and neither the lock nor an empty folder stays
-behind.
-"""
+"""A folder is locked by one process at a time, and neither the lock nor an empty folder stays behind."""
 
 import errno
 import logging

@@ -86,9 +86,8 @@ def test_an_attraction_that_closed_nodes_cannot_hold_moves_its_node_towards_the_
 
 
 def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_are_held():
-    """Closed, node 0 holds its neighbour: feedback 30 (0.1 - 0.09^2 / 0.1) = 0.57. But it lets go,
-    and two open nodes have 30 (0.1 + 0.09) = 5.7: scaled to 0.9 they move ten times their free way
-    of 0.02.
+    """Closed, node 0 holds its neighbour: feedback 30 (0.1 - 0.09^2 / 0.1) = 0.57. But it lets go, and two
+    open nodes have 30 (0.1 + 0.09) = 5.7: scaled to 0.9 they move ten times their free way of 0.02.
     """
     compliance = np.zeros((4, 4))
     compliance[::2, ::2] = [[0.1, 0.09], [0.09, 0.1]]
@@ -101,9 +100,8 @@ def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_a
 
 
 def test_an_attraction_is_scaled_to_what_the_closed_nodes_hold_where_they_stay():
-    """Node 0, pressed, holds its neighbour at 100 x 0.011 = 1.1; without it, 100 x 1.011 = 101 return.
-    Scaled to 0.9 of the first the neighbour moves ten times its free way of 0.02, of the other 1.01
-    times.
+    """Node 0, pressed, holds its neighbour at 100 x 0.011 = 1.1; without it, 100 x 1.011 = 101 return. Scaled
+    to 0.9 of the first the neighbour moves ten times its free way of 0.02, of the other 1.01 times.
     """
     compliance = np.zeros((4, 4))
     compliance[::2, ::2] = [[1.0, 1.0], [1.0, 1.011]]

@@ -214,9 +214,7 @@ def test_hover_force_of_half_an_ellipse_on_sixty_edges(order, voltage, gap, exac
 @pytest.mark.parametrize(("order", "total"), [(1, 1e-14), (2, 3e-3)])
 @surfaces
 def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, surface):
-    """Exactly, tangent too, on linear edges; on quadratic ones it projects chords (sum 1.9e-3
-    apart).
-    """
+    """Exactly, tangent too, on linear edges; on quadratic ones it projects chords (sum 1.9e-3 apart)."""
     mesh = FingerPad(resolution="coarse").mesh(order)
     space, pad = make_space(mesh, {1: "q1", 2: "q2p1"}[order]), make_pad(mesh)
     surface = surface.shifted(mesh.points[:, 1].min() - 0.2)
@@ -225,8 +223,8 @@ def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, 
     position = (mesh.points + u)[pad.nodes]
     rule = Attraction(Kaczmarek(), LAYERS, pad, surface)
     weights = {1: [1 / 2, 1 / 2], 2: [1 / 6, 4 / 6, 1 / 6]}[order]
-    quadrature = (np.linspace(0.0, 1.0, order + 1)[None], np.array(weights))
-    points = facet_points(space, "pad", quadrature)
+    places = (np.linspace(0.0, 1.0, order + 1)[:, None], np.array(weights))
+    points = facet_points(space, "pad", places)
     w = SimpleNamespace(
         x=points.x, n=points.normal, law=rule.law, layers=LAYERS, voltage=800.0, surface=surface
     )
@@ -241,7 +239,5 @@ def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, 
         unknown = (2 * pad.nodes[:, None] + [0, 1]).ravel()
         K = -assembled(space, form.cell_tangents(u), points.cells)[unknown][:, unknown]
         np.testing.assert_allclose(
-            K.toarray(),
-            rule.stiffness(position, 800.0, None).toarray(),
-            atol=1e-12 * np.abs(K).max(),
+            K.toarray(), rule.stiffness(position, 800.0, None).toarray(), atol=1e-12 * np.abs(K).max()
         )

@@ -1,6 +1,4 @@
-"""A linear contact step against the equations it solves, written out for a random condensed
-tangent.
-"""
+"""A linear contact step against the equations it solves, written out for a random condensed tangent."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,9 +14,7 @@ K = 5
 
 
 def tangent(rng, coupling=0.0):
-    """A random SPD matrix on five candidates and the bone, and an unsymmetric coupling of
-    candidates.
-    """
+    """A random SPD matrix on five candidates and the bone, and an unsymmetric coupling of candidates."""
     A = rng.normal(size=(2 * K + 2, 2 * K + 2))
     schur = 4.0 * np.eye(2 * K + 2) + 0.3 * A @ A.T
     between = coupling * rng.normal(size=(2 * K, 2 * K))
@@ -59,9 +55,8 @@ def axes_of(surface):
 
 
 def pushed(step, found):
-    """Forces (2 c,) on the candidates beyond the present ones: new contact forces on today's axes,
-    what the present ones turn into on a curved profile, and how slipping friction changes along a
-    ramp.
+    """Forces (2 c,) on the candidates beyond the present ones: new contact forces on today's axes, what the
+    present ones turn into on a curved profile, and how slipping friction changes along a ramp.
     """
     known, moved = step.candidates, found.moved.reshape(-1, 2)
     normal, tangent = axes_of(known.surface)
@@ -76,9 +71,7 @@ def pushed(step, found):
 
 
 def residuals(step, schur, between, found):
-    """What the solution leaves of the balance of the candidates, and of the bone along the
-    unknowns' axes.
-    """
+    """What the solution leaves of the balance of the candidates, and of the bone along the unknowns' axes."""
     known = step.candidates
     normal, tangent = axes_of(known.surface)
     present = (known.force[:, :1] * normal + known.force[:, 1:] * tangent).ravel()
@@ -155,9 +148,7 @@ def test_candidates_and_bone_are_in_balance(seed, curved, coupling):
 @pytest.mark.parametrize("curved", [0.0, 1.0], ids=["flat", "curved"])
 @pytest.mark.parametrize("unknowns", [("force",), ("voltage",), ("force", "voltage")])
 def test_prescribed_forces_are_reached_on_any_profile(seed, curved, unknowns):
-    """The forces that turn with the profile count in the balance of the bone as in that of the
-    nodes.
-    """
+    """The forces that turn with the profile count in the balance of the bone as in that of the nodes."""
     step, *matrices = step_of(np.random.default_rng(seed), curved, 0.1, unknowns)
     found = check(step, *matrices)
     assert found.extra.size == len(unknowns)
@@ -232,9 +223,7 @@ def test_a_node_that_was_far_from_contact_does_not_penetrate():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_nodes_and_bone_feel_how_the_attraction_changes(seed):
-    """Open nodes by their negative stiffness times the change of their gap, closed ones by the
-    gain.
-    """
+    """Open nodes by their negative stiffness times the change of their gap, closed ones by the gain."""
     rng = np.random.default_rng(seed)
     gain, stiffness = rng.uniform(0.5, 1.0, K), rng.uniform(0.3, 0.6, K)
     attracted = {"gain_on_closing": gain, "negative_stiffness": stiffness}

@@ -1,6 +1,4 @@
-"""The edge of contact between nodes: closed forms of the gap, any place of the nodes, and short
-outlines.
-"""
+"""The edge of contact between nodes: closed forms of the gap, any place of the nodes, and short outlines."""
 
 import numpy as np
 import pytest

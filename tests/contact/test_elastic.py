@@ -93,6 +93,61 @@ def test_the_slope_of_the_compliance_is_its_derivative():
     np.testing.assert_allclose(slopes(Own(), x, lengths), exact, atol=1e-4 * np.abs(exact).max())
 
 
+def grid(count, distance, seed=3):
+    """Places (n, 2) about `distance` apart, and areas of squares that leave gaps or overlap a little."""
+    random = np.random.default_rng(seed)
+    even = distance * np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2)
+    return even + random.uniform(-0.2, 0.2, even.shape) * distance, random.uniform(
+        0.5, 1.2, len(even)
+    ) * distance**2
+
+
+def test_a_square_on_a_half_space():
+    """Its own mean p L (1 - nu^2)/E x .9464020088; a layer 1e4 times as thick is 1.2 L / H less."""
+    E, nu = 0.37, 0.3
+    own = ev.ElasticLayer(E, nu, 1e3).compliance(np.zeros((1, 2)), [0.01])
+    assert own[0, 0] * 0.1 * E / (1.0 - nu**2) == pytest.approx(0.9464020088, rel=2e-4)
+    far = ev.ElasticLayer(E, nu, 1e3).compliance([[0.0, 0.0], [3.0, 0.0]], [0.01, 0.01])
+    # Cerruti and Boussinesq: u_x of q_x and u_z of q_z at a distance along x, u_z of q_x
+    mu = 0.5 * E / (1.0 + nu)
+    point = np.array([1.0, 1.0 - nu, 0.5 - nu]) / (2.0 * np.pi * mu * 3.0)
+    found = [far[3, 2], far[5, 4], far[1, 2]]
+    np.testing.assert_allclose(found, point, rtol=0.01)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.2, 1.0, 2.5])
+def test_squares_in_a_row_are_a_strip(x):
+    """Forces on squares along z act on one of them as the strip of plane strain does."""
+    layer, count = ev.ElasticLayer(0.2, 0.3, 2.0), 401
+    places = np.column_stack([np.full(count, x), 0.2 * (np.arange(count) - count // 2)])
+    found = layer.compliance(np.vstack([places, [[0.0, 0.0]]]), np.full(count + 1, 0.04))
+    rows = found.reshape(3, count + 1, 3, count + 1)[:2, -1, :2, :-1].sum(axis=2)
+    strips = layer.compliance([0.0, x] if x else [0.0], [0.2]).reshape(2, -1, 2, 2 if x else 1)[:, 0, :, -1]
+    np.testing.assert_allclose(0.2 * rows, strips, atol=2e-5 * abs(strips).max())
+
+
+@pytest.mark.parametrize("thickness", [0.3, 2.0, 50.0])
+@pytest.mark.parametrize("nu", [0.0, 0.5])
+def test_the_compliance_in_space_is_symmetric_positive_and_has_that_slope(thickness, nu):
+    layer, (x, areas) = ev.ElasticLayer(0.2, nu, thickness), grid(7, 0.3)
+    found, slope = layer.compliance(x, areas), layer.compliance_slope(x, areas)
+    np.testing.assert_allclose(found, found.T, atol=1e-15 * found.max())
+    assert np.linalg.eigvalsh(found).min() > 0.0
+
+    class Own:
+        def compliance(self, x, lengths):
+            return layer.compliance(x, lengths)
+
+    np.testing.assert_allclose(slopes(Own(), x, areas), slope, atol=1e-4 * np.abs(slope).max())
+
+
+def test_layers_of_one_material_in_space_are_one_layer():
+    x, areas = grid(4, 0.7)
+    one = ev.ElasticLayer(0.2, 0.48, 2.0).compliance(x, areas)
+    parts = [ev.ElasticLayer(0.2, 0.48, 0.5), ev.ElasticLayer(0.2, 0.48, 1.5)]
+    np.testing.assert_allclose(ev.ElasticStack(parts).compliance(x, areas), one, atol=1e-9 * one.max())
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

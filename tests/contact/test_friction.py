@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import benchmark_finger, finger
+from tools.builders import benchmark_finger, finger, left_over, resumed
 from tools.meshes import block
 
 import evfem as ev
@@ -14,7 +14,6 @@ from evfem.errors import InputError
 from evfem.planning.plan import plan
 from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
-from evfem.simulation.result import Saved
 from evfem.surface.friction import KINDS, Slipping
 
 pytestmark = pytest.mark.solver
@@ -101,13 +100,6 @@ def slid(speed=None, distance=0.05, steps=3):
     return ev.Slide(distance, steps=steps, hold="force", speed=speed)
 
 
-def remainder(result):
-    given = result.external_work + result.electrostatic_work
-    lost = result.friction_dissipation + result.integrator_dissipation + result.snap_dissipation
-    kept = result.stored_energy + result.kinetic_energy + result.viscous_dissipation
-    return np.abs(given - lost - kept).max() / np.abs(given).max()
-
-
 @pytest.mark.parametrize(
     ("law", "ratio", "near"),
     [
@@ -119,14 +111,12 @@ def remainder(result):
     ids=["coulomb", "load index", "load index above 1", "adhesive"],
 )
 def test_a_slab_slides_with_the_force_of_its_uniform_pressure(law, ratio, near):
-    """The law of the whole slab is that of its nodes up to the roll of a pad 200 times as wide as
-    high.
-    """
+    """The law of the whole slab is that of its nodes up to the roll of a pad 200 times as wide as high."""
     for sign in (1.0, -1.0):
         result = ev.simulate(slab(law, slid(distance=sign * 0.05)))
         assert result.tangential_force[-1] == pytest.approx(sign * ratio * N, rel=near)
         assert result.newton_iterations.max() <= 8
-        assert remainder(result) < 1e-9
+        assert left_over(result) < 1e-9
         # the last two steps are full slip all the way
         way = np.diff(result.position)[-1] * sign
         assert np.diff(result.friction_dissipation)[-1] == pytest.approx(ratio * N * way, rel=near)
@@ -145,7 +135,7 @@ def test_a_slab_slides_with_the_force_of_its_uniform_pressure(law, ratio, near):
 def test_a_slab_slides_with_the_force_of_its_speed(law, ratio, speed):
     result = ev.simulate(slab(law, slid(speed, steps=5)))
     np.testing.assert_allclose(result.tangential_force[-2:], ratio(speed) * N, rtol=1e-8)
-    assert remainder(result) < 1e-9
+    assert left_over(result) < 1e-9
 
 
 def test_what_depends_on_the_speed_converges_quadratically():
@@ -316,7 +306,7 @@ def test_every_node_of_a_finger_obeys_and_both_couplings_agree(law):
         assert slips.sum() > 3
         np.testing.assert_allclose(np.abs(shear[slips]), bound[slips], rtol=1e-6)
         assert (np.abs(shear) <= bound + 1e-6 * bound.max())[facing].all()
-        assert remainder(result) < 1e-6
+        assert left_over(result) < 1e-6
     np.testing.assert_allclose(found[0].tangential_force, found[1].tangential_force, rtol=1e-6)
 
 
@@ -338,16 +328,8 @@ def test_a_wished_friction_force_is_found_under_a_law():
 
 
 def test_a_run_that_is_resumed_remembers_how_old_its_contact_is():
-    kept = []
-
-    class Keep:
-        def step(self, row, frame, checkpoint):
-            kept.append(checkpoint())
-
-    scene = slab(AGEING, ev.Wait(10.0, steps=2), slid(1.0))
-    whole = ev.simulate(scene, observers=[Keep()])
-    resumed = ev.simulate(scene, resume=Saved(kept[2], whole.rows[:3]))
-    np.testing.assert_array_equal(resumed.tangential_force, whole.tangential_force)
+    whole, again = resumed(slab(AGEING, ev.Wait(10.0, steps=2), slid(1.0)), 3)
+    np.testing.assert_array_equal(again.tangential_force, whole.tangential_force)
 
 
 # -- in scenes

@@ -1,6 +1,4 @@
-"""What takes an equilibrium its stability: a point on two springs, whose stiffness along every way is
-known.
-"""
+"""What takes an equilibrium its stability: a point on two springs of known stiffness along every way."""
 
 from dataclasses import replace
 

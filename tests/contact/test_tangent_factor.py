@@ -94,7 +94,7 @@ def test_what_a_summit_gains_on_closing_and_loses_on_opening_is_the_fields():
         place, pressing = linear.interface.resting(at), at.contact_force[:, 0]
         return by(place, 380.0, linear.touching, pressing)[summit, 1]
 
-    field, columns = model.attraction.forces, model.attraction.column_forces
+    field, columns = model.attraction.forces, model.attraction.column_law.forces
     for start, end, known in (
         (state, closed, linear.gain_on_closing(state)[summit]),
         (closed, pressed, linear.roughness(pressed).loss_on_opening[summit, 0]),

@@ -1,11 +1,10 @@
-"""The documentation: its examples run and print what stands below them, its links lead somewhere,
-the names that it uses exist, what it lists is complete, it builds.
+"""The documentation: its examples run and print what stands below them, its links lead somewhere, the names
+that it uses exist, what it lists is complete, it builds.
 
-A page's Python blocks run in order, in one namespace and a folder of their own. A `text` block
-after one is what it prints, `...` standing for anything. TOML blocks are scenes or sweeps, `evfem`
-lines in `sh` blocks are understood by the command. `<!-- not run: reason -->` or
-`<!-- needs vtk -->` before a block says why it does not run here; `<!-- needs fast -->` that it takes
-minutes without PARDISO.
+A page's Python blocks run in order, in one namespace and a folder of their own. A `text` block after one is
+what it prints, `...` standing for anything. TOML blocks are scenes or sweeps, `evfem` lines in `sh` blocks
+are understood by the command. `<!-- not run: reason -->` or `<!-- needs vtk -->` before a block says why it
+does not run here; `<!-- needs fast -->` that it takes minutes without PARDISO.
 """
 
 import doctest
@@ -30,9 +29,8 @@ from evfem.scene.motion import Motion
 from evfem.simulation.result import COLUMNS
 from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
-from evfem.textures.importing import IMPORTERS
+from evfem.textures.importers import IMPORTERS
 from evfem.tissue import space
-from evfem.tissue import space as elements
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -68,9 +66,7 @@ def blocks(page):
 
 
 def run(page, wanted, capsys):
-    """Run the Python blocks whose mark is in `wanted`, compare what they print, read the other
-    blocks.
-    """
+    """Run the Python blocks whose mark is in `wanted`, compare what they print, read the other blocks."""
     namespace = {"__name__": "page"}
     printed = None
     for kind, text, mark, line in blocks(page):
@@ -100,8 +96,7 @@ def understood(text):
 @pytest.mark.filterwarnings("ignore:at .* V touching skin")  # told to users of smooth screens, too
 def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
-    monkeypatch.setattr(elements, "ELEMENTS", table)
+    monkeypatch.setattr(space, "ELEMENTS", dict(space.ELEMENTS))  # a page adds one
     families = FORCE_LAWS, IMPORTERS, Motion.kinds, NamedFriction.kinds
     with ExitStack() as kept:  # what a page adds to a family goes with it
         for family in families:

@@ -20,9 +20,7 @@ WIDTHS = (390, 1024, 1366, 1440)
 
 @pytest.fixture
 def site(tmp_path):
-    """Some pages, built as the site is; their links lead nowhere, which sphinx is told to say to
-    nobody.
-    """
+    """Some pages, built as the site is; their links lead nowhere, which sphinx is told to say to nobody."""
     source = tmp_path / "docs"
     source.mkdir()
     for page in PAGES:

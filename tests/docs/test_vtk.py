@@ -1,5 +1,4 @@
-"""What ParaView sees of a run: the series read with VTK, warped, compared and drawn.
-`pytest -m vtk`.
+"""What ParaView sees of a run: the series read with VTK, warped, compared and drawn. `pytest -m vtk`.
 
 The tests without the mark read the macro alone, which needs neither VTK nor ParaView.
 """
@@ -96,9 +95,7 @@ def test_warp_by_vector_gives_the_deformed_finger(series):
 
 @pytest.mark.vtk
 def test_cells_have_the_areas_of_the_mesh(series):
-    """A wrong order of nodes would fold the cells: their areas by VTK add up to that of the
-    finger.
-    """
+    """A wrong order of nodes would fold the cells: their areas by VTK add up to that of the finger."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
 

@@ -144,15 +144,3 @@ def test_derivatives_with_electrodes_that_end(floating):
     quotients = [energy(k * step) - energy(-k * step) for k in (1, 2, 3)]
     slope = (45.0 * quotients[0] - 9.0 * quotients[1] + quotients[2]) / (60.0 * step)
     assert found.by_x @ dx + np.sum(found.by_level * rise) == pytest.approx(slope, rel=1e-7)
-
-
-def test_from_nearby_a_field_is_exact_to_the_second_order():
-    """A tenth of the way, a thousandth of the error, in potential and forces."""
-    x, levels = wave(49, 0.005)
-    near, errors = FILM_AND_AIR.nearby(x, levels), []
-    for moved in (1e-3, 1e-4):
-        there = levels + moved * np.array([[0.0], [0.0], [1.0]]) * np.cos(3.0 * x)
-        exact, found = FILM_AND_AIR.solve(x, there), FILM_AND_AIR.solve(x, there, near=near)
-        errors.append([np.abs(found.phi - exact.phi).max(), np.abs(found.by_level - exact.by_level).max()])
-    assert errors[1][0] < 1e-5
-    assert np.log10(np.divide(*errors)) == pytest.approx([3.0, 3.0], abs=0.3)

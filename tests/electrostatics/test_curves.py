@@ -87,7 +87,7 @@ def test_a_sphere_over_a_plane():
     outline = curved(Outline.of(*bottom(8.34, 0.25, 101), periodic=False), 0.0)
     space = Space(make_mesh(outline, 0.0, 0.0), 1.0)
     space.eps = space.eps * np.pi * np.abs(space.basis.mapping.F(space.basis.X)[0])
-    force = -1e3 * Potential.of(space).force() * 2000.0**2
+    force = -1e3 * Potential.of(space).force * 2000.0**2
     assert force == pytest.approx(3.52603445, rel=5e-5)
 
 

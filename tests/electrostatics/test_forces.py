@@ -1,6 +1,4 @@
-"""Closed-form forces: the paper's numbers, quadrature against an adaptive one, inversions of
-thresholds.
-"""
+"""Closed-form forces: the paper's numbers, quadrature against an adaptive one, inversions of thresholds."""
 
 import warnings
 
@@ -10,8 +8,6 @@ from scipy.integrate import IntegrationWarning, quad
 
 from evfem.electrostatics.forces import (
     EllipsoidalPad,
-    air_layer_ratio,
-    capacitor_force,
     effective_thickness_from_thresholds,
     pad_force,
     pad_force_per_depth,
@@ -29,9 +25,7 @@ MIL = 0.0254
 
 
 def adaptive(law, pad, gap, layers, ellipse):
-    """The same integral by nested adaptive quadrature of pad.gap(x, y), x = a sin t and y = c sin
-    v.
-    """
+    """The same integral by nested adaptive quadrature of pad.gap(x, y), x = a sin t and y = c sin v."""
     scale = np.sqrt(gap + layers.reduced) / pad.height**0.5
 
     def over(function, end):
@@ -108,17 +102,10 @@ def test_a_touching_pad_is_integrated_where_its_insulator_is_thin(law, film):
 
 
 def test_plates_follow_equations_2_to_7():
-    assert capacitor_force(100.0, 140.0, 0.2, 5.0) == pytest.approx(
-        eps_0 * 5 * 100 * 140**2 / (2 * 0.2**2), rel=1e-14
-    )
-    one = Layers.of(Layer(0.2, 5.0))
-    assert plate_force(Kaczmarek(), 100.0, 0.0, 140.0, one) == pytest.approx(
-        capacitor_force(100, 140, 0.2, 5), rel=1e-14
-    )
+    one, capacitor = Layers.of(Layer(0.2, 5.0)), eps_0 * 5 * 100 * 140**2 / (2 * 0.2**2)
+    assert plate_force(Kaczmarek(), 100.0, 0.0, 140.0, one) == pytest.approx(capacitor, rel=1e-14)
     # (4): Strong-Troxel exceeds (2) by the factor eps
-    assert plate_force(StrongTroxel(), 100.0, 0.0, 140.0, one) == pytest.approx(
-        5.0 * capacitor_force(100, 140, 0.2, 5), rel=1e-14
-    )
+    assert plate_force(StrongTroxel(), 100.0, 0.0, 140.0, one) == pytest.approx(5.0 * capacitor, rel=1e-14)
 
 
 def test_thickness_from_thresholds():
@@ -149,13 +136,6 @@ def test_thickness_found_gives_equal_tangential_forces(friction):
         np.testing.assert_allclose(pulls[0], pulls[1], rtol=1e-12)
 
 
-def test_air_layer_share():
-    # notes, Fig. 11: with ridges 0.17 F^-0.49 is 0.738 at 0.05 N/mm, that is 42 % of the total
-    ratio = air_layer_ratio(0.05, 0.17, 0.49)
-    assert ratio == pytest.approx(0.738, abs=5e-4)
-    assert ratio / (1 + ratio) == pytest.approx(0.425, abs=1e-3)
-
-
 def test_impossible_input_is_refused_with_a_sentence():
     films = Layer(0.5 * MIL, 4.5), Layer(1.0 * MIL, 4.5)
     for thresholds in ((73.0, 73.0), (110.0, 73.0), (50.0, 110.0)):
@@ -173,5 +153,3 @@ def test_impossible_input_is_refused_with_a_sentence():
         EllipsoidalPad(10.0, 0.0, 20.0)
     with pytest.raises(InputError, match="area"):
         plate_force(Kaczmarek(), -1.0, 0.0, 1e3, TABLE_2)
-    with pytest.raises(InputError, match="thickness"):
-        capacitor_force(1.0, 1.0, 0.0, 1.0)

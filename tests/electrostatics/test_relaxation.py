@@ -9,13 +9,13 @@ import evfem as ev
 from evfem.electrostatics import alternating_pressure
 from evfem.electrostatics.dielectrics import debye_layer, seen_at
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.relaxation import stack_of
+from evfem.electrostatics.relaxation import Sandwich
 
 #: two poles in the skin, one slower and one faster than a cycle, and one in the film
 SKIN = ev.Layer(0.30, ev.Dielectric(80.0, [(900.0, 2e-3, 0.0), (300.0, 2e-5, 0.0)], 2e-4))
 FILM = ev.Layer(0.001, ev.Dielectric(3.0, [(0.9, 5e-4, 0.0)], 1e-10))
 LEAK = 1e-8
-STACK = stack_of(SKIN, FILM, frequency=None, gap_conductivity=LEAK, gap_eps_r=1.0)
+STACK = Sandwich.of(SKIN, FILM, frequency=None, gap_conductivity=LEAK, gap_eps_r=1.0)
 GAPS = np.array([0.0, 1e-3, 5e-3])
 
 
@@ -54,9 +54,9 @@ def test_the_state_after_a_ramp_is_that_of_a_matrix_exponential(gap, seconds):
 
 def test_without_poles_and_without_seconds_it_is_the_sandwich():
     skin = ev.Layer(0.30, ev.Dielectric(1136.0, (), 2e-4))
-    plain = stack_of(skin, ev.TOUCHSCREEN, frequency=75.0, gap_conductivity=LEAK, gap_eps_r=1.2)
+    plain = Sandwich.of(skin, ev.TOUCHSCREEN, frequency=75.0, gap_conductivity=LEAK, gap_eps_r=1.2)
     faint = ev.Layer(0.30, ev.Dielectric(1136.0, [(1e-11, 1e-3, 0.0)], 2e-4))
-    same = stack_of(faint, ev.TOUCHSCREEN, frequency=75.0, gap_conductivity=LEAK, gap_eps_r=1.2)
+    same = Sandwich.of(faint, ev.TOUCHSCREEN, frequency=75.0, gap_conductivity=LEAK, gap_eps_r=1.2)
     assert (plain.states, same.states) == (2, 3)
     both = (
         np.array([[4e3, 1e3, -50.0], [-9e2, 2e4, 30.0]]),
@@ -82,7 +82,7 @@ def test_time_domain_against_the_phasor(name, frequency):
     skin = ev.electrostatics.SKINS[name].debye(1.0, 1e5)
     layer = ev.Layer(0.30, skin)
     given = {"frequency": frequency, "gap_conductivity": LEAK, "gap_eps_r": 1.0}
-    stack = stack_of(layer, ev.TOUCHSCREEN, **given)
+    stack = Sandwich.of(layer, ev.TOUCHSCREEN, **given)
     size, step = stack.states, 1.0 / (parts * frequency)
     volts = 100.0 * np.sin(2.0 * np.pi * np.arange(parts + 1) / parts)
     # one part is linear in its start and in the voltages of its two ends

@@ -1,6 +1,4 @@
-"""The parametric finger: outline and ridges on their formula, layers as offsets, counts, symmetry,
-quality.
-"""
+"""The finger by parameters: outline and ridges on their formula, offset layers, counts, symmetry, quality."""
 
 import numpy as np
 import pytest
@@ -28,7 +26,7 @@ UNITS = {"ridge_crest": "of the pitch", "ridge_groove": "of the pitch"}
 
 def green_area(mesh):
     """Area of the region inside the outer edges, exactly also for parabolas (Simpson), mm^2."""
-    p = mesh.points[mesh.outer_edges]
+    p = mesh.points[mesh.outer_sides]
     a, b = p[:, 0], p[:, 1]
     chord = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     if mesh.order == 1:
@@ -167,7 +165,7 @@ def test_sets_are_the_lower_outline_the_nail_and_the_bone():
     nail = mesh.points[mesh.node_sets["nail"]]
     assert np.abs(nail[:, 0]).max() == pytest.approx(5.5)
     np.testing.assert_allclose((nail[:, 0] / A) ** 2 + (nail[:, 1] / B) ** 2, 1.0)
-    edges = [len(mesh.edges_of(name)) for name in ("pad", "nail", "bone")]
+    edges = [len(mesh.sides_of(name)) for name in ("pad", "nail", "bone")]
     assert edges[0] == len(lower) - 1
     assert edges[1] == len(nail) - 1
     assert edges[2] == len(mesh.node_sets["bone"])

@@ -60,18 +60,16 @@ def test_volume(offset):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("ridges", ["none", "along", "whorl"])
 def test_surface_is_pad_bone_and_rim(ridges, order):
-    """No cracks: the faces of one cell only are those of the three sets, and every node has a
-    cell.
-    """
+    """No cracks: the faces of one cell only are those of the three sets, and every node has a cell."""
     mesh = tip(ridges=ridges).mesh(order)
-    faces = [mesh.faces_of(name) for name in ("pad", "bone", "rim")]
+    faces = [mesh.sides_of(name) for name in ("pad", "bone", "rim")]
     if order == 2:
         assert {len(face) for face in faces[0]} == {9}
-    assert sum(len(one) for one in faces[:2]) == len(mesh.outer_faces)
+    assert sum(len(one) for one in faces[:2]) == len(mesh.outer_sides)
     assert len(faces[2]) > 0
     assert len(np.unique(mesh.cells)) == len(mesh.points)
     free = ev.Fingertip(ridges=ridges, resolution="coarse", rim="free").mesh(order)
-    assert len(free.faces_of("bone")) == len(faces[1]) - len(faces[2])
+    assert len(free.sides_of("bone")) == len(faces[1]) - len(faces[2])
     np.testing.assert_array_equal(free.node_sets["rim"], mesh.node_sets["rim"])
 
 
@@ -94,9 +92,7 @@ def test_surfaces_are_the_ellipsoids():
 
 
 def test_posture_turns_the_tip_down():
-    """About x, by its angle: a rigid turn, after which the tip is lower than the finger's other
-    end.
-    """
+    """About x, by its angle: a rigid turn, after which the tip is lower than the finger's other end."""
     level, turned = (tip(posture=angle).mesh().points for angle in (0.0, 30.0))
     c, s = np.cos(np.pi / 6), 0.5
     np.testing.assert_allclose(turned[:, 1], c * level[:, 1] - s * level[:, 2], atol=1e-12)
@@ -116,9 +112,7 @@ def test_shape_of_the_cells(ridges, order):
 
 
 def depth_of(finger):
-    """x and z of the feet, depth along the normal (by Newton's method), of the nodes near the
-    middle.
-    """
+    """x and z of the feet, depth along the normal (by Newton's method), of the nodes near the middle."""
     mesh, axes = finger.mesh(), 0.5 * np.array([finger.width, finger.height, finger.length])
     points = mesh.points[mesh.node_sets["pad"]]
     points = points[(np.abs(points[:, 0]) < 4.0) & (np.abs(points[:, 2]) < 4.0)]
@@ -157,9 +151,7 @@ def test_patterns_are_one_pitch_from_crest_to_crest():
 
 
 def test_prints_from_a_table_and_from_an_image(tmp_path):
-    """The same relief as an object, in a csv file and in an image of 16 bits, whose top is the
-    tip.
-    """
+    """The same relief as an object, in a csv file and in an image of 16 bits, whose top is the tip."""
     x, z = np.linspace(-4.0, 4.0, 81), np.linspace(-5.0, 5.0, 101)
     height = 0.1 * np.exp(-((x - 1.0) ** 2 + (z[:, None] - 2.0) ** 2))
     own = tip(ridges=HeightMap(x, z, height), ridge_width=0.7)

@@ -62,9 +62,7 @@ def test_version_four_gmsh_file_is_read(tmp_path):
 
 
 def version_four(file, names):
-    """A `.msh` 4.1 text as gmsh writes it: entities that carry the physical groups, blocks per
-    entity.
-    """
+    """A `.msh` 4.1 text as gmsh writes it: entities that carry the physical groups, blocks per entity."""
     box = "-9 -9 0 9 9 0"
     lines = [f"{tag} {box} 1 -{tag} 0" for d, tag in names if d == 1]  # curves that run backwards
     faces = [f"{tag} {box} 1 {tag} 0" for d, tag in names if d == 2]
@@ -110,7 +108,7 @@ def test_pad_is_reduced_to_the_outline(tmp_path):
     parts["point_data"]["pad"][:] = 1.0
     meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
     mesh = meshfile.read(tmp_path / "mesh.vtu", REGIONS)
-    np.testing.assert_array_equal(mesh.node_sets["pad"], np.unique(mesh.outer_edges))
+    np.testing.assert_array_equal(mesh.node_sets["pad"], np.unique(mesh.outer_sides))
 
 
 @pytest.mark.parametrize(

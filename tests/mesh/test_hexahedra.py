@@ -18,10 +18,10 @@ from evfem.mesh.quality import check
 def test_outer_faces_of_a_block():
     """As many as its sides have, each on its side, areas and normals of the sides."""
     for mesh in (block((2, 3, 4), jitter=0.2), raised(block((2, 3, 4), jitter=0.2))):
-        assert len(mesh.outer_faces) == 2 * (6 + 8 + 12)
-        assert len(mesh.faces[0]) == (3 * 12 + 4 * 8 + 5 * 6)
+        assert len(mesh.outer_sides) == 2 * (6 + 8 + 12)
+        assert len(mesh.sides[0]) == (3 * 12 + 4 * 8 + 5 * 6)
         for k, name in enumerate(SIDES):
-            corner = mesh.points[mesh.faces_of(name)[:, :4]]
+            corner = mesh.points[mesh.sides_of(name)[:, :4]]
             area = 0.5 * np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]).sum(axis=0)
             np.testing.assert_allclose(area, np.eye(3)[k // 2] * (1 if k % 2 else -1), atol=1e-15)
 
@@ -138,7 +138,7 @@ def hanging():
 def loose_middle():
     """A mid-node that one of its cells has as another node in nearly the same place."""
     mesh = solid(2)
-    inner = np.setdiff1d(mesh.cells[:, 8:20], mesh.outer_faces)[0]
+    inner = np.setdiff1d(mesh.cells[:, 8:20], mesh.outer_sides)[0]
     cell = np.flatnonzero((mesh.cells == inner).any(axis=1))[0]
     nodes = np.where(mesh.cells[cell] == inner, len(mesh.points), mesh.cells[cell])
     mesh = replace(mesh, points=np.vstack([mesh.points, mesh.points[inner] + 1e-3]))

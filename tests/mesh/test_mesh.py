@@ -40,8 +40,8 @@ def triangle(kind="triangle", apex=(0.5, 0.75**0.5)):
 def test_outer_edges_run_around_the_body_with_the_body_on_the_left():
     for order in (1, 2):
         mesh = strip(order=order)
-        start, end = mesh.points[mesh.outer_edges[:, 0]], mesh.points[mesh.outer_edges[:, 1]]
-        assert len(mesh.outer_edges) == 12
+        start, end = mesh.points[mesh.outer_sides[:, 0]], mesh.points[mesh.outer_sides[:, 1]]
+        assert len(mesh.outer_sides) == 12
         # Green: the integral of (x dy - y dx)/2 over the outline is plus the area
         assert 0.5 * np.sum(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]) == pytest.approx(12.0)
 

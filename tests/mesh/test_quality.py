@@ -22,9 +22,7 @@ def shifted_copy(gap):
 
 
 def curl():
-    """A strip of cells that goes round by more than a turn, so that its end lies over its
-    beginning.
-    """
+    """A strip of cells that goes round by more than a turn, so that its end lies over its beginning."""
     angle = np.linspace(0.0, 2.2 * np.pi, 45)
     rings = [r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (3.0, 4.0)]
     node = np.arange(90).reshape(2, 45)
@@ -34,9 +32,7 @@ def curl():
 
 
 def hanging():
-    """A cell whose upper edge meets two cells: their common node hangs on it (a side column joins
-    them).
-    """
+    """A cell whose upper edge meets two cells: their common node hangs on it (a side column joins them)."""
     points = np.array(
         [[0, 0], [4, 0], [4, 2], [0, 2], [2, 2], [0, 4], [2, 4], [4, 4], [6, 0], [6, 2], [6, 4.0]]
     )

@@ -1,6 +1,4 @@
-"""Anderson's mixing: linear contractions end after few steps, and what else a state carries
-follows.
-"""
+"""Anderson's mixing: linear contractions end after few steps, and what else a state carries follows."""
 
 from dataclasses import replace
 
@@ -16,9 +14,7 @@ NODES = 2
 
 
 def state(u, force=0.0, bone=0.0, squared=0.0, status=OPEN):
-    """A state of two nodes, the first of them the pad, at displacements u (4,); voltage squared in
-    kV^2.
-    """
+    """A state of two nodes, the first of them the pad, at displacements u (4,); voltage squared in kV^2."""
     zero = np.zeros((NODES, 2))
     return State(
         u=np.reshape(u, (NODES, 2)),
@@ -34,9 +30,7 @@ def state(u, force=0.0, bone=0.0, squared=0.0, status=OPEN):
 
 
 def contraction(dimension, seed=0):
-    """Fixed point x (4,) and matrix M (4, 4) of g = x + M (. - x), whose error has `dimension`
-    directions.
-    """
+    """Fixed point x (4,) and matrix M (4, 4) of g = x + M (. - x), whose error has `dimension` directions."""
     rng = np.random.default_rng(seed)
     basis = np.linalg.qr(rng.normal(size=(4, 4)))[0]
     rates = np.zeros(4)

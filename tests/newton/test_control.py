@@ -7,35 +7,24 @@ import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import OPEN, STICK
-from evfem.newton.control import (
-    FollowFriction,
-    Force,
-    GivenVoltage,
-    Unsupported,
-    VoltageProblem,
-)
+from evfem.newton.control import FollowFriction, Force, GivenVoltage, VoltageProblem
 
 REACTION = np.array([0.2, -3.0])
 
 
 def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
-    """The bone is pressed with 5 N/mm downwards and pushed up with 3: 2 N/mm more are missing,
-    downwards.
-    """
+    """The bone is pressed with 5 N/mm downwards and pushed up with 3: 2 N/mm more are missing, downwards."""
     force = Force(5.0)
     assert (force.free, force.known(0.7)) == (True, 0.7)
     assert force.missing(0.7, REACTION) == pytest.approx(-2.0)
     assert force.missing(0.7, np.array([0.2, -5.0])) == 0.0
-    assert force.towards(Force(9.0), 0.25) == Force(6.0)
 
 
 # -- the voltage that follows a friction force ----------------------------------------------------------
 
 
 class Friction:
-    """A pad whose friction force is 2 N/mm plus 3 N/mm for each kV^2: contact problems of one
-    number.
-    """
+    """A pad whose friction force is 2 N/mm plus 3 N/mm for each kV^2: contact problems of one number."""
 
     def __init__(self, squared):
         self.squared, self.residuals = squared, []
@@ -53,9 +42,7 @@ class Friction:
 
 
 def follow(wish, squared, largest=2000.0, before=1000.0):
-    """The control after one iteration at `squared` kV^2, what it changed, and the contact problems
-    it posed.
-    """
+    """The control after one iteration at `squared` kV^2, what it changed, and contact problems it posed."""
     control, friction = FollowFriction(wish, largest), Friction(squared)
     control.begin(SimpleNamespace(voltage=before))
     step = LinearContactStep(None, None, np.zeros(1), np.zeros(2))
@@ -63,9 +50,7 @@ def follow(wish, squared, largest=2000.0, before=1000.0):
 
 
 def test_between_its_bounds_the_squared_voltage_is_what_the_wish_needs():
-    """2 + 3 x = 6.5: x = 1.5, half a kV^2 more than there is; one kV^2 does (7,) to the backward
-    solve.
-    """
+    """2 + 3 x = 6.5: x = 1.5, half a kV^2 more than there is; one kV^2 does (7,) to the backward solve."""
     control, found, posed = follow(6.5, 1.0)
     assert control.free
     assert found.change == pytest.approx(0.5)
@@ -92,9 +77,7 @@ def test_at_a_bound_the_voltage_stays_there_and_contact_is_solved_again(wish, sq
     ("wish", "tolerated", "corrected"), [(1.0, 3.0, 0.5), (20.0, 19.0, 21.0)], ids=["at zero", "at limit"]
 )
 def test_a_bound_is_left_only_where_the_voltage_could_help(way, wish, tolerated, corrected):
-    """At 0 V more friction than wished for cannot be helped, less can; at the limit the other way
-    round.
-    """
+    """At 0 V more friction than wished for cannot be helped, less can; at the limit the other way round."""
     for force, accepted in ((tolerated, True), (corrected, False)):
         control, _, _ = follow(wish, 1.0)
         control.force = way * control.force
@@ -113,10 +96,3 @@ def test_only_at_the_limit_of_a_pad_that_sticks_the_old_voltage_is_kept(wish, st
     assert control.fallback(old, found) == (GivenVoltage(321.0) if kept else None)
     assert control.fallback(old, None) == GivenVoltage(321.0)
     assert GivenVoltage(5.0).fallback(old, None) is None
-
-
-def test_a_force_acts_on_the_way_from_or_to_a_loose_finger():
-    """The ends themselves keep their own controls (`Run._path`)."""
-    for force in (0.0, 1e-9):
-        assert Unsupported(0.3).towards(Force(force), 0.5) == Force(force)
-        assert Force(force).towards(Unsupported(0.3), 0.5) == Force(force)

@@ -78,7 +78,7 @@ def test_one_iteration_of_the_whole_step_leaves_a_quadratic_rest(options, move):
     state = equilibrium.step(state, Target.held(state.bone + 1e-2 * np.array(move) * [1.0, -1.0], voltage))
     rest = []
     for size in (2e-3, 5e-4):
-        equilibrium.body.linearisation.discard()
+        equilibrium.body.discard()
         equilibrium.step(
             replace(state, last_increment=0.0 * state.last_increment),
             Target.held(state.bone + size * np.array(move) * [1.0, -1.0], voltage),
@@ -184,15 +184,6 @@ def test_the_travel_of_the_bone_does_not_count_as_force():
     assert result.substeps.tolist() == [1, 1, 1, 1]
     assert result.normal_force[2] > 1.0
     assert np.abs(result.applied_force[3]) < 1e-12
-
-
-@pytest.mark.parametrize("history", [[0.0, 0.04], [0.0, 0.0], [1e-3, 0.0]])
-def test_residuals_of_exactly_zero_are_numbers_like_others(history):
-    """A balanced start, contact not settled: the factorisation is renewed only if the residual
-    grew.
-    """
-    model, _ = pressed(Display())
-    assert model.equilibrium.body.linearisation._too_old(history) == (history[1] > 0.0)
 
 
 def test_iterations_that_go_to_and_fro_are_given_up_and_falling_ones_are_not():

@@ -1,6 +1,4 @@
-"""Finite elements behind the outer iteration: what counts as out of balance, and how far an update
-may go.
-"""
+"""Finite elements behind the outer iteration: what counts as out of balance, and how far an update may go."""
 
 from dataclasses import replace
 
@@ -26,9 +24,7 @@ ROUND = finger(block(8, 3, sag=0.4))
 
 @pytest.fixture(scope="module")
 def pressed():
-    """A model, its body, its state at 0.2 mm of indentation under 1000 V, and the target it was
-    for.
-    """
+    """A model, its body, its state at 0.2 mm of indentation under 1000 V, and the target it was for."""
     scene = Scene(ROUND, Display(), Kaczmarek(), 1000.0, [Press(indentation=0.2)])
     model = make_model(scene)
     target = Target.held(model.bone(0.0, 0.2), 1000.0)
@@ -63,9 +59,7 @@ def test_a_wished_friction_force_counts_while_the_voltage_is_free(pressed, missi
 
 
 def test_forces_that_add_up_count_by_their_sum(pressed):
-    """Every touching node pushed with as little as can pass alone: together they are so many times
-    more.
-    """
+    """Every touching node pushed with as little as can pass alone: together they are so many times more."""
     body, state, _ = pressed
     touching = state.touching
     extra = 1e-5 * touching[:, None] * [1.0, 0.0]

@@ -1,6 +1,4 @@
-"""What is said of an iterate that is no equilibrium: numbers put in by hand come out, at the right
-places.
-"""
+"""What is said of an iterate that is no equilibrium: numbers put in by hand come out, at the right places."""
 
 import numpy as np
 import pytest
@@ -14,9 +12,7 @@ from evfem.tissue.laws import NeoHookean
 
 @pytest.fixture
 def body():
-    """A unit square of 2 x 2 cells whose upper side is the bone; nodes are numbered along x, then
-    y.
-    """
+    """A unit square of 2 x 2 cells whose upper side is the bone; nodes are numbered along x, then y."""
     space = rectangle("q1", (2, 2))
     space.mesh.node_sets["bone"] = space.mesh.node_sets["top"]
     return Body(space, {"lower": NeoHookean(E=1.0, nu=0.3)})

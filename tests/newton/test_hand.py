@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from tools.builders import coarse_pad, finger
+from tools.builders import coarse_pad, finger, left_over
 from tools.meshes import block
 
 import evfem as ev
@@ -31,13 +31,6 @@ def slid(distance, steps, speed=1.0, hold="force"):
     return ev.Slide(distance, steps=steps, hold=hold, speed=speed)
 
 
-def remainder(result):
-    lost = result.friction_dissipation + result.integrator_dissipation + result.snap_dissipation
-    kept = result.stored_energy + result.kinetic_energy + result.viscous_dissipation
-    given = result.external_work + result.electrostatic_work
-    return np.abs(given - lost - kept).max() / np.abs(given).max()
-
-
 @pytest.mark.parametrize("hold", ["force", "indentation"])
 def test_behind_a_spring_the_bone_sticks_until_it_is_stretched_and_then_lags_behind(hold):
     """The stretch of full slip is mu N / k = 0.8 mm, forwards and, 1.6 mm later, backwards."""
@@ -47,7 +40,7 @@ def test_behind_a_spring_the_bone_sticks_until_it_is_stretched_and_then_lags_beh
     lag = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 0.8, 0.8, 0.4, 0.0, -0.4, -0.8, -0.8])
     np.testing.assert_allclose(result.position, drive - lag, atol=2e-4)
     np.testing.assert_allclose(result.applied_tangential_force, K * (drive - result.position), atol=1e-10)
-    assert remainder(result) < 1e-9
+    assert left_over(result) < 1e-9
     # the drive has stretched the spring, and friction has taken the way of the bone
     friction = 0.4 * N * np.abs(np.diff(result.position)).sum()
     assert result.friction_dissipation[-1] == pytest.approx(friction, rel=2e-3)
@@ -67,7 +60,7 @@ def test_without_friction_the_bone_swings_about_the_drive(damping):
         t = result.time
         stretch = np.exp(-decay * t) * np.sin(omega * t) / omega
         errors.append(np.abs(result.position - (t - stretch)).max() * omega)
-        assert remainder(result) < 1e-6  # the work is small, and the residuals are relative to the load
+        assert left_over(result) < 1e-6  # the work is small, and the residuals are relative to the load
     assert errors[1] < 0.1
     assert 1.7 < errors[0] / errors[1] < 2.3
     assert (result.viscous_dissipation[-1] > 0.0) == (damping > 0.0)
@@ -126,7 +119,7 @@ def test_the_period_of_stick_slip_is_that_of_a_mass_on_a_spring():
         slab(hand, slid(before, 3), slid(fine, 600), slid(rest, 3), slid(0.03, 60), friction_law=STRIBECK)
     )
     speed = np.diff(result.position) / np.diff(result.time)
-    assert remainder(result) < 1e-8
+    assert left_over(result) < 1e-8
     # sticks again at the end of the slip, and the spring is stretched by the drive alone
     held = slice(580, 606)
     assert np.abs(speed[held]).max() == pytest.approx(K * 0.02 / (25.0 * 4.0), rel=1e-3)  # of the slab itself
@@ -148,7 +141,7 @@ def test_a_finger_with_time_of_its_own_goes_with_a_hand(dynamics):
         solver=ev.Solver(dynamics=dynamics), output=OUTPUT, friction_law=ev.RateFriction(20.0, ratio=1.2),
     )  # fmt: skip
     result = ev.simulate(scene)
-    assert remainder(result) < 1e-6
+    assert left_over(result) < 1e-6
     assert 0.0 < result.position[-1] < 0.3
     assert result.substeps.max() == 1
 

@@ -19,9 +19,7 @@ ROUND = finger(block(8, 3, sag=0.4))
 
 
 def interface_and_state(surface, statuses, solver=None):
-    """The interface of a pad about 0.1 mm above the surface, and a state whose nodes have these
-    statuses.
-    """
+    """The interface of a pad about 0.1 mm above the surface, and a state whose nodes have these statuses."""
     model = make_model(Scene(ROUND, surface, motion=[Press(indentation=0.1)], solver=solver or Solver()))
     state = model.equilibrium.rest(np.zeros(2), 0.0)
     status = np.resize(statuses, state.status.size)

@@ -112,7 +112,7 @@ def test_a_linear_step_solves_both_equations(element):
     )
     both = np.linalg.solve(system, np.concatenate([-mixed_forces.ravel()[free], misfit.ravel()]))
 
-    pressure = Pressure(tissue, SimpleNamespace(reusable=SimpleNamespace(u=u0)))
+    pressure = Pressure(tissue, SimpleNamespace(reusable=SimpleNamespace(state=SimpleNamespace(u=u0))))
     state = SimpleNamespace(u=u, pressure=q)
     np.testing.assert_allclose(pressure.misfit(state), misfit)
     forces = (tissue.forces(u) + pressure.further_forces(state, misfit)).ravel()
@@ -151,7 +151,7 @@ def test_a_resumed_run_has_the_factorisation_that_was_made_under_a_pressure(inte
     assert np.abs(pressure).max() > 1e-3
     run = Run(scene, Saved(kept[2], rows[:2]))
     np.testing.assert_array_equal(run.checkpoint()["factor_pressure"], pressure)
-    assert reusable_of(kept[2]).tangent_point.pressure.shape == pressure.shape
+    assert reusable_of(kept[2]).tangent_point.state.pressure.shape == pressure.shape
     resumed = simulate(scene, resume=Saved(kept[2], rows[:2]))
     assert resumed.newton_iterations.tolist() == [row["newton_iterations"] for row in rows]
     np.testing.assert_allclose(

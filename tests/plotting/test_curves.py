@@ -21,10 +21,9 @@ from evfem.plotting import (
     signal,
     spectrum,
 )
-from evfem.plotting.curves import ENERGIES, OVER, abscissa
+from evfem.plotting.curves import ENERGIES, abscissa
 from evfem.plotting.labels import kind_of
 from evfem.scene.probes import Probe, columns, histories
-from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS, Result
 
 
@@ -243,10 +242,6 @@ def test_totals_and_others_are_not_compared():
         compare({"a": result, "b": result.total}, "normal_force")
     both = compare({"a": result.total, "b": result.total}, "normal_force")
     assert both.get_ylabel() == "normal force (N)"
-
-
-def test_what_can_be_drawn_over_is_in_the_history():
-    assert set(OVER) <= {*COLUMNS, *SPATIAL}
 
 
 def test_every_column_has_a_kind_and_a_unit():

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 from tools.fakes import fake_result
 
-from evfem.plotting import deformed, forces, history, signal
+from evfem.plotting import contact_pressure, deformed, forces, history, signal
 
 PNG = b"\x89PNG"
 #: a backend that tells which figures `plt.show()` shows, instead of opening windows
@@ -88,7 +88,8 @@ def test_a_picture_can_be_kept_and_loaded(tmp_path):
 
 def test_given_axes_are_left_to_their_figure():
     ax = Figure().add_subplot()
-    assert forces(fake_result(), ax=ax) is ax
+    for draw in (forces, contact_pressure, deformed):
+        assert draw(fake_result(), ax=ax) is ax
     assert not hasattr(ax, "_repr_png_")
 
 

@@ -6,20 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
 from tools.fakes import fake_result
 from tools.meshes import KINDS, square_mesh
 
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.plotting import FIELDS, contact_pressure, deformed, regions, side_by_side
-from evfem.plotting.fields import CELL_FIELDS, patches, scale_of
+from evfem.plotting.fields import patches, scale_of
 from evfem.scene.file import dump
 from evfem.scene.motion import Press
 from evfem.scene.probes import Probe
 from evfem.scene.scene import Output, Scene
 from evfem.simulation.model import placed
-from evfem.simulation.result import POINT_FIELDS
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Flat, Sinusoid
 from evfem.tissue.laws import NeoHookean
@@ -78,9 +76,7 @@ def test_flat_cells_are_drawn_where_they_moved_with_their_values(kind):
 
 
 def area(cells):
-    """Sum of the polygon areas by the shoelace formula, positive only if nodes go round
-    counter-clockwise.
-    """
+    """Sum of the polygon areas by the shoelace formula, positive only if nodes go round counter-clockwise."""
     total = 0.0
     for path in cells.get_paths():
         x, y = path.vertices.T
@@ -320,18 +316,6 @@ def test_unknown_fields_frames_and_windows_get_a_sentence():
         deformed(result, vmin=2.0, vmax=1.0)
     with pytest.raises(InputError, match="results: given nothing"):
         side_by_side({})
-
-
-def test_axes_that_are_given_are_used(tmp_path):
-    figure = Figure()
-    left, right = figure.subplots(1, 2)
-    assert deformed(fake_result(), ax=left) is left
-    assert contact_pressure(fake_result(), ax=right) is right
-    figure.savefig(tmp_path / "both.png")
-
-
-def test_the_fields_are_those_of_a_frame():
-    assert set(FIELDS) == {*CELL_FIELDS, "displacement", *POINT_FIELDS}
 
 
 def test_probes_are_marked_where_they_are_and_only_in_the_window():

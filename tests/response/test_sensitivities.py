@@ -6,8 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from tools.meshes import between
+from tools.meshes import held as with_sets
 
 import evfem as ev
+from evfem.response.lines import PLACES, STEP, difference
 from evfem.response.parameters import parameter_of
 
 TISSUE = "finger.materials.tissue."
@@ -134,16 +137,46 @@ def test_friction_has_no_effect_before_the_first_slip_and_speed_is_time(held):
     assert 0.03 * by_time[2] == pytest.approx(5.8124895294e-3, rel=1e-8)
 
 
-def test_beyond_valid_to_a_status_changes(held):
-    """Before it none does."""
-    found, key = held["indentation"], "surface.friction"
-    reach = found.valid_to[key][14]
-    statuses = []
-    for share in (0.0, 0.9, -0.9):
-        scene = block(surface=ev.Display(ev.Layer(0.01, 3.0), friction=0.3 + share * reach, y=0.0))
-        statuses.append(ev.simulate(scene).frames[-1].contact_status.tolist())
-    assert reach > 0.05
-    assert statuses[0] == statuses[1] or statuses[0] == statuses[2]
+def statuses(scene, step):
+    """Of all nodes in a step, counted from 0."""
+    return ev.simulate(scene).frames[step].contact_status.tolist()
+
+
+@pytest.mark.parametrize("key", ["surface.friction", THICKNESS])
+def test_a_status_changes_where_valid_to_says_and_not_before(held, key):
+    """In the step with the shortest reach: what is left is asked for again and again on the way there."""
+    reaches = held["indentation"].valid_to[key]
+    step, left, change = int(np.argmin(reaches)), reaches.min(), 0.0
+    here = lambda change: changed(block(), key, held["indentation"].parameters[key] + change)  # noqa: E731
+    before = statuses(block(), step)
+    way = 1.0 if statuses(here(1.5 * left), step) != before else -1.0
+    for _ in range(4):
+        change += 0.9 * way * left
+        left = ev.sensitivities(here(change), key, FORCES).valid_to[key][step]
+    assert left < 1e-3 * reaches.min()
+    assert abs(change) == pytest.approx(reaches.min(), rel=0.5)  # which is of first order
+    for share, stays in ((0.99, True), (1.01, False)):
+        assert (statuses(here(change + share * way * left), step) == before) is stays
+
+
+#: derivatives of the mean tangential force of steps 8 to 15 by the voltage of every step, of the same code
+BY_VOLTAGE = [
+    -1.1148158e-9, -4.7639e-13, -3.3896e-12, -9.8728e-12, -1.4121948e-10, 2.4901548e-8, 1.9682496e-7,
+    1.4629216554e-5, 1.7562765037e-5, 2.4522860074e-5, 4.1576791625e-5, -8.4019619e-10, -5.7863827e-10,
+    -3.5549086e-10, -1.6168386e-10,
+]  # fmt: skip
+
+
+def test_sticking_remembers_the_voltages_of_earlier_steps():
+    """All 15 voltages are parameters; step 15 depends on those of steps 7 to 11 and hardly on its own."""
+    signal = ev.Sampled(np.full(16, 100.0), rate=20.0)
+    keys = [f"electrostatics.signal.voltage.{step}" for step in range(1, 16)]
+    found = ev.sensitivities(block(voltage=signal), keys, ["tangential_force"])
+    by_voltage = [found["tangential_force", key][7:].mean() for key in keys]
+    assert by_voltage == pytest.approx(BY_VOLTAGE, rel=1e-8, abs=2e-14)
+    last = np.array([found["tangential_force", key][14] for key in keys])
+    assert last[[8, 10]] == pytest.approx([1.0272e-5, 5.8953e-5], rel=1e-4)
+    assert abs(last[14]) < 1e-3 * last[10]
 
 
 def test_what_counts_has_no_derivative_and_a_reason(held):
@@ -220,6 +253,14 @@ def solid():
     return ev.Scene(finger, surface, ev.StrongTroxel(), 100.0, motion, solver=solver)
 
 
+def full_field():
+    """A smooth finger pressed and moved over the field of its electrode."""
+    pad = ev.FingerPad(ridges=False, resolution="coarse")
+    motion = (ev.Press(indentation=0.3, steps=2), ev.Slide(0.2, steps=1))
+    scene = ev.Scene(pad, ev.Display(), ev.StrongTroxel(), 1000.0, motion, field="full")
+    return replace(scene, solver=ev.Solver(tolerance=1e-11))
+
+
 LAYERED = {"insulator": ev.Layer(0.01, 3.0)}
 ROUGH = ev.PowerRoughness(gap=0.002, pressure=0.01, exponent=0.3, open_gap=0.004)
 CASES = {
@@ -248,10 +289,7 @@ CASES = {
     ),
     "rate": (lambda: block(friction_law=ev.RateFriction(speed=1.0, ratio=0.7)), "surface.friction_law.ratio"),
     "ageing": (lambda: block(friction_law=ev.AgeingFriction(0.5, 0.3)), "surface.friction_law.time"),
-    "sines": (
-        lambda: block(surface=ev.Sinusoid(terms=[[0.05, 0.5, 0.3]], **LAYERED)),
-        "surface.terms.0.0",
-    ),
+    "sines": (lambda: block(surface=ev.Sinusoid(terms=[[0.05, 0.5, 0.3]], **LAYERED)), "surface.terms.0.0"),
     "normal": (lambda: block(direction="normal"), "electrostatics.voltage"),
     "inertia": (lambda: block(solver=replace(block().solver, dynamics="inertial")), TISSUE + "E"),
     "jump of friction": (
@@ -262,6 +300,16 @@ CASES = {
     ),
     "adhesion": (lambda: block(adhesion=ev.Dugdale(stress=0.002, reach=0.02)), "adhesion.stress"),
     "solid": (solid, "surface.friction"),
+    "profile": (
+        lambda: block(surface=ev.Profile([-9.0, -3.0, 3.0, 9.0], [0.0, 0.03, 0.01, 0.0], **LAYERED)),
+        "surface.points.1.1",
+    ),
+    "friction on a profile": (
+        lambda: block(surface=ev.Profile([-9.0, 0.0, 9.0], [0.0, 0.02, 0.0], friction=0.3, **LAYERED)),
+        "surface.friction",
+    ),
+    "full field": (full_field, "electrostatics.insulator_thickness"),
+    "rounds": (lambda: block(coupling="staggered"), "electrostatics.voltage"),
 }
 
 
@@ -274,9 +322,9 @@ def test_derivatives_are_those_of_differences_of_runs(case):
     size = 2e-4 * min(value, 0.5 - value if key.endswith("nu") else value)
     runs = differenced(scene, lambda s, v: changed(s, key, v), value, size, columns)
     holds = np.cumprod(found.valid_to[key] > 4 * size).astype(bool)
-    assert holds[:5].all()
+    assert holds[: min(5, len(holds))].all()
     for name, row in zip(columns, runs, strict=True):
-        scale = max(np.abs(row).max(), 1e-3 * np.abs(found.result[name]).max() / value)
+        scale = max(np.abs(row).max(), 1e-3 * found.result.normal_force.max() / value)
         assert found[name, key][holds] == pytest.approx(row[holds], rel=1e-6, abs=1e-6 * scale)
 
 
@@ -300,6 +348,66 @@ def test_an_elastic_surface_is_refused():
     soft = replace(block().surface, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
     with pytest.raises(ev.InputError, match="a rigid one: derivatives know no other"):
         ev.sensitivities(block(surface=soft), "surface.friction")
+
+
+def test_an_attraction_of_another_place_is_refused():
+    """Its forces are no function of the state that the step ends at: they would be wrong by up to 30 %."""
+    with pytest.raises(ev.InputError, match="monolithic or staggered"):
+        ev.sensitivities(block(coupling="staggered_once"), "surface.friction")
+
+
+def half_width(load, radius, modulus):
+    return ev.reference.HertzLine(load, radius, modulus).half_width
+
+
+def pull_in(stiffness, gap, layer, area):
+    layers = ev.Layers.of(ev.Layer(layer, 1.0))
+    return ev.reference.pull_in_strong_troxel(stiffness, gap, area, layers).voltage
+
+
+#: how well the values know the permittivity of vacuum
+EPS_0 = 3e-8
+#: function, its numbers, value and derivatives
+CLOSED = [
+    (half_width, (0.05, 10.0, 0.08), 2.82094791774, (28.209479177, 0.14104739589, -17.630924486)),
+    (
+        pull_in,
+        (0.1, 0.25, 0.38 / 1650.0 + 0.09 / 3.35, 100.0),
+        843.789391325,
+        (4218.9469566, 4567.6741058, 4567.6741058, -4.2189469566),
+    ),
+]
+
+
+@pytest.mark.parametrize(("function", "numbers", "value", "slopes"), CLOSED)
+def test_derivatives_of_closed_forms_by_the_differences_that_are_taken_of_models(
+    function, numbers, value, slopes
+):
+    assert function(*numbers) == pytest.approx(value, rel=EPS_0)
+    for i, slope in enumerate(slopes):
+        step = STEP * numbers[i]
+        ways = [np.array(numbers) + place * step * np.eye(len(numbers))[i] for place in PLACES]
+        assert difference([function(*way) for way in ways], step) == pytest.approx(slope, rel=EPS_0)
+
+
+@pytest.mark.filterwarnings("ignore:the shear modulus")
+def test_a_hovering_parabola_has_the_derivatives_of_its_closed_form():
+    """F = pi/4 eps_0 U^2 sqrt(2 R) (d + s)^-3/2 of an infinitely wide rigid one, d 0.25 mm; of 30 mm width
+    the columns have all but 1e-3 of it.
+    """
+    x, R = np.sinh(np.linspace(-4.0, 4.0, 401)) * 15.0 / np.sinh(4.0), 10.89
+    rows = np.stack([x**2 / (2.0 * R), x**2 / (2.0 * R) + 1.0])
+    mesh = with_sets(between(np.tile(x, (2, 1)), rows))
+    skin = ev.Electrical(stratum_corneum_thickness=0.38)
+    finger = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(E=100.0, nu=0.3)}, electrical=skin)
+    display, motion = ev.Display(ev.Layer(0.09, 3.35)), ev.Hover(gap=0.25, steps=1)
+    scene = ev.Scene(finger, display, ev.StrongTroxel(), 2000.0, motion)
+    keys = ["electrostatics.voltage", "motion.0.gap"]
+    found = ev.sensitivities(scene, keys, ["electrostatic_force"])
+    exact = 8.89984055095e-4, 8.8998405510e-7, -4.8177390766e-3
+    values = [found.result.electrostatic_force, *(found["electrostatic_force", key] for key in keys)]
+    assert np.ravel(values) == pytest.approx(exact, rel=2e-3)
+    assert values[1] * 1000.0 == pytest.approx(values[0], rel=1e-4)
 
 
 def test_a_voltage_that_follows_a_force_is_not_differentiated_and_said_so():

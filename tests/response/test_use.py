@@ -53,6 +53,14 @@ def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
         ev.plotting.tornado(found, "substeps")
 
 
+def test_uncertainty_of_a_result_is_that_of_its_scene(path):
+    sd, columns = {"surface.friction": 0.03}, ["tangential_force"]
+    found = ev.uncertainty(ev.simulate(path), sd, columns)
+    assert found.sd["tangential_force"] == pytest.approx(
+        ev.uncertainty(path, sd, columns).sd["tangential_force"]
+    )
+
+
 @pytest.mark.parametrize(
     ("sd", "said"),
     [({}, "standard deviation"), ({"surface.friction": 0.0}, "larger than 0"), ({"surface.mu": 1.0}, "mu")],
@@ -108,3 +116,41 @@ def test_the_command_writes_a_table_and_a_picture(path, capsys):
     assert (out / "sensitivities.png").stat().st_size > 5000
     assert "tangential_force" in capsys.readouterr().out
     assert main(["sensitivities", str(path), "--by", "surface.y", "--out", str(out)]) == 2
+
+
+FILE = 'version = 1\nscene = "scene.toml"\nby = ["motion.0.indentation"]\ncolumns = ["applied_force"]\n'
+
+
+def test_a_file_beside_the_scene_names_keys_and_columns(path, capsys):
+    """Paths in it start beside it; what is no such file is refused with one sentence."""
+    (path.parent / "asked.toml").write_text(FILE)
+    out = path.parent / "out"
+    assert main(["sensitivities", str(path.parent / "asked.toml"), "--out", str(out)]) == 0
+    header = (out / "sensitivities.csv").read_text().splitlines()[0]
+    assert header == "step,applied_force by motion.0.indentation,valid_to motion.0.indentation"
+    assert (out / "sensitivities.png").exists()
+    capsys.readouterr()
+    for text, said in (
+        (SCENE, "a scene file and --by KEY"),
+        (FILE.replace("by", "wrt"), "by = [KEY"),
+        (FILE.replace("columns", "column"), "columns"),
+        (FILE + "\nby = 3", "TOML"),
+    ):
+        (path.parent / "asked.toml").write_text(text)
+        assert main(["sensitivities", str(path.parent / "asked.toml"), "--out", str(out)]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_the_command_of_an_impedance_writes_a_table_and_a_picture(path, capsys):
+    out = path.parent / "out"
+    asked = ["impedance", str(path), "--axis", "tangential", "--out", str(out), "--frequencies"]
+    assert main([*asked, "1", "50"]) == 0
+    with open(out / "impedance.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    found = ev.impedance(path, [1.0, 50.0], "tangential")
+    assert [float(row["frequency (Hz)"]) for row in rows] == [1.0, 50.0]
+    real = [float(row["stiffness real (N/mm per mm)"]) for row in rows]
+    assert real == found.stiffness.real.tolist()
+    assert (out / "impedance.png").stat().st_size > 5000
+    assert "Impedance, tangential" in capsys.readouterr().out
+    assert main([*asked, "-1"]) == 2

@@ -184,9 +184,12 @@ def scenes(folder):
     yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press, closing])
     rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
     yield Scene(FingerPad(), rough, motion=[press])
+    ended = Display(electrodes=[[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]])
+    yield Scene(FingerPad(), ended, StrongTroxel(), 10.0, [press], field="full", grounded=False)
+    yield Scene(FingerPad(), Display(), StrongTroxel(), 10.0, [press], field="auto")
 
 
-@pytest.mark.parametrize("number", range(7))
+@pytest.mark.parametrize("number", range(9))
 def test_what_is_written_is_read_back(folder, number):
     scene = list(scenes(folder))[number]
     text = dump(scene)
@@ -281,13 +284,7 @@ WRONG = [
     (SHORT, FLAT, "kind = 'round'", "surface.kind", 'given "round"'),
     (SHORT, FLAT, "kind = 3", "surface.kind", "given 3"),
     (SHORT, FLAT, "kind = 'grating'", "surface.period", "missing; allowed: a length in mm"),
-    (
-        SHORT,
-        FLAT,
-        "kind = 'self_affine'\nhurst = 2\nrms = 0.01",
-        "surface.hurst",
-        "a Hurst exponent from 0 to",
-    ),
+    (SHORT, FLAT, "kind = 'self_affine'\nhurst = 2\nrms = 0.01", "surface.hurst", "a Hurst exponent from 0"),
     (SHORT, FLAT, "kind = 'self_affine'\nhurst = 0.5\nrms = 0.01\nseed = 0.5", "surface.seed", "given 0.5"),
     (SHORT, FLAT, "\nfrictoin = 0.3", "surface.frictoin", "allowed: friction?"),
     (SHORT, FLAT, "\nterms = []", "surface.terms", "an unknown key"),
@@ -341,13 +338,7 @@ WRONG = [
     (DISPLAY, VOLTS, "voltage = 1\nvoltage_file = 'voltage.csv'", "electrostatics.voltage", "exactly"),
     (DISPLAY, VOLTS, "voltage_file = 'scan.csv'", "electrostatics.voltage_file", "position,voltage"),
     (DISPLAY, "insulator_thickness = 0.09", "", "electrostatics.insulator_thickness", "missing; allowed:"),
-    (
-        DISPLAY,
-        VOLTS,
-        "\nroughness_gap = -0.1",
-        "electrostatics.roughness_gap",
-        "given -0.1; allowed: a length",
-    ),
+    (DISPLAY, VOLTS, "\nroughness_gap = -0.1", "electrostatics.roughness_gap", "given -0.1; allowed: a"),
     (DISPLAY, VOLTS, "\nroughness_gap = {law = 'linear'}", f"{ROUGH}.law", "constant | power | exponential"),
     (DISPLAY, VOLTS, "\nroughness_gap = {law = 'power', gap = 0.1}", f"{ROUGH}.pressure", "missing"),
     (DISPLAY, VOLTS, "\nroughness_gap = {law = 'constant', gap = 5.0}", f"{ROUGH}.gap", "given 5"),
@@ -357,6 +348,7 @@ WRONG = [
     (OWN_MESH, MESH, '\nparticipant = "i"', "finger.participant", "no geometry"),
     (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", "tissue = zero"),
     (OWN_MESH, "E = 0.05", "E = -0.05", "finger.materials.tissue.E", "given -0.05"),
+    (OWN_MESH, "ness = 0.38", "ness = 0", "finger.electrical.stratum_corneum_thickness", "larger than 0"),
     (TEXTURE, "speed = 20.0", "", "motion[1].speed", "dynamics = viscous"),
     (TEXTURE, "viscosity = 1.0e-3", "", "finger.viscosity", "dynamics = viscous"),
 ]

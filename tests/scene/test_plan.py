@@ -1,6 +1,4 @@
-"""What a scene needs: terms that are left out must not matter, and the numbers are those of the
-mesh.
-"""
+"""What a scene needs: terms that are left out must not matter, and the numbers are those of the mesh."""
 
 from dataclasses import replace
 
@@ -11,8 +9,8 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
-from evfem.planning.pathdependence import path_dependence
 from evfem.planning.plan import plan
+from evfem.planning.resolution import path_dependence
 from evfem.simulation.model import make_model
 
 pytestmark = pytest.mark.solver

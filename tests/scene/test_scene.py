@@ -1,6 +1,4 @@
-"""Scenes hold what they were given, refuse what does not fit together, and have a stable
-fingerprint.
-"""
+"""Scenes hold what they were given, refuse what does not fit together, and have a stable fingerprint."""
 
 import subprocess
 import sys

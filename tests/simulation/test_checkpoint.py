@@ -1,5 +1,7 @@
 """Checkpoints: what does not fit is refused by its name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,7 +30,8 @@ STATE = State(
     last_increment=numbers(N, 2),
 )
 TOUCHED, STATUS = np.array([True, False, True, True]), np.array([2, 0, 1, 3])
-POINT = TangentPoint(numbers(N, 2), 456.0, TOUCHED, True, numbers(N, 2), 0.25, STATUS)
+MADE = replace(STATE, u=numbers(N, 2), status=STATUS)
+POINT = TangentPoint(MADE, TOUCHED, True, numbers(N, 2), 0.25, STATE.inner, STATE.past)
 CARRIED = Reusable(np.array([0, 2, 3]), POINT, 0.75)
 
 

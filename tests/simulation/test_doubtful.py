@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import finger
+from tools.builders import finger, resumed
 from tools.domes import dome_scene
 from tools.meshes import block
 
 import evfem as ev
-from evfem.simulation.checkpoint import Checkpoint
 
 BLOCK = block(8, 3, sag=0.1)
 
@@ -37,7 +36,7 @@ def test_a_boundary_outside_the_pad_that_passes_the_glass_is_told_with_its_place
     assert ev.simulate(scene(10.0)).warnings == []
     result = ev.simulate(scene(0.5))
     mesh, frame = result.mesh, result.frames[-1]
-    facets = mesh.outer_edges if mesh.dim == 2 else mesh.outer_faces
+    facets = mesh.outer_sides
     nodes = np.setdiff1d(facets, mesh.node_sets["pad"])
     glass = mesh.points[mesh.node_sets["pad"], 1].min()
     depth = glass - (mesh.points + frame.displacement)[nodes, 1]
@@ -50,17 +49,9 @@ def test_a_resumed_run_knows_what_passed_before(tmp_path):
     scene = replace(
         scene_2d(0.5), motion=[ev.Press(indentation=0.2, steps=1), ev.Press(indentation=0.01, steps=1)]
     )
-    kept = []
-
-    class Keeper:
-        def step(self, row, frame, checkpoint):
-            kept.append(checkpoint())
-
-    whole = ev.simulate(scene, observers=[Keeper()])
-    file = Checkpoint(tmp_path / "checkpoint.npz")
-    file.write(scene.digest(), kept[0], whole.rows[:1])
+    whole, again = resumed(scene, 1, tmp_path)
     assert any("passed through the surface" in said for said in whole.warnings)
-    assert ev.simulate(scene, resume=file.read(scene.digest())).warnings == whole.warnings
+    assert again.warnings == whole.warnings
 
 
 def test_a_slide_that_touches_nothing_is_told():

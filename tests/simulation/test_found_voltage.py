@@ -232,10 +232,7 @@ def test_a_stiff_plate_on_a_soft_column_stays_below_its_pull_in(dim, ratio, shar
     k = area / (5.0 / 0.05 + 0.5 / (0.05 * ratio))
     volts = share * np.sqrt(8.0 * k * far**3 / (27.0 * eps_0 * area))
     roots = np.roots([2.0 * k, -4.0 * k * far, 2.0 * k * far**2, -eps_0 * area * volts**2])
-    laws = {
-        "plate": ev.LinearElastic(E=0.05 * ratio, nu=0.0),
-        "column": ev.LinearElastic(E=0.05, nu=0.0),
-    }
+    laws = {"plate": ev.LinearElastic(E=0.05 * ratio, nu=0.0), "column": ev.LinearElastic(E=0.05, nu=0.0)}
     finger = ev.MeshedFinger(column(dim), laws, electrical=SKIN)
     motion = [ev.Hover(GAP), ev.VoltageRamp(volts, steps=steps)]
     found = ev.simulate(ev.Scene(finger, SCREEN, ev.StrongTroxel(), motion=motion))

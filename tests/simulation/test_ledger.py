@@ -38,9 +38,7 @@ FINGER = MeshedFinger(block(20, 2, sag=0.05), {"tissue": LAW}, SKIN, TAU)
 
 @cache
 def run():
-    """The result, the scene's model, and the state before the first and after every step; no step
-    in parts.
-    """
+    """The result, the model, and the state before the first and after every step; no step in parts."""
     lowest = np.min(_outline()[:, 1] - WAVES.height(_outline()[:, 0]))
     surface = WAVES.shifted(lowest - G0)
     solver = Solver(element="q2", dynamics="inertial")
@@ -311,7 +309,7 @@ def shares(state):
     result, model, _ = run()
     left, right = np.full(len(model.mesh.points), np.inf), np.full(len(model.mesh.points), -np.inf)
     x = model.mesh.points[:, 0] + state.u[:, 0]
-    for start, end, middle in result.mesh.edges_of("pad"):
+    for start, end, middle in result.mesh.sides_of("pad"):
         a, L = x[start], x[end] - x[start]
         for node, begin, finish in ((start, 0.0, 1 / 6), (middle, 1 / 6, 5 / 6), (end, 5 / 6, 1.0)):
             left[node] = min(left[node], a + begin * L)

@@ -1,6 +1,4 @@
-"""Simulations through the public API against closed forms of contact mechanics and of finite
-elasticity.
-"""
+"""Simulations through the public API against closed forms of contact mechanics and of finite elasticity."""
 
 import numpy as np
 import pytest
@@ -8,13 +6,7 @@ from tools.builders import pad_state
 from tools.meshes import both_sides, contact_block, graded, parabola
 
 import evfem as ev
-from evfem.reference import (
-    BondedLayer,
-    CattaneoMindlin,
-    HertzLine,
-    plane_modulus,
-    sliding_force_ratio,
-)
+from evfem.reference import BondedLayer, CattaneoMindlin, HertzLine, plane_modulus, sliding_force_ratio
 
 
 def press(mesh, law, surface, *motion, element=None):
@@ -90,11 +82,9 @@ def test_bonded_layer_under_a_cylinder():
 
 
 def test_cattaneo_mindlin_stick_zone():
-    """A nearly incompressible body of four hundred half widths: then pressing leaves next to no
-    shear behind.
+    """A nearly incompressible body of four hundred half widths: then pressing leaves next to no shear behind.
 
-    (The far sides widen the loaded surface by a strain of order p0/E* a/L, which sticking turns
-    into shear.)
+    (The far sides widen the loaded surface by a strain of order p0/E* a/L, which sticking turns into shear.)
     """
     half_width, radius, mu, nu = 0.1, 20.0, 0.3, 0.499
     x = both_sides(graded(1.125 * half_width, half_width / 32, 40.0, 1.5))

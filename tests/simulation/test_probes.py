@@ -230,14 +230,8 @@ BAD = {
     "outside": ({"tip": [[0.1, 0.3], [0.0, 1.2]]}, "output.probes.tip: given (0, 1.2), outside the tissue"),
     "in space": ({"tip": [[0.0, 0.0, 0.0]]}, "output.probes.tip: given points with 3 coordinates"),
     "beside": ({"tip": ev.Probe(x=[1.2], depth=0.1)}, "output.probes.tip: given x = 1.2, with no tissue"),
-    "through": (
-        {"tip": ev.Probe(x=[0.0], depth=1.1)},
-        "output.probes.tip: given (0, 1.1), outside the tissue",
-    ),
-    "layer": (
-        {"tip": ev.Probe(x=[0.0], at="dermis")},
-        'output.probes.tip.at: given "dermis"; allowed: tissue',
-    ),
+    "through": ({"tip": ev.Probe(x=[0.0], depth=1.1)}, "output.probes.tip: given (0, 1.1), outside the"),
+    "layer": ({"tip": ev.Probe(x=[0.0], at="dermis")}, 'output.probes.tip.at: given "dermis"; allowed'),
     "z": ({"tip": ev.Probe(x=[0.0], z=[0.0], depth=0.1)}, "output.probes.tip.z: given z of a plane finger"),
 }
 

@@ -40,13 +40,11 @@ def test_staggered_iterations_end_where_the_monolithic_ones_do(direction):
 
 
 def direct_force(mesh, displacement, gap_to, voltage):
-    """Quadrature of (8b) over the deformed outline: vertical traction per projected length, edge
-    by edge.
-    """
+    """Quadrature of (8b) over the deformed outline: vertical traction per projected length, edge by edge."""
     s, weight = np.polynomial.legendre.leggauss(12)
     shape = np.array([0.5 * s * (s - 1.0), 0.5 * s * (s + 1.0), 1.0 - s**2])
     slope = np.array([s - 0.5, s + 0.5, -2.0 * s])
-    edges = mesh.edges_of("pad")
+    edges = mesh.sides_of("pad")
     place = (mesh.points + displacement)[edges]
     x_s, y = np.einsum("nq,kn->kq", slope, place[..., 0]), np.einsum("nq,kn->kq", shape, place[..., 1])
     gap, reduced, whole = y - gap_to, 0.38 / 1650.0 + 0.09 / 3.35, 0.47
@@ -96,7 +94,7 @@ def test_without_air_layer_only_the_contact_attracts():
 def tributary(mesh, displacement):
     x = (mesh.points + displacement)[:, 0]
     length = np.zeros(len(x))
-    for start, end, middle in mesh.edges_of("pad"):
+    for start, end, middle in mesh.sides_of("pad"):
         length[[start, end, middle]] += max(x[end] - x[start], 0.0) * np.array([1.0, 1.0, 4.0]) / 6.0
     return length
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tools.builders import left_over
 from tools.domes import DISPLAY, Dome, dome, dome_scene
 
 import evfem as ev
@@ -16,14 +17,6 @@ SHEARS = ("tangential_force_x", "tangential_force_z")
 FORCES = ("applied_force", "normal_force", *SHEARS, "electrostatic_force")
 
 
-def balance(result):
-    """How far the energies are from balance, relative to the stored one."""
-    given = result.external_work + result.electrostatic_work
-    kept = result.stored_energy + result.kinetic_energy + result.friction_dissipation
-    lost = result.viscous_dissipation + result.integrator_dissipation + result.snap_dissipation
-    return np.abs(given - kept - lost).max() / np.abs(result.stored_energy).max()
-
-
 @pytest.fixture(scope="module")
 def slid():
     return simulate(dome_scene(PRESS, ev.Slide(0.5, steps=4, angle=30.0)))
@@ -31,7 +24,7 @@ def slid():
 
 def test_forces_and_energies_balance_and_friction_is_against_the_slide(slid):
     assert_allclose(slid.normal_force - slid.electrostatic_force, slid.applied_force, rtol=1e-7)
-    assert balance(slid) < 1e-7
+    assert left_over(slid) < 1e-7
     assert slid.frames[-1].contact_status.max() == SLIP
     shear = np.array([slid[name][-1] for name in SHEARS])
     assert_allclose(np.hypot(*shear), 0.3 * slid.normal_force[-1], rtol=2e-3)
@@ -96,7 +89,7 @@ def test_hover_ramp_and_snap_in_come_to_the_display():
     assert result.real_contact_area[-1] > 0.5
     assert result.normal_force[-1] > 0.0
     assert_allclose(result.normal_force - result.electrostatic_force, result.applied_force, atol=1e-8)
-    assert balance(result) < 1e-5
+    assert left_over(result) < 1e-5
 
 
 def test_time_adds_viscous_stress_and_inertia():
@@ -107,7 +100,7 @@ def test_time_adds_viscous_stress_and_inertia():
     assert timed.viscous_dissipation[-1] > 0.0
     assert timed.kinetic_energy[-1] > 0.0
     assert timed.applied_force[1] > 1.02 * calm.applied_force[1]
-    assert balance(timed) < 1e-7
+    assert left_over(timed) < 1e-7
 
 
 def test_a_followed_friction_force_is_met_along_x():

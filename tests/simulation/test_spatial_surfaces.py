@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tools.builders import left_over
 from tools.domes import LINEAR, Dome, cylinder, dome_scene
 from tools.meshes import block as plane_block
 
@@ -42,14 +43,6 @@ def slid(surface, angle, **other):
     return simulate(
         dome_scene(PRESS, ev.Slide(0.6, steps=3, angle=angle, speed=10.0), surface=surface, **other)
     )
-
-
-def balance(result):
-    """How far the energies are from balance, relative to the stored one."""
-    given = result.external_work + result.electrostatic_work + result.adhesive_work
-    kept = result.stored_energy + result.kinetic_energy + result.friction_dissipation
-    lost = result.viscous_dissipation + result.integrator_dissipation + result.snap_dissipation
-    return np.abs(given - kept - lost).max() / result.stored_energy.max()
 
 
 def exponential(speed, **settings):
@@ -116,7 +109,7 @@ def test_a_turned_and_a_mirrored_scene_have_turned_and_mirrored_numbers(name):
         assert_allclose(first[kind][2:], along[2:], atol=1e-12)
     assert np.abs(second["tangential_force_x"] - first["tangential_force_x"]).max() > 1e-3
     for result in (first, second, third):
-        assert balance(result) < 1e-6
+        assert left_over(result) < 1e-6
 
 
 def test_an_angled_surface_is_that_of_a_slide_at_its_angle():
@@ -154,7 +147,7 @@ def test_the_work_on_waves_falls_to_nothing_without_friction():
         result = simulate(
             dome_scene(*motion, surface=replace(eggs(0.0, 90.0), friction=0.0), law=None, voltage=0.0)
         )
-        assert balance(result) < 1e-6
+        assert left_over(result) < 1e-6
         given = result.external_work[-1] - result.external_work[1]
         assert_allclose(given, 0.0, atol=0.02 * result.stored_energy[1])
         lost.append(abs(given))
@@ -174,10 +167,7 @@ LIMITS = {
     ),
     "jump": (ev.Display(FILM, friction=[[-9.0, 0.2], [0.1, 0.2], [0.1, 0.6]]), {}),
     "rate": (ev.Display(FILM), exponential(5.0, exponent=0.5)),
-    "rough": (
-        ev.Display(THIN),
-        {"law": ev.StrongTroxel(), "voltage": 150.0, "roughness_gap": ROUGH},
-    ),
+    "rough": (ev.Display(THIN), {"law": ev.StrongTroxel(), "voltage": 150.0, "roughness_gap": ROUGH}),
 }
 
 

@@ -31,18 +31,18 @@ def growing(count, first, total):
     return first * np.cumsum(factor ** np.arange(count))
 
 
-def paraboloid(fine, coarse, rows):
+def paraboloid(fine, coarse, rows, sphere=RADIUS):
     """Linear cells: `fine` ones on 0.6 mm from the middle, `coarse` ones beyond, `rows` upwards."""
     cell = FINE / fine
     half = np.append(np.linspace(0.0, FINE, fine + 1), FINE + growing(coarse, 1.3 * cell, 0.5 * SIZE - FINE))
     along, up = np.append(-half[:0:-1], half), np.append(0.0, growing(rows, cell, SIZE))
     count = along.size - 1
-    mesh = dome((count, rows, count), (SIZE, SIZE, SIZE), RADIUS)
+    mesh = dome((count, rows, count), (SIZE, SIZE, SIZE), sphere)
     points = mesh.points
     i, k = (np.rint((points[:, a] / SIZE + 0.5) * count).astype(int) for a in (0, 2))
-    low = 0.5 * (points[:, 0] ** 2 + points[:, 2] ** 2) / RADIUS
+    low = 0.5 * (points[:, 0] ** 2 + points[:, 2] ** 2) / sphere
     j = np.rint((points[:, 1] - low) / (SIZE - low) * rows).astype(int)
-    low = 0.5 * (along[i] ** 2 + along[k] ** 2) / RADIUS
+    low = 0.5 * (along[i] ** 2 + along[k] ** 2) / sphere
     points[:] = np.column_stack([along[i], low + (SIZE - low) * up[j] / SIZE, along[k]])
     return mesh
 
@@ -58,11 +58,11 @@ class Sphere(Dome):
         return mesh
 
 
-def press(fine, coarse, rows):
-    """Pressed, and pulled sideways by less than friction holds."""
-    motion = [ev.Press(indentation=2.5e-4, steps=1), ev.Slide(0.7e-4, steps=1)]
+def press(fine, coarse, rows, elastic=None):
+    """Pressed, and pulled sideways by less than friction holds; alone pressed on an elastic half space."""
+    motion = [ev.Press(indentation=2.5e-4, steps=1), ev.Slide(0.7e-4, steps=1)][: 2 if elastic is None else 1]
     finger = Sphere(paraboloid(fine, coarse, rows), ev.NeoHookean(E=E, nu=NU))
-    given = {"surface": ev.Flat(friction=0.3), "law": None, "voltage": 0.0}
+    given = {"surface": ev.Flat(friction=0.3, elastic=elastic), "law": None, "voltage": 0.0}
     return simulate(dome_scene(*motion, finger=finger, solver=ev.Solver(element="hex27p1"), **given))
 
 
@@ -94,8 +94,8 @@ def spread_of(result, step, traction):
     return float((area * value) @ distance**2 / (area @ value))
 
 
-def radius_under(load):
-    return (0.75 * load * RADIUS / STIFF) ** (1.0 / 3.0)
+def radius_under(load, stiff=STIFF):
+    return (0.75 * load * RADIUS / stiff) ** (1.0 / 3.0)
 
 
 @pytest.mark.slow
@@ -114,6 +114,24 @@ def test_radius_pressure_and_depth_are_hertz_s(pressed):
     square, fall = np.linalg.lstsq(columns[inside], (pressure**2 * weight)[inside], rcond=None)[0]
     assert_allclose(np.sqrt(square), 1.5 * load / (np.pi * radius**2), rtol=0.005)
     assert_allclose(np.sqrt(square / fall), radius, rtol=0.005)
+
+
+@pytest.mark.slow
+def test_two_elastic_bodies_are_one_of_the_combined_modulus():
+    """On a half space (2000 contact radii thick) of E = 2.5, nu = 0.3, with 5 nodes on the radius: 1 / E* is
+    the sum of (1 - nu^2) / E; the depth within 0.5 %, where the pressure acts 1 %, its peak 2.5 %.
+    """
+    half_space = ev.ElasticLayer(2.5, 0.3, 1e3)
+    result = press(3, 4, 6, half_space)
+    load, stiff = result.applied_force[0], 1.0 / (1.0 / STIFF + (1.0 - 0.3**2) / 2.5)
+    radius = radius_under(load, stiff)
+    assert_allclose(result.indentation[0], radius**2 / RADIUS, rtol=0.005)
+    assert_allclose(np.sqrt(2.5 * spread_of(result, 0, "contact_pressure")), radius, rtol=0.01)
+    peak = result.frames[0].contact_pressure.max()
+    assert_allclose(peak, 1.5 * load / (np.pi * radius**2), rtol=0.025)
+    # each body gives way by its share
+    sunk = result.surface_sink[0]
+    assert_allclose(sunk * 2.5 / (1.0 - 0.3**2), (result.indentation[0] - sunk) * STIFF, rtol=0.01)
 
 
 def misses(result):

@@ -1,6 +1,4 @@
-"""Closed books: works, energies and dissipations of every row add up, each from its own
-definition.
-"""
+"""Closed books: works, energies and dissipations of every row add up, each from its own definition."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -102,9 +100,7 @@ def test_what_the_way_loses_falls_with_the_square_of_the_step(name):
 
 @pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_body_that_swings_loses_its_energy_to_the_integrator():
-    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half
-    the step.
-    """
+    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half the step."""
     lost = []
     for times in (1, 2):
         motion = (
@@ -281,7 +277,9 @@ def test_the_field_stretches_with_the_forces_on_the_way():
         SimpleNamespace(place=long * np.ones((3, 2)), contact_force=load * np.ones((3, 2)))
         for long, load in ((1.0, 0.2), (1.5, 0.6))
     )
-    assert SubstepWork(model, old, new)._stretching() == pytest.approx(3 * 0.5, rel=1e-12)
+    assert SubstepWork(model, old, new)._stretching(model.attraction.charging) == pytest.approx(
+        3 * 0.5, rel=1e-12
+    )
     np.testing.assert_allclose(seen, 0.2 + 0.4 * np.outer(works.WAY, nodes), rtol=1e-12)
 
 

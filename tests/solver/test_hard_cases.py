@@ -1,6 +1,5 @@
-"""Scenes that stopped earlier versions: steep friction, snapping pads, thin insulators, big steps.
-Each ends in a converged state whose physics is known; most are cases of the study of stability,
-beside its quick ones.
+"""Scenes that stopped earlier versions: steep friction, snapping pads, thin insulators, big steps. Each ends
+in a converged state whose physics is known; most are cases of the study of stability, beside its quick ones.
 """
 
 from dataclasses import replace
@@ -52,9 +51,8 @@ def test_a_hard_case_of_the_study_ends_as_it_should(key):
 
 @pytest.mark.filterwarnings("ignore:at .* V touching skin")
 def test_a_thin_insulator_by_strong_troxels_law():
-    """200 nm at 140 V: up to 1 MPa that falls within a fraction of a micrometre, so nodes snap one
-    by one. Touching nodes are on the surface to the last digit; the rounding of their gaps would
-    be a force.
+    """200 nm at 140 V: up to 1 MPa that falls within a fraction of a micrometre, so nodes snap one by one.
+    Touching nodes are on the surface to the last digit; the rounding of their gaps would be a force.
     """
     surface = Display(Layer(2e-4, 3.35), friction=0.3)
     voltage = {"law": StrongTroxel(), "voltage": 140.0}
@@ -98,10 +96,9 @@ def test_penalised_friction_obeys_the_return_map():
 @pytest.mark.parametrize(("law", "voltage"), [(Kaczmarek(), 1500.0), (StrongTroxel(), 500.0)])
 @pytest.mark.parametrize("ridges", [False, True])
 def test_a_hovering_pad_falls_onto_the_display_under_a_small_force(law, voltage, ridges):
-    """No equilibrium with that force is near: the attraction grows faster on the way down than the
-    finger stiffens. The bone flies to the surface and a little beyond, not as far as it may, and
-    where the linear problem has no travel that settles the force, the one that lacks least is
-    taken.
+    """No equilibrium with that force is near: the attraction grows faster on the way down than the finger
+    stiffens. The bone flies to the surface and a little beyond, not as far as it may, and where the linear
+    problem has no travel that settles the force, the one that lacks least is taken.
     """
     surface = Display(Layer(0.05, 3.35), friction=0.3)
     motion = [Hover(gap=0.1, steps=1), Press(force=0.002, steps=2)]

@@ -57,9 +57,7 @@ def ways(strategy, longest, takes=5):
 
 
 def test_parts_are_halved_until_they_hold_and_grow_by_the_factor():
-    """1 and 1/2 fail, 1/4 holds; then each part is 1.25 times the last one, the end is met
-    exactly.
-    """
+    """1 and 1/2 fail, 1/4 holds; then each part is 1.25 times the last one, the end is met exactly."""
     assert ways(Strategy(), 0.3) == pytest.approx([0.25, 0.15625, 0.1953125, 0.244140625, 0.154296875])
     assert ways(Strategy(growth=1.0), 0.3) == [0.25] * 4
     # no part is easy

@@ -30,7 +30,7 @@ QUICK = [
 ]
 SLOW = ["fig11", "fig12", "fig13", "participants", "uncertainty", "stability", "work_precision", "fringe"]
 SLOW += ["fingertip", "fingerprint", "friction_spectrum", "stick_slip", "relaxation", "impedance"]
-SLOW += ["soft_display", "moisture"]
+SLOW += ["sensitivities", "soft_display", "moisture"]
 
 
 @pytest.mark.filterwarnings("ignore:motion . has steps of")

@@ -1,4 +1,4 @@
-"""The studies of tissue in time: what must hold whatever the shares."""
+"""The studies of tissue in time and of derivatives: what must hold whatever the shares."""
 
 import pytest
 
@@ -29,3 +29,15 @@ def test_a_slow_impedance_is_the_slope_of_a_press(numbers_of):
     slope = found["slope_of_a_press.mN_per_mm2"]
     assert found["slow.mN_per_mm2"] == pytest.approx(slope, rel=1e-4)
     assert found["vanishes_Hz.tangential.0.6_mm.onset"] < found["vanishes_Hz.normal.0.6_mm.onset"]
+
+
+def test_friction_decides_in_full_slip_alone_and_the_voltage_counts_twice(numbers_of):
+    found = numbers_of("sensitivities")
+    tangential = "tangential_force.surface.friction"
+    assert found[f"full slip.{tangential}"] == pytest.approx(1.0, abs=0.1)
+    assert abs(found[f"partial slip.{tangential}"]) < 0.1
+    assert found["rest.electrostatic_force.electrostatics.voltage"] == pytest.approx(2.0, abs=0.05)
+    names = [name for name in found if name.endswith("by_run")]
+    assert len(names) == 4
+    for name in names:
+        assert found[name] == pytest.approx(found[name.removesuffix("run") + "derivative"], rel=0.2)

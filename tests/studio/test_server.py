@@ -177,11 +177,13 @@ def test_a_run_whose_process_goes_slowly_has_a_result(monkeypatch):
 
 
 def test_no_more_than_two_runs_at_once(monkeypatch):
-    monkeypatch.setattr(runs, "_PLACES", threading.BoundedSemaphore(1))
-    with runs._place(), pytest.raises(InputError, match="at a time: wait"), runs._place():
-        pass
-    with runs._place():
-        pass
+    places = threading.BoundedSemaphore(1)
+    monkeypatch.setattr(runs, "_PLACES", places)
+    monkeypatch.setattr(runs, "_work", os.abort)
+    with places, pytest.raises(InputError, match="at a time: wait"):
+        runs.run("{}", False, print)
+    runs.run("{}", False, lambda line: None)
+    assert places.acquire(blocking=False)
 
 
 @pytest.mark.slow

@@ -134,10 +134,7 @@ MISTAKES = [
     ),
     ("[grid]\nsurface.friction = [0.1]\n[gird]", "gird: given an unknown key; allowed: grid?"),
     ("outputs = ['force.last']\n[grid]\nsurface.y = [0.1]", "outputs: force.last: given an unknown key"),
-    (
-        "outputs = ['voltage']\n[grid]\nsurface.y = [0.1]",
-        'outputs: given "voltage"; allowed: COLUMN.STATISTIC',
-    ),
+    ("outputs = ['voltage']\n[grid]\nsurface.y = [0.1]", 'outputs: given "voltage"; allowed'),
     (
         "outputs = ['voltage.max.2']\n[grid]\nsurface.y = [0.1]",
         'given "voltage.max.2"; allowed: motions from 0 to 1',
@@ -152,7 +149,7 @@ MISTAKES = [
     (f"{SAMPLED}surface.y = {{ normal = [2.0] }}", "samples.parameters.surface.y.normal: given [2.0]"),
     (
         f"{SAMPLED}surface.y = {{ between = [0.0, 1.0] }}",
-        "samples.parameters.surface.y: given neither uniform nor normal",
+        "samples.parameters.surface.y.uniform: given neither uniform nor normal",
     ),
     (
         SAMPLED.replace("seed = 1\n", "") + "surface.y = { normal = [0.0, 1.0] }",

@@ -1,6 +1,4 @@
-"""Sweeps run: the numbers of single runs, failures in the table, kills, resuming, processes and
-Dask.
-"""
+"""Sweeps run: the numbers of single runs, failures in the table, kills, resuming, processes and Dask."""
 
 import csv
 import json

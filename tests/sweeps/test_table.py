@@ -71,7 +71,7 @@ def test_a_csv_alone_has_its_numbers_and_counts_its_points(tmp_path):
 
 WRONG = {
     "point,case\n1,2\n": "starts with 'point,case'",
-    "point,status,seconds,message\n1,done\n": "starts with 'point,status,seconds,message'",
+    "point,status,seconds,message\n1,done\n": "with 'point,status,seconds,message', then '1,done'",
 }
 
 

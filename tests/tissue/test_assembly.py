@@ -1,38 +1,15 @@
-"""The engine of all weak forms: fluxes, derivatives and theta against formulae and against the
-fast ways.
-"""
+"""The engine of all weak forms: what a user's form may use, and which forms are refused."""
 
 import numpy as np
 import pytest
-from tools.grids import CELLS, bend, rectangle, tangent_of, wavy
+from tools.grids import CELLS, bend, rectangle
 
 import evfem as ev
 from evfem.errors import InputError
-from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.userforms import make_term, tried
 
 MU, LMBDA = 0.7, 1.9
 every_element = pytest.mark.parametrize("element", list(CELLS))
-
-
-# -- fast ways and forms ---------------------------------------------------------------------------------
-
-
-@every_element
-def test_compiled_loops_are_the_form_of_the_viscosity(element):
-    """And its dissipation, in cells of different viscosity, one of which has none."""
-    space = rectangle(element, (5, 4), warp=bend)
-    start, u = wavy(space.mesh.points), wavy(space.mesh.points, 0.11)
-    eta = np.linspace(0.0, 0.3, len(space.nodes))
-    fast, plain = Dynamics(space, eta, None), Dynamics(space, eta, None)
-    plain.loops = None
-    for term in (fast, plain):
-        term.begin(start, 0 * u, 2e-3)
-    tangents = [tangent_of(space, u, term).toarray() for term in (fast, plain)]
-    forces = plain.forces(u)
-    np.testing.assert_allclose(fast.forces(u), forces, atol=1e-13 * np.abs(forces).max())
-    np.testing.assert_allclose(*tangents, atol=1e-13 * np.abs(tangents).max())
-    assert fast.dissipation(u) == pytest.approx(plain.dissipation(u), rel=1e-12)
 
 
 # -- theta in a user's form ------------------------------------------------------------------------------

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tools.builders import resumed
 from tools.grids import rectangle, tangent_of
 from tools.meshes import block, held
 from tools.solids import block as solid
 from tools.solids import box
 
 import evfem as ev
-from evfem.simulation.checkpoint import Checkpoint
 from evfem.tissue.branches import Branches, branches_of, make_branches
 
 SKIN = ((0.8, 0.004), (0.5, 0.07), (0.4, 1.4))
@@ -179,17 +179,7 @@ def test_a_motion_without_time_ends_at_rest():
 
 def test_a_run_that_goes_on_is_the_same(tmp_path):
     """From a checkpoint within the slide, to the last digit; also the loss."""
-    scene = flat(tissue(relaxation=SKIN), stroke(2))
-    kept = []
-
-    class Keeper:
-        def step(self, row, frame, checkpoint):
-            kept.append(checkpoint())
-
-    whole = ev.simulate(scene, observers=[Keeper()])
-    file = Checkpoint(tmp_path / "checkpoint.npz")
-    file.write(scene.digest(), kept[4], whole.rows[:5])
-    again = ev.simulate(scene, resume=file.read(scene.digest()))
+    whole, again = resumed(flat(tissue(relaxation=SKIN), stroke(2)), 5, tmp_path)
     for name in ("applied_force", "applied_tangential_force", "stored_energy", "viscous_dissipation"):
         np.testing.assert_array_equal(column(again, name), column(whole, name))
 

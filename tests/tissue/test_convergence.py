@@ -1,6 +1,4 @@
-"""Every element converges at its order, and those made for it do not lock as Poisson's ratio nears
-1/2.
-"""
+"""Every element converges at its order, and those made for it do not lock as Poisson's ratio nears 1/2."""
 
 import numpy as np
 import pytest
@@ -38,8 +36,7 @@ def isochoric(x, y):
 
 
 def manufactured_error(element, field, nu, n, users=False):
-    """L2 error on n x n cells for the load int P(F) : grad v of `field` and its values on the
-    outline.
+    """L2 error on n x n cells for the load int P(F) : grad v of `field` and its values on the outline.
 
     With the built-in law, or with the `users`, which elements split in another way.
     """
@@ -65,11 +62,10 @@ def errors_of(element, field, nu, users=False):
 
 @every_element
 def test_order_of_convergence(element):
-    """2 for linear, 3 for quadratic shape functions, on cells that are no parallelograms, with
-    finite strain.
+    """2 for linear, 3 for quadratic shape functions, on cells that are no parallelograms, with finite strain.
 
-    A quadrature too weak for the element, a wrong mid-node or a projection that is not exact for
-    planes lowers the order; a wrong law or volume term leaves an error that no refinement removes.
+    A quadrature too weak for the element, a wrong mid-node or a projection that is not exact for planes
+    lowers the order; a wrong law or volume term leaves an error that no refinement removes.
     """
     errors = errors_of(element, swell, 0.3)
     assert RATES[element] <= order(errors[:2]) <= RATES[element] + 0.4
@@ -78,9 +74,7 @@ def test_order_of_convergence(element):
 
 @pytest.mark.parametrize("element", ["q1_fbar", "q2p1"])
 def test_no_locking_of_the_projected_elements(element):
-    """At nu = 0.4999 the same order, and errors within 5 % of those at nu = 0.3 (measured: 0 to 4
-    % less).
-    """
+    """At nu = 0.4999 the same order, and errors within 5 % of those at nu = 0.3 (measured: 0 to 4 % less)."""
     soft, stiff = (errors_of(element, isochoric, nu) for nu in (0.3, 0.4999))
     assert order(stiff) >= RATES[element]
     np.testing.assert_allclose(stiff, soft, rtol=0.05)

@@ -4,11 +4,11 @@ runs that go on.
 
 import numpy as np
 import pytest
+from tools.builders import resumed
 from tools.grids import rectangle
 from tools.meshes import block
 
 import evfem as ev
-from evfem.simulation.checkpoint import Checkpoint
 from evfem.tissue.dynamics import make_dynamics
 
 SMALL = 1e-5
@@ -57,16 +57,7 @@ def test_mirrored_scenes_are_equal_with_branches_and_probes():
 
 @pytest.mark.filterwarnings("ignore:probes have")
 def test_a_run_that_goes_on_has_the_same_branches_and_probes(tmp_path):
-    scene, kept = there_and_back(0.2), []
-
-    class Keeper:
-        def step(self, row, frame, checkpoint):
-            kept.append(checkpoint())
-
-    whole = ev.simulate(scene, observers=[Keeper()])
-    file = Checkpoint(tmp_path / "checkpoint.npz")
-    file.write(scene.digest(), kept[3], whole.rows[:4])
-    again = ev.simulate(scene, resume=file.read(scene.digest()))
+    whole, again = resumed(there_and_back(0.2), 4, tmp_path)
     for name in ("applied_force", "stored_energy", "viscous_dissipation"):
         np.testing.assert_allclose(again[name], whole[name], rtol=1e-13)
     for name in ("displacement", "cauchy_stress", "strain_energy_density"):

@@ -43,9 +43,7 @@ def test_a_block_that_moves_as_a_whole_feels_its_mass(rate):
 
 
 def test_a_shear_is_held_by_its_viscous_stress():
-    """From rest: E_xy = g/2, E_yy = g^2/2, and S_v : E with S_v = 2 mu s E; the mass adds
-    s^2 mu/H^2 (g y)^2.
-    """
+    """E_xy = g/2, E_yy = g^2/2, and S_v : E with S_v = 2 mu s E; the mass adds s^2 mu/H^2 (g y)^2."""
     moving, g, rate = body(), 0.2, 0.7
     moving.release(np.zeros((moving.space.size, 2)), rate)
     viscous = 2.0 * MU * rate * (2.0 * (0.5 * g) ** 2 + (0.5 * g**2) ** 2) * WIDTH * HEIGHT

@@ -1,6 +1,4 @@
-"""Viscous and inertial forces: objectivity, tangents, what they dissipate and carry, and motions
-in time.
-"""
+"""Viscous and inertial forces: objectivity, tangents, what they dissipate and carry, and motions in time."""
 
 from types import SimpleNamespace
 
@@ -93,9 +91,7 @@ def test_simple_shear_by_hand():
 
 @every_element
 def test_dissipation_is_the_work_of_the_viscous_forces(element):
-    """Never negative, whichever way the step goes; equal to f_v . du up to a share that is linear
-    in du.
-    """
+    """Never negative, whichever way the step goes; equal to f_v . du up to a share that is linear in du."""
     space = rectangle(element, (2, 2), warp=bend)
     X = space.mesh.points
     term = dynamics_on(space, inertial=True)
@@ -119,9 +115,7 @@ def test_dissipation_is_the_work_of_the_viscous_forces(element):
 
 
 def test_free_fall():
-    """Backward Euler by hand: after n steps v = n g dt and u = n (n + 1)/2 g dt^2, everywhere,
-    unstrained.
-    """
+    """Backward Euler by hand: after n steps v = n g dt and u = n (n + 1)/2 g dt^2, everywhere, unstrained."""
     space = rectangle("q1_fbar", (2, 2), jitter=0.2)
     law, gravity, dt = NeoHookean(E=0.05, nu=0.48), -9810.0, 1e-3
     term = make_dynamics(space, {"lower": law}, SimpleNamespace(viscosity=1e-3), "inertial")
@@ -143,9 +137,7 @@ def test_free_fall():
 
 
 def test_only_what_is_asked_for():
-    """No time, no forces; no relaxation time, no viscosity; neither viscosity nor inertia, no term
-    at all.
-    """
+    """No time, no forces; no relaxation time, no viscosity; neither viscosity nor inertia, no term at all."""
     space = rectangle("q1", (2, 2), split=lambda x, y: y > 0.5)
     laws = {
         "lower": NeoHookean(E=0.26, nu=0.3, viscosity=0.0, density=2e-9),

@@ -46,7 +46,7 @@ def test_nail_bed_by_hand(element):
     term = make_term(space, nail_bed, "top", boundary=True)
     u = np.tile([0.3, -0.1], (space.size, 1))
     expected = np.zeros_like(u)
-    for edge in space.mesh.edges_of("top"):
+    for edge in space.mesh.sides_of("top"):
         expected[edge] += 0.5 * 0.02 * np.outer(SHARES[element], [0.3, -0.1])
     np.testing.assert_allclose(term.forces(u), expected, atol=1e-16)
     # a linear field: work 0.02 int u^2 over the edge, u = (x, 1), from 0 to 2
@@ -56,9 +56,7 @@ def test_nail_bed_by_hand(element):
 
 @every_kind
 def test_region_form_acts_on_its_region_only(element):
-    """Weight of the upper half of 2 x 1 mm: f = rho g times its area, spread over its cells'
-    nodes.
-    """
+    """Weight of the upper half of 2 x 1 mm: f = rho g times its area, spread over its cells' nodes."""
     space = rectangle(element, (2, 4), size=(2.0, 1.0), split=lambda x, y: y > 0.5)
     weight = ev.form(lambda u, v, w: 9.81e-3 * v[1])
     forces = make_term(space, weight, "upper", boundary=False).forces(np.zeros((space.size, 2)))
@@ -99,9 +97,7 @@ def test_unknown_places_are_refused():
 
 
 def block_scene(law=NEO_HOOKEAN, element="q2", friction=0.0, **motion):
-    """A block of 2 x 1 mm of one law, pressed onto a plane (by 0.1 mm, unless `motion` says
-    otherwise).
-    """
+    """A block of 2 x 1 mm of one law, pressed onto a plane (by 0.1 mm, unless `motion` says otherwise)."""
     base = rectangle("q1", (6, 3), size=(2.0, 1.0)).mesh
     sets = {"pad": base.node_sets["bottom"], "bone": base.node_sets["top"], "side": base.node_sets["left"]}
     mesh = Mesh(base.points, base.cells, "quad", base.region, {"tissue": 0}, sets)
@@ -130,9 +126,7 @@ def material(u, v, w):
 
 @pytest.mark.parametrize("element", ["q1", "q1_fbar", "q2p1"])
 def test_form_as_a_material_is_the_tissue(element):
-    """Forces, energies and stresses in the plane of a press and slide; the stress out of it is
-    unknown.
-    """
+    """Forces, energies and stresses in the plane of a press and slide; the stress out of it is unknown."""
     ours, theirs = (ev.simulate(block_scene(law, element, friction=0.2)) for law in (NEO_HOOKEAN, material))
     np.testing.assert_allclose(theirs.applied_force, ours.applied_force, rtol=1e-10)
     np.testing.assert_allclose(theirs.stored_energy, ours.stored_energy, rtol=1e-10)
@@ -143,9 +137,7 @@ def test_form_as_a_material_is_the_tissue(element):
 
 
 def test_form_as_a_material_knows_the_place_and_nothing_but_gradients():
-    """Stiffness that grows along x carries the mean; a material cannot depend on the displacement
-    itself.
-    """
+    """Stiffness that grows along x carries the mean; a material cannot depend on the displacement itself."""
 
     def graded(u, v, w):
         return (0.5 + 0.5 * w.x[0]) * material(u, v, w)

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.linalg import eigh, expm
+from tools.builders import resumed
 from tools.grids import rectangle, solve, tangent_of
 from tools.meshes import block
 
 import evfem as ev
 from evfem.newton.control import Force, GivenVoltage, Target
-from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.model import make_model
 from evfem.tissue.dynamics import Difference, Dynamics, Past, make_dynamics
 from evfem.tissue.laws import NeoHookean
@@ -264,16 +264,7 @@ def test_a_mirrored_run_is_the_mirror_image(hand):
 @pytest.mark.parametrize("step", [2, 4, 7, 13])
 def test_a_resumed_run_gives_the_same_numbers(step, tmp_path):
     """In the middle of a motion, where the part before counts, and between two, to the last digit."""
-    scene, kept = slid(1.0, ev.Hand(0.2, 1e-4, 1e-7)), []
-
-    class Keeper:
-        def step(self, row, frame, checkpoint):
-            kept.append(checkpoint())
-
-    whole = ev.simulate(scene, observers=[Keeper()])
-    file = Checkpoint(tmp_path / "checkpoint.npz")
-    file.write(scene.digest(), kept[step - 1], whole.rows[:step])
-    again = ev.simulate(scene, resume=file.read(scene.digest()))
+    whole, again = resumed(slid(1.0, ev.Hand(0.2, 1e-4, 1e-7)), step, tmp_path)
     for name in ("applied_force", "applied_tangential_force", "kinetic_energy", "integrator_dissipation"):
         np.testing.assert_array_equal(again[name], whole[name], err_msg=name)
 

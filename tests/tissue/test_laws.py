@@ -1,6 +1,4 @@
-"""Laws against their definitions, each other and linear elasticity; derivatives against
-differences.
-"""
+"""Laws against their definitions, each other and linear elasticity; derivatives against differences."""
 
 import numpy as np
 import pytest
@@ -8,8 +6,9 @@ from tools.laws import EnergyOnly, StressOnly
 
 from evfem.errors import InputError
 from evfem.tensor import complex_step, det, inv, trace, transpose
+from evfem.tissue.forms import embed
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, SplitLaw, Yeoh, split
-from evfem.tissue.splitlaw import UserLaw, embed
+from evfem.tissue.splitlaw import UserLaw
 
 rng = np.random.default_rng(2)
 BUILT_IN = [

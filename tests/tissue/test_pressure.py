@@ -82,22 +82,6 @@ def test_the_tangent_is_that_of_displacements_and_pressure(element, law):
     np.testing.assert_allclose(K @ du.ravel(), expected.ravel(), atol=1e-7 * np.abs(expected).max())
 
 
-@every_element
-def test_compiled_loops_are_the_form(element):
-    """Cells enough for three blocks, the last one not full; curved edges."""
-    space = rectangle(element, (7, 5), warp=quarter_ring(1.0, 2.0), split=lambda x, y: x + y > 1.0)
-    laws = {"lower": NeoHookean(E=0.8, nu=0.3), "upper": NeoHookean(E=3.0, nu=0.4999)}
-    fast, plain = Tissue(space, laws), Tissue(space, laws)
-    plain.loops = None
-    u, q = wavy(space.mesh.points), np.random.default_rng(5).normal(size=space.weight.shape)
-    du = np.random.default_rng(6).normal(size=u.shape)
-    for name, *given in (("pressure", u), ("pressure_change", u, du), ("pressure_forces", u, q)):
-        ours, theirs = (getattr(tissue, name)(*given) for tissue in (fast, plain))
-        np.testing.assert_allclose(ours, theirs, atol=2e-12 * np.abs(theirs).max(), err_msg=name)
-    ours, theirs = (mixed_tangent_of(tissue, u, q).toarray() for tissue in (fast, plain))
-    np.testing.assert_allclose(ours, theirs, atol=2e-12 * np.abs(theirs).max())
-
-
 # -- which laws need it
 # ------------------------------------------------------------------------------------------------
 

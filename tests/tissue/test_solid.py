@@ -1,174 +1,21 @@
-"""Hexahedra: patch test, derivatives, rigid motion, convergence, and plane strain as a special
-case.
-"""
+"""Hexahedra: convergence, plane strain as a special case, and tractions on their faces."""
 
-import importlib.util
 from functools import cache
 
 import numpy as np
 import pytest
-from tools.grids import mixed_tangent_of, order, rectangle, solve, tangent_of
-from tools.laws import LAWS as EVERY_LAW
-from tools.laws import LMBDA, MU, SteepVolume, neo_hookean_stress
-from tools.solids import box
+from tools.grids import order, rectangle, solve
+from tools.laws import neo_hookean_stress
+from tools.solids import bend, box
 
-from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.forms import form
-from evfem.tissue.laws import NeoHookean, Yeoh
+from evfem.tissue.laws import NeoHookean
 from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 
-
-@form
-def neo_hookean_form(u, v, w):
-    """The neo-Hookean law as a user's form."""
-    F = np.eye(3)[:, :, None, None] + u.grad
-    return MU * np.sum(F * v.grad, axis=(0, 1)) + (LMBDA * u.theta - MU) * v.theta
-
-
-LAWS = EVERY_LAW | {"form": neo_hookean_form}
 #: the plane element that each hexahedron is, extruded
 PLANE = {"hex8": "q1_fbar", "hex27p1": "q2p1"}
 every_element = pytest.mark.parametrize("element", list(PLANE))
-every_law = pytest.mark.parametrize("law", list(LAWS))
-STRETCH = np.array([[0.12, 0.2, 0.05], [-0.07, -0.05, 0.1], [0.03, -0.08, 0.06]])
-
-
-def bend(x, y, z):
-    """A warp that curves every edge and twists every face."""
-    return (
-        x + 0.06 * np.sin(2.0 * y + x - z),
-        y + 0.08 * np.sin(2.5 * x + 0.7 * z),
-        z + 0.07 * np.sin(2.0 * x * y + 1.5 * z),
-    )
-
-
-def wavy(points, size=0.06):
-    """A smooth displacement field, far from affine."""
-    x, y, z = points.T
-    waves = np.sin(2 * x + y - z) + y * z, np.cos(3 * x - y) + x * z, np.sin(2 * z - x) + x * y
-    return size * np.column_stack(waves)
-
-
-def stress_of(law, F):
-    """P (3, 3) at F (3, 3): the law's own, or the neo-Hookean law's for those that are it."""
-    if isinstance(law, SteepVolume):
-        J, G = np.linalg.det(F), np.linalg.inv(F).T
-        return MU * (F - G) + LMBDA / 4.0 * (J**2 - J**-2) * (J**2 + J**-2) * G
-    return law.P(F) if hasattr(law, "P") else neo_hookean_stress(F, MU, LMBDA)
-
-
-# -- patch test -----------------------------------------------------------------------------------------
-
-
-@every_law
-@every_element
-@pytest.mark.parametrize("shape", ["distorted", "curved"])
-def test_patch(element, law, shape):
-    """Affine displacements give the law's own stress in every cell and no force on an inner node.
-
-    ln J at the centroid leaves forces of 1e-4 here (see the next test). Curved cells map affine
-    fields exactly too, but 27 points do not integrate their Jacobian exactly.
-    """
-    distortion = {"jitter": 0.25} if shape == "distorted" else {"warp": bend}
-    space = box(element, (3, 2, 2), **distortion)
-    tissue = Tissue(space, {"lower": LAWS[law]})
-    points, outside = space.mesh.points, space.mesh.node_sets["outside"]
-    u = points @ STRETCH.T
-    F = np.eye(3) + STRETCH
-    J, P = np.linalg.det(F), stress_of(LAWS[law], F)
-    forces = tissue.forces(u)
-    inner = np.setdiff1d(np.arange(space.size), outside)
-    if shape == "distorted" or element == "hex8":
-        assert np.abs(forces[inner]).max() < 1e-14
-    np.testing.assert_allclose(forces.T @ points, P * space.weight.sum(), atol=1e-12)
-    stress, volume = tissue.cell_stress(u)
-    np.testing.assert_allclose(volume, J, rtol=1e-12)
-    sigma = P if law == "linear_elastic" else P @ F.T / J
-    expected = np.tile(sigma[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]], (len(stress), 1))
-    np.testing.assert_allclose(stress, expected, atol=1e-12)
-
-
-# -- derivatives ----------------------------------------------------------------------------------------
-
-
-@every_law
-@every_element
-def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(element, law):
-    """Central differences along random directions; two regions, so groups mix."""
-    space = box(element, (2, 1, 1), warp=bend, split=lambda x, y, z: x > 0.5)
-    tissue = Tissue(space, {"lower": LAWS[law], "upper": Yeoh(c1=0.3, c2=0.2, nu=0.3)})
-    u = wavy(space.mesh.points)
-    f, K = tissue.forces(u), tangent_of(space, u, tissue)
-    scale = abs(K).max()
-    for direction in np.random.default_rng(3).normal(size=(3, *u.shape)):
-        h = 1e-4
-        ends = [tissue.energy(u + s * h * direction) for s in (1, -1, 2, -2)]
-        slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
-        assert slope == pytest.approx(np.sum(f * direction), rel=2e-8)
-        ends = [tissue.forces(u + s * h * direction) for s in (1, -1, 2, -2)]
-        slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
-        np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=2e-9 * scale)
-    cells = tissue.regions[0][1].cell_tangents(u)
-    assert np.abs(cells - np.swapaxes(cells, 1, 2)).max() < 1e-9 * np.abs(cells).max()
-
-
-# -- compiled loops --------------------------------------------------------------------------------------
-
-
-def test_loops_of_hexahedra_are_used_where_they_were_built():
-    tissue = Tissue(box("hex8", (1, 1, 1)), {"lower": LAWS["neo_hookean"]})
-    built = importlib.util.find_spec("evfem.tissue.kernels.solids") is not None
-    assert (tissue.loops is not None) == built
-
-
-@every_element
-def test_compiled_tissue_is_the_form(element):
-    """Nine cells of two regions: forces, energy, tangents, pressures and their changes."""
-    space = box(element, (3, 3, 1), warp=bend, split=lambda x, y, z: x + y > 1.0)
-    laws = {"lower": NeoHookean(E=0.8, nu=0.3), "upper": NeoHookean(E=3.0, nu=0.4999)}
-    fast, plain = Tissue(space, laws), Tissue(space, laws)
-    plain.loops = None
-    u, du = wavy(space.mesh.points), wavy(space.mesh.points[:, ::-1])
-    q = np.random.default_rng(4).uniform(-0.2, 0.1, space.weight.shape)
-    for of in (
-        lambda tissue: tissue.forces(u),
-        lambda tissue: tangent_of(space, u, tissue).toarray(),
-        lambda tissue: mixed_tangent_of(tissue, u, q).toarray(),
-        lambda tissue: tissue.pressure(u),
-        lambda tissue: tissue.pressure_change(u, du),
-        lambda tissue: tissue.pressure_forces(u, q),
-        lambda tissue: np.array([tissue.energy(u), tissue.smallest_J(u)]),
-        lambda tissue: np.column_stack(tissue.cell_stress(u)),
-    ):
-        expected = of(plain)
-        np.testing.assert_allclose(of(fast), expected, atol=2e-12 * np.abs(expected).max())
-
-
-@every_element
-def test_compiled_viscosity_is_the_form(element):
-    """And its dissipation, in cells of different viscosity, one of which has none."""
-    space = box(element, (3, 3, 1), warp=bend)
-    start, u = wavy(space.mesh.points), wavy(space.mesh.points, 0.08)
-    eta = np.linspace(0.0, 0.3, len(space.nodes))
-    fast, plain = Dynamics(space, eta, None), Dynamics(space, eta, None)
-    plain.loops = None
-    for term in (fast, plain):
-        term.begin(start, 0 * u, 2e-3)
-    forces, K = plain.forces(u), tangent_of(space, u, plain).toarray()
-    np.testing.assert_allclose(fast.forces(u), forces, atol=1e-12 * np.abs(forces).max())
-    np.testing.assert_allclose(tangent_of(space, u, fast).toarray(), K, atol=1e-12 * np.abs(K).max())
-    assert fast.dissipation(u) == pytest.approx(plain.dissipation(u), rel=1e-12)
-
-
-@every_element
-def test_inverted_states_are_seen(element):
-    """A state turned inside out has negative J and forces that are not numbers."""
-    space = box(element, (2, 1, 1))
-    u = space.mesh.points * [-2.0, 0.0, 0.0]
-    for tissue in (Tissue(space, {"lower": LAWS[law]}) for law in ("neo_hookean", "yeoh")):
-        assert tissue.smallest_J(u) == pytest.approx(-1.0)
-        assert np.isnan(tissue.forces(u)).any()
 
 
 # -- convergence ----------------------------------------------------------------------------------------
@@ -198,9 +45,7 @@ def isochoric(x, y, z):
 
 @cache
 def manufactured_error(element, field, nu, n):
-    """L2 error on n x n x n cells for the load int P(F) : grad v of `field` and its values
-    outside.
-    """
+    """L2 error on n x n x n cells for the load int P(F) : grad v of `field` and its values outside."""
     law = NeoHookean(E=1.0, nu=nu)
     space = box(element, (n, n, n), warp=bend)
     exact = field(*space.mesh.points.T)[0].T

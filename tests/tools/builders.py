@@ -6,6 +6,9 @@ from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.checkpoint import Checkpoint
+from evfem.simulation.result import Saved
+from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Display
 from evfem.tissue.laws import NeoHookean
 from tools.meshes import half_finger
@@ -44,13 +47,38 @@ def benchmark_scene(kind, level, element=None, steps=15):
 
 
 def balance(result):
-    """Out-of-balance force of every row (rows, 2) relative to its largest force (at least 1e-6
-    N/mm).
-    """
+    """Out-of-balance force of every row (rows, 2) relative to its largest force (at least 1e-6 N/mm)."""
     x = [result.applied_tangential_force, -result.tangential_force, result.electrostatic_force_x]
     y = [-result.applied_force, result.normal_force, -result.electrostatic_force]
     forces = np.array([x, y])
     return np.abs(forces.sum(axis=1) / np.maximum(np.abs(forces).max(axis=(0, 1)), 1e-6)).T
+
+
+def left_over(result):
+    """The largest work or energy of any row that no column has, relative to the largest of all."""
+    given = [result.external_work, result.electrostatic_work, result.adhesive_work]
+    kept = [result.stored_energy, result.kinetic_energy, result.friction_dissipation]
+    kept += [result.viscous_dissipation, result.integrator_dissipation, result.snap_dissipation]
+    return np.abs(np.sum(given, axis=0) - np.sum(kept, axis=0)).max() / np.abs(given + kept).max()
+
+
+def resumed(scene, after, folder=None):
+    """The result of a scene, and that of a run that goes on from its checkpoint after a step, by way of a
+    file where a folder is given.
+    """
+    kept = []
+
+    class Keeper:
+        def step(self, row, frame, checkpoint):
+            kept.append(checkpoint())
+
+    whole = simulate(scene, observers=[Keeper()])
+    saved = Saved(kept[after - 1], whole.rows[:after])
+    if folder is not None:
+        file = Checkpoint(folder / "checkpoint.npz")
+        file.write(scene.digest(), saved.arrays, saved.rows)
+        saved = file.read(scene.digest())
+    return whole, simulate(scene, resume=saved)
 
 
 def pad_state(result, k=-1):

@@ -22,9 +22,7 @@ def called(folder, *words):
 
 
 def process_of(*words):
-    """What starts `evfem WORDS` in a process that finds the same packages: its words and
-    environment.
-    """
+    """What starts `evfem WORDS` in a process that finds the same packages: its words and environment."""
     path = os.pathsep.join(p for p in sys.path if p)
     environment = os.environ | {"PYTHONPATH": path}
     return [sys.executable, "-m", "evfem.cli", *map(str, words)], environment

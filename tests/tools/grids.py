@@ -1,6 +1,4 @@
-"""Small meshes and a plain Newton solver for tests of the tissue: nothing here knows contact or
-steps.
-"""
+"""Small meshes and a plain Newton solver for tests of the tissue: nothing here knows contact or steps."""
 
 import numpy as np
 import scipy.sparse as sparse
@@ -39,10 +37,9 @@ def columns_of(forces, u, step=1e-5):
 def rectangle(element, divisions, size=(1.0, 1.0), warp=None, jitter=0.0, split=None):
     """The space of `element` on [0, w] x [0, h] in nx x ny cells.
 
-    `jitter` moves inner corners at random by that share of a cell and keeps edges straight; `warp`
-    maps all nodes, mid-nodes too, so that edges become curves; `split(x, y)` at the centre of a
-    cell is True in region `upper`, the rest is `lower`. Node sets: left, right, bottom, top and
-    outline.
+    `jitter` moves inner corners at random by that share of a cell and keeps edges straight; `warp` maps all
+    nodes, mid-nodes too, so that edges become curves; `split(x, y)` at the centre of a cell is True in region
+    `upper`, the rest is `lower`. Node sets: left, right, bottom, top and outline.
     """
     nx, ny = divisions
     base = between(*np.meshgrid(np.linspace(0, size[0], nx + 1), np.linspace(0, size[1], ny + 1)))
@@ -113,9 +110,7 @@ def mixed_tangent_of(tissue, u, q):
 
 
 def solve(tissue, u, free, load=0.0, iterations=14):
-    """Equilibrium f_int(u) = load of the `free` unknowns (N, dim) by Newton's method from u; all
-    else stays.
-    """
+    """Equilibrium f_int(u) = load of the `free` unknowns (N, dim) by Newton from u; all else stays."""
     u, free = u.copy(), free.ravel()
     for _ in range(iterations):
         K = tangent_of(tissue.space, u, *getattr(tissue, "terms", [tissue]))[free][:, free]

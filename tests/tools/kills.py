@@ -18,9 +18,7 @@ from tools.meshes import block
 
 
 def head(mesh, more=""):
-    """The beginning of a scene: its finger from a mesh with the region `tissue`, and further keys
-    of it.
-    """
+    """The beginning of a scene: its finger from a mesh with the region `tissue`, and further keys of it."""
     return f"""version = 1
 [finger]
 mesh = "{mesh}"

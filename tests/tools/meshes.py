@@ -30,9 +30,7 @@ def cells_between(node, kind="quad"):
 
 
 def between(x, y, kind="quad"):
-    """Cells on points x, y (rows, columns), both growing; sets bottom, top, left and right, one
-    region 0.
-    """
+    """Cells on points x, y (rows, columns), both growing; sets bottom, top, left and right, one region 0."""
     node = np.arange(x.size).reshape(x.shape)
     cells = cells_between(node, kind)
     sets = {"bottom": node[0], "top": node[-1], "left": node[:, 0], "right": node[:, -1]}
@@ -41,9 +39,7 @@ def between(x, y, kind="quad"):
 
 
 def held(mesh, pad=None, bone=None, region=None, names=None):
-    """The mesh with the sets `pad` (the bottom) and `bone` (the top) alone, and perhaps regions by
-    name.
-    """
+    """The mesh with the sets `pad` (the bottom) and `bone` (the top) alone, and perhaps regions by name."""
     sets = {
         "pad": mesh.node_sets["bottom"] if pad is None else pad,
         "bone": mesh.node_sets["top"] if bone is None else bone,
@@ -61,9 +57,7 @@ def block(columns=8, rows=4, width=4.0, height=2.0, sag=0.0):
 
 
 def square_mesh(kind="quad"):
-    """[-1, 1] x [0, 2] in cells of one kind, two regions, the lower side `pad`, the upper side
-    `bone`.
-    """
+    """[-1, 1] x [0, 2] in cells of one kind, two regions, the lower side `pad`, the upper side `bone`."""
     n = 5 if kind in ("quad9", "triangle6") else 3
     mesh = between(*np.meshgrid(np.linspace(-1, 1, n), np.linspace(0, 2, n)), kind)
     upper = np.arange(len(mesh.cells)) >= len(mesh.cells) // 2
@@ -71,8 +65,7 @@ def square_mesh(kind="quad"):
 
 
 def half_finger(around=60, tissue=10, skin=2):
-    """Half a finger between two ellipses, the press-and-slide benchmark's: lines from the bone to
-    the skin.
+    """Half a finger between two ellipses, the press-and-slide benchmark's: lines from the bone to the skin.
 
     `tissue` and `skin` are numbers of cells across them.
     """

@@ -1,15 +1,13 @@
-"""Mistakes in the physics that the tests must see: each is made in a copy of the package, one at a
-time.
+"""Mistakes in the physics that the tests must see: each is made in a copy of the package, one at a time.
 
-    python tests/tools/mistakes.py [--only WORD]
+python tests/tools/mistakes.py [--only WORD]
 
-The table is `mistakes.toml` beside this file. A mistake is one edit within one function or method:
-of the package's functions called `where`, one has the expression `old` once, and there it becomes
-`new`. Expressions are compared as Python reads them, so that lines may be broken otherwise and
-functions may move; `where` of a C header is its name, and blanks do not count. `breaks` says what is
-wrong then, `tests` which tests must see it. They run in a temporary folder with a copy of the
-package, first as it is, then with each mistake, one process at a time. Exit status 1 if a mistake
-survives.
+The table is `mistakes.toml` beside this file. A mistake is one edit within one function or method: of the
+package's functions called `where`, one has the expression `old` once, and there it becomes `new`. Expressions
+are compared as Python reads them, so that lines may be broken otherwise and functions may move; `where` of a
+C header is its name, and blanks do not count. `breaks` says what is wrong then, `tests` which tests must see
+it. They run in a temporary folder with a copy of the package, first as it is, then with each mistake, one
+process at a time. Exit status 1 if a mistake survives.
 """
 
 from __future__ import annotations
@@ -124,12 +122,7 @@ class Copy:
         """Python with these arguments in the copy."""
         words = [sys.executable, "-P", *arguments]
         return subprocess.run(
-            words,
-            cwd=self.folder,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=seconds,
+            words, cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=seconds
         )
 
     def test(self, tests: tuple[str, ...], seconds: float = LONGEST) -> str | None:
@@ -170,9 +163,7 @@ class Copy:
 
 
 def survivors(chosen: list[Mistake]) -> int:
-    """Make the mistakes one after the other, print a line for each, and count those that no test
-    sees.
-    """
+    """Make the mistakes one after the other, print a line for each, and count those that no test sees."""
     survived = 0
     with TemporaryDirectory() as folder:
         copy = Copy(Path(folder))

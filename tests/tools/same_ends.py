@@ -11,19 +11,14 @@ the largest force of its scene. `tests/tools/ends.csv` holds the ends that a cha
 
 import argparse
 import csv
-import multiprocessing
 import os
 import resource
 import signal
 import sys
 import time
 import warnings
-from concurrent.futures import ThreadPoolExecutor
-from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-from threadpoolctl import threadpool_limits
 
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
 COLUMNS = ("seed", "scene", "end", "requested", "rows", "substeps", "iterations", "factorisations", "cuts",
@@ -32,8 +27,8 @@ LIMIT_S = 300.0
 Row = dict[str, str]
 
 
-def run(seed: int, number: int, line: Connection) -> None:
-    """Run one scene in this process and send its row."""
+def run(key: tuple[int, int]) -> Row:
+    """The row of one scene, whose process dies beyond `LIMIT_S` CPU seconds."""
     from evfem.studies.campaign.drawing import draw
     from evfem.studies.campaign.tables import text_of, with_files
 
@@ -42,10 +37,11 @@ def run(seed: int, number: int, line: Connection) -> None:
     from evfem.simulation.run import simulate
 
     warnings.simplefilter("ignore")
+    resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + LIMIT_S), resource.RLIM_INFINITY))
     begin, row = time.process_time(), {"end": "equilibrium"}
     with TemporaryDirectory() as folder:
         try:
-            scene = loads(text_of(with_files(draw(seed, number), Path(folder))), Path(folder))
+            scene = loads(text_of(with_files(draw(*key), Path(folder))), Path(folder))
             row["requested"] = str(scene.total_steps)
             result = simulate(scene)
         except NotConverged as error:
@@ -61,42 +57,23 @@ def run(seed: int, number: int, line: Connection) -> None:
         }
         row |= {"rows": str(len(result.step)), "substeps": str(int(result.substeps.sum()))}
         row |= {name: f"{getattr(result, name)[-1]:.12g}" for name in ("indentation", *FORCES)}
-    line.send(row)
-
-
-def guarded(key: tuple[int, int]) -> Row:
-    """The row of one scene, run in a process of its own that may die or take too long."""
-    context = multiprocessing.get_context("fork")
-    mine, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=limited, args=(*key, theirs))
-    process.start()
-    theirs.close()
-    try:
-        row = mine.recv()
-    except EOFError:
-        process.join()
-        row = {"end": "timeout" if process.exitcode == -signal.SIGXCPU else f"died: {process.exitcode}"}
-    process.join()
-    print(*key, *row.values(), flush=True)
-    return {"seed": str(key[0]), "scene": str(key[1]), **row}
-
-
-def limited(seed: int, number: int, line: Connection) -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (int(LIMIT_S), int(LIMIT_S) + 5))
-    signal.signal(signal.SIGXCPU, signal.SIG_DFL)
-    with threadpool_limits(1):
-        run(seed, number, line)
+    return row
 
 
 def record(path: Path, keys: list[tuple[int, int]], workers: int) -> int:
     """Run the scenes and write their rows."""
+    from evfem.common.pools import processes
 
-    with ThreadPoolExecutor(workers) as pool, path.open("w", newline="") as file:
+    with processes(workers) as pool, path.open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         table.writeheader()
-        for row in pool.map(guarded, keys):
-            table.writerow(row)
+        for (seed, number), row in pool(run, {key: key for key in keys}):
+            if isinstance(row, Exception):
+                status = getattr(row, "status", None)
+                row = {"end": "timeout" if status == -signal.SIGXCPU else f"died: {status or row}"}
+            table.writerow({"seed": seed, "scene": number, **row})
             file.flush()
+            print(seed, number, *row.values(), flush=True)
     return 0
 
 

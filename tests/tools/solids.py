@@ -9,14 +9,30 @@ from evfem.surface.skin import Skin
 from evfem.tissue.space import ELEMENTS, make_space
 
 SIDES = ("left", "right", "bottom", "top", "back", "front")  # -x, +x, -y, +y, -z, +z
+SOLIDS = ("hex8", "hex27p1")
+
+
+def bend(x, y, z):
+    """A warp that curves every edge and twists every face."""
+    return (
+        x + 0.06 * np.sin(2.0 * y + x - z),
+        y + 0.08 * np.sin(2.5 * x + 0.7 * z),
+        z + 0.07 * np.sin(2.0 * x * y + 1.5 * z),
+    )
+
+
+def wavy(points, size=0.06):
+    """A smooth displacement field, far from affine."""
+    x, y, z = points.T
+    waves = np.sin(2 * x + y - z) + y * z, np.cos(3 * x - y) + x * z, np.sin(2 * z - x) + x * y
+    return size * np.column_stack(waves)
 
 
 def block(divisions, size=(1.0, 1.0, 1.0), jitter=0.0, split=None):
-    """[0, w] x [0, h] x [0, d] in nx x ny x nz hexahedra; node sets are its six sides and
-    `outside`.
+    """[0, w] x [0, h] x [0, d] in nx x ny x nz hexahedra; node sets are its six sides and `outside`.
 
-    `jitter` moves inner nodes at random by that share of a cell; `split(x, y, z)` at the centre of
-    a cell is True in region `upper`, the rest is `lower`.
+    `jitter` moves inner nodes at random by that share of a cell; `split(x, y, z)` at the centre of a cell is
+    True in region `upper`, the rest is `lower`.
     """
     divisions, size = np.array(divisions), np.asarray(size, dtype=float)
     grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in divisions), indexing="ij"), axis=-1)

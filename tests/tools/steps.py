@@ -20,12 +20,7 @@ TOLERANCE, MU = 1e-6, 0.5
 MESH = raised(block(4, 2))
 PAD = make_pad(MESH)
 #: statuses of pad nodes in a row, with forces along normal and tangent (N/mm) that obey Coulomb's law
-NODES = {
-    OPEN: (0.0, 0.0),
-    STICK: (1.0, 0.3),
-    FORWARD: (0.8, -MU * 0.8),
-    BACKWARD: (0.6, MU * 0.6),
-}
+NODES = {OPEN: (0.0, 0.0), STICK: (1.0, 0.3), FORWARD: (0.8, -MU * 0.8), BACKWARD: (0.6, MU * 0.6)}
 SLIP, GAP = 1e-3, 1e-2
 
 

@@ -9,9 +9,7 @@ from evfem.sweeps.folder import Answer
 
 
 def work_or_die(job):
-    """(file, "die") makes the file and ends the process without a word; others answer after it is
-    there.
-    """
+    """(file, "die") makes the file and ends the process without a word; others answer after it is there."""
     file, word = job
     if word == "die":
         Path(file).touch()

@@ -10,11 +10,11 @@
 #define MOST_MODES 9
 #define ZERO {{{{0}, {0}}, {{0}, {0}}}}
 #define DOT(x, m, y, n) ((x)[0] * (y)[0] + (x)[m] * (y)[n])
-#define SIZED(NAME, ...)                            \
-    switch (m->n) {                                 \
-    case 4: return NAME(m, 4, __VA_ARGS__);         \
-    case 6: return NAME(m, 6, __VA_ARGS__);         \
-    default: return NAME(m, 9, __VA_ARGS__);        \
+#define SIZED(NAME, r)              \
+    switch ((r)->m.n) {             \
+    case 4: NAME(r, 4); break;      \
+    case 6: NAME(r, 6); break;      \
+    default: NAME(r, 9);            \
     }
 #else
 #define MOST_NODES 27
@@ -22,12 +22,11 @@
 #define MOST_MODES 4
 #define ZERO {{{{0}}}}
 #define DOT(x, m, y, n) ((x)[0] * (y)[0] + (x)[m] * (y)[n] + (x)[2 * (m)] * (y)[2 * (n)])
-#define SIZED(NAME, ...)                            \
-    switch (m->n) {                                 \
-    case 8: return NAME(m, 8, __VA_ARGS__);         \
-    default: return NAME(m, 27, __VA_ARGS__);       \
-    }
+#define SIZED(NAME, r) \
+    if ((r)->m.n == 8) NAME(r, 8); \
+    else NAME(r, 27);
 #endif
+#define MOST_ARRAYS 7
 #define EACH(i) _Pragma("GCC unroll 3") for (int i = 0; i < DIM; i++)
 
 typedef struct { lanes a[DIM][DIM]; } tensor;
@@ -49,6 +48,15 @@ typedef struct {
     const stored *psi;    /* (B, modes, sample.count) */
     const stored *mean;   /* (B, modes): a_m */
 } mesh;
+
+/* What a loop works on: cells, its arrays in the order of `LOOPS` (`module.h`), branches of the tissue; and the
+   numbers that it finds. */
+typedef struct {
+    mesh m;
+    void *arrays[MOST_ARRAYS];
+    int branches;
+    double found[2];
+} request;
 
 /* -- at a point ------------------------------------------------------------------------------ */
 
@@ -101,6 +109,13 @@ INLINE void add_forces(tensor P, const points *at, Py_ssize_t b, int q, int n, l
         EACH(i) fe[DIM * k + i] += DOT(T.a[i], 1, g + DIM * k, 1);
 }
 
+/* Shape gradients at point q of block b, (n, DIM). */
+INLINE void shape_gradients(const mesh *m, Py_ssize_t b, int q, int n, lanes *out) {
+    const double *g = m->at.reference + DIM * n * q;
+    const stored *A = m->at.inverse + DIM * DIM * (b * m->at.count + q);
+    for (int k = 0; k < n; k++) EACH(i) out[DIM * k + i] = DOT(A + i, DIM, g + DIM * k, 1);
+}
+
 #if DIM == 2
 /* cofactors of 1 + H */
 INLINE tensor cofactors(tensor H) {
@@ -112,11 +127,6 @@ INLINE lanes volume_change(tensor H) {
     return H.a[0][0] + H.a[1][1] + (H.a[0][0] * H.a[1][1] - H.a[0][1] * H.a[1][0]);
 }
 
-INLINE lanes contracted(tensor S, tensor T) {
-    return S.a[0][0] * T.a[0][0] + S.a[0][1] * T.a[0][1] + S.a[1][0] * T.a[1][0] + S.a[1][1] * T.a[1][1];
-}
-
-INLINE lanes trace(tensor H) { return H.a[0][0] + H.a[1][1]; }
 #else
 INLINE lanes minor(tensor F, int i, int j) {
     int k = (i + 1) % 3, l = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
@@ -137,14 +147,19 @@ INLINE lanes volume_change(tensor H) {
     return H.a[0][0] + H.a[1][1] + H.a[2][2] + (C.a[0][0] + C.a[1][1] + C.a[2][2] + det);
 }
 
+#endif
+
 INLINE lanes contracted(tensor S, tensor T) {
     lanes total = {0};
     EACH(i) EACH(j) total += S.a[i][j] * T.a[i][j];
     return total;
 }
 
-INLINE lanes trace(tensor H) { return H.a[0][0] + H.a[1][1] + H.a[2][2]; }
-#endif
+INLINE lanes trace(tensor H) {
+    lanes total = {0};
+    EACH(i) total += H.a[i][i];
+    return total;
+}
 
 INLINE tensor scaled(lanes factor, tensor T) {
     EACH(i) EACH(j) T.a[i][j] *= factor;

@@ -45,15 +45,17 @@ INLINE lanes volume(const mesh *m, Py_ssize_t b, int n, const lanes *ue, lanes m
 }
 
 /* Nodal forces added to out (N, DIM); returns the stored energy, and the smallest J. */
-INLINE double elastic_forces(const mesh *m, int n, const double *u, const stored *mu,
-                             const stored *lmbda, double *out, double *smallest) {
+INLINE void forces(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0];
+    const stored *mu = r->arrays[1], *lmbda = r->arrays[2];
+    double *out = r->arrays[3], smallest = INFINITY;
     lanes total = {0};
-    *smallest = INFINITY;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[DIM * MOST_NODES], fe[DIM * MOST_NODES] = {{0}}, pressure[MOST_POINTS];
         tensor inverse[MOST_POINTS];
         gather(u, m->nodes + b * n * LANES, n, ue);
-        total += volume(m, b, n, ue, mu[b], lmbda[b], inverse, pressure, smallest);
+        total += volume(m, b, n, ue, mu[b], lmbda[b], inverse, pressure, &smallest);
         for (int q = 0; q < m->at.count; q++) {
             tensor P = displacement_gradient(&m->at, b, q, ue, n);
             lanes w = mu[b] * m->weight[b * m->at.count + q];
@@ -69,14 +71,17 @@ INLINE double elastic_forces(const mesh *m, int n, const double *u, const stored
             add_forces(scaled(pressure[s], inverse[s]), &m->sample, b, s, n, fe);
         spread(fe, m->nodes + b * n * LANES, n, out);
     }
-    return sum(total);
+    r->found[0] = sum(total), r->found[1] = smallest;
 }
 
 /* What changes of the tangent, added to the matrix: pairs k <= l of nodes, places (B, pairs, DIM DIM,
    LANES). The curvature of ln J is weighted with the law's own pressure, or with a given one (B, S). */
-INLINE void elastic_tangent(const mesh *m, int n, const double *u, const stored *mu,
-                            const stored *lmbda, const stored *given, const int32_t *places,
-                            double *data) {
+INLINE void add_tangent(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0];
+    const stored *mu = r->arrays[1], *lmbda = r->arrays[2], *given = r->arrays[3];
+    const int32_t *places = r->arrays[4];
+    double *data = r->arrays[5];
     int S = m->sample.count, rank = HAS_MODES(m) ? m->modes : S;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[DIM * MOST_NODES], pressure[MOST_POINTS];
@@ -116,7 +121,10 @@ INLINE void elastic_tangent(const mesh *m, int n, const double *u, const stored 
 }
 
 /* ln J at the samples (B, S), or with du its change along du, F^-T : grad du. */
-INLINE void log_volumes(const mesh *m, int n, const double *u, const double *du, stored *out) {
+INLINE void log_volumes(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0], *du = r->arrays[1];
+    stored *out = r->arrays[2];
     int S = m->sample.count;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[DIM * MOST_NODES], change[DIM * MOST_NODES];
@@ -133,7 +141,11 @@ INLINE void log_volumes(const mesh *m, int n, const double *u, const double *du,
 }
 
 /* Nodal forces pressure F^-T : grad v of a given pressure (B, S), added to out (N, DIM). */
-INLINE void volume_forces(const mesh *m, int n, const double *u, const stored *pressure, double *out) {
+INLINE void volume_forces(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0];
+    const stored *pressure = r->arrays[1];
+    double *out = r->arrays[2];
     int S = m->sample.count;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[DIM * MOST_NODES], fe[DIM * MOST_NODES] = {{0}};
@@ -148,7 +160,9 @@ INLINE void volume_forces(const mesh *m, int n, const double *u, const stored *p
 }
 
 /* Smallest volume ratio over all samples. */
-INLINE double smallest_volume(const mesh *m, int n, const double *u) {
+INLINE void smallest_J(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0];
     double smallest = INFINITY;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[DIM * MOST_NODES];
@@ -159,36 +173,5 @@ INLINE double smallest_volume(const mesh *m, int n, const double *u) {
                 if (!(J[i] >= smallest)) smallest = J[i];
         }
     }
-    return smallest;
-}
-
-/* Means over the cells of the Cauchy stress xx, yy, zz, xy (yz, xz), and of J, (B, STRESSES + 1): J sigma =
-   mu F F^T + q with the pressure q (B, Q) at the points, in the plane with F_zz = 1. */
-INLINE void cell_stresses(const mesh *m, int n, const double *u, const stored *mu, const stored *pressure,
-                          stored *out) {
-    for (Py_ssize_t b = 0; b < m->blocks; b++) {
-        lanes ue[DIM * MOST_NODES], total = {0}, means[STRESSES + 1] = {{0}};
-        gather(u, m->nodes + b * n * LANES, n, ue);
-        for (int q = 0; q < m->at.count; q++) {
-            tensor F = displacement_gradient(&m->at, b, q, ue, n);
-            lanes w = m->weight[b * m->at.count + q], J = 1.0 + volume_change(F), share = w / J;
-            lanes p = pressure[b * m->at.count + q];
-            EACH(i) F.a[i][i] += 1.0;
-#if DIM == 2
-            EACH(i) means[i] += share * (mu[b] * DOT(F.a[i], 1, F.a[i], 1) + p);
-            means[2] += share * (mu[b] + p);
-            means[3] += share * mu[b] * DOT(F.a[0], 1, F.a[1], 1);
-#else
-            tensor S;
-            EACH(i) EACH(j) S.a[i][j] = share * mu[b] * DOT(F.a[i], 1, F.a[j], 1);
-            EACH(i) means[i] += S.a[i][i] + share * p;
-            means[3] += S.a[0][1];
-            means[4] += S.a[1][2];
-            means[5] += S.a[0][2];
-#endif
-            means[STRESSES] += w * J;
-            total += w;
-        }
-        for (int i = 0; i <= STRESSES; i++) out[(STRESSES + 1) * b + i] = means[i] / total;
-    }
+    r->found[0] = smallest;
 }

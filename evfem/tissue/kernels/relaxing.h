@@ -143,8 +143,12 @@ INLINE void means(lanes y, lanes *f, lanes *rest, lanes *decay) {
 
 /* B and a of all branches, both over 1 + a, from steps over their times x (B, branches), displacements and
    C_i (B, Q, branches, KEPT). */
-INLINE void relaxing_begin(const mesh *m, int n, const double *u, int branches, const stored *x,
-                           const stored *kept, stored *before) {
+INLINE void begin_relaxing(request *r, int n) {
+    const mesh *m = &r->m;
+    const int branches = r->branches;
+    const double *u = r->arrays[0];
+    const stored *x = r->arrays[1], *kept = r->arrays[2];
+    stored *before = r->arrays[3];
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[DIM * MOST_NODES];
         gather(u, m->nodes + b * n * LANES, n, ue);
@@ -166,8 +170,12 @@ INLINE void relaxing_begin(const mesh *m, int n, const double *u, int branches, 
 /* -- forces and tangent ------------------------------------------------------------------------- */
 
 /* Nodal forces P : grad v added to out (N, DIM); moduli (B, branches), `before` (B, Q, branches, KEPT + 1). */
-INLINE void relaxing_forces(const mesh *m, int n, const double *u, int branches, const stored *modulus,
-                            const stored *before, double *out) {
+INLINE void relaxing(request *r, int n) {
+    const mesh *m = &r->m;
+    const int branches = r->branches;
+    const double *u = r->arrays[0];
+    const stored *modulus = r->arrays[1], *before = r->arrays[2];
+    double *out = r->arrays[3];
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         if (!relaxes(modulus + b * branches, branches)) continue;
         lanes ue[DIM * MOST_NODES], fe[DIM * MOST_NODES] = {{0}}, root;
@@ -222,16 +230,14 @@ INLINE void relaxing_moduli(const strained *at, int branches, const stored *modu
     }
 }
 
-/* Shape gradients of a point, (n, DIM). */
-INLINE void shape_gradients(const mesh *m, Py_ssize_t b, int q, int n, lanes *out) {
-    const double *g = m->at.reference + DIM * n * q;
-    const stored *A = m->at.inverse + DIM * DIM * (b * m->at.count + q);
-    for (int k = 0; k < n; k++) EACH(i) out[DIM * k + i] = DOT(A + i, DIM, g + DIM * k, 1);
-}
-
-/* Tangent of `relaxing_forces` added to the matrix, like `elastic_tangent`. */
-INLINE void relaxing_tangent(const mesh *m, int n, const double *u, int branches, const stored *modulus,
-                             const stored *before, const int32_t *places, double *data) {
+/* Tangent of `relaxing` added to the matrix, like `add_tangent`. */
+INLINE void add_relaxing(request *r, int n) {
+    const mesh *m = &r->m;
+    const int branches = r->branches;
+    const double *u = r->arrays[0];
+    const stored *modulus = r->arrays[1], *before = r->arrays[2];
+    const int32_t *places = r->arrays[3];
+    double *data = r->arrays[4];
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         if (!relaxes(modulus + b * branches, branches)) continue;
         lanes ue[DIM * MOST_NODES];
@@ -272,9 +278,12 @@ INLINE solid overstrain(solid inverse, solid bar) {
 /* C_i at the end (B, Q, branches, KEPT); returns the stored energy and what was lost since the displacements
    u0 and C_i `kept`, with the numbers `loss` (B, branches, 4): e^-x and those of e0:e0, e0:d and d:d, where
    d = e1 - e^-x e0. */
-INLINE double relaxing_end(const mesh *m, int n, const double *u, int branches, const stored *modulus,
-                           const stored *before, const double *u0, const stored *kept, const stored *loss,
-                           stored *out, double *lost) {
+INLINE void end_relaxing(request *r, int n) {
+    const mesh *m = &r->m;
+    const int branches = r->branches;
+    const double *u = r->arrays[0], *u0 = r->arrays[3];
+    const stored *modulus = r->arrays[1], *before = r->arrays[2], *kept = r->arrays[4], *loss = r->arrays[5];
+    stored *out = r->arrays[6];
     lanes total = {0}, gone = {0};
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         if (!relaxes(modulus + b * branches, branches)) continue;
@@ -298,6 +307,5 @@ INLINE double relaxing_end(const mesh *m, int n, const double *u, int branches, 
             }
         }
     }
-    *lost = sum(gone);
-    return sum(total);
+    r->found[0] = sum(total), r->found[1] = sum(gone);
 }

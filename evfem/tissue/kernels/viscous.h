@@ -12,20 +12,17 @@ static const int ROW[STRAINS] = {0, 1, 2, 0, 1, 0}, COLUMN[STRAINS] = {0, 1, 2, 
 INLINE void green_strain(tensor H, lanes *E) {
     for (int c = 0; c < STRAINS; c++) {
         int i = ROW[c], j = COLUMN[c];
-#if DIM == 2
-        if (i == j)
-            E[c] = H.a[i][i] + 0.5 * (H.a[0][i] * H.a[0][i] + H.a[1][i] * H.a[1][i]);
-        else
-            E[c] = 0.5 * (H.a[i][j] + H.a[j][i] + H.a[0][i] * H.a[0][j] + H.a[1][i] * H.a[1][j]);
-#else
-        E[c] = 0.5 * (H.a[i][j] + H.a[j][i] + H.a[0][i] * H.a[0][j] + H.a[1][i] * H.a[1][j] +
-                      H.a[2][i] * H.a[2][j]);
-#endif
+        E[c] = H.a[i][j] + H.a[j][i];
+        EACH(k) E[c] += H.a[k][i] * H.a[k][j];
+        E[c] *= 0.5;
     }
 }
 
 /* Green strains of all points (B, at.count, STRAINS) as xx, yy, (zz,) xy(, yz, xz). */
-INLINE void viscous_strains(const mesh *m, int n, const double *u, stored *out) {
+INLINE void strains(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0];
+    stored *out = r->arrays[1];
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[DIM * MOST_NODES], E[STRAINS];
         gather(u, m->nodes + b * n * LANES, n, ue);
@@ -50,8 +47,11 @@ INLINE lanes viscous_stress(const mesh *m, Py_ssize_t b, int q, int n, const lan
 }
 
 /* Nodal forces F S : grad v added to out (N, DIM); returns what the step dissipates, S : (E - E0). */
-INLINE double viscous_forces(const mesh *m, int n, const double *u, const stored *rate,
-                             const stored *strain0, double *out) {
+INLINE void viscous(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0];
+    const stored *rate = r->arrays[1], *strain0 = r->arrays[2];
+    double *out = r->arrays[3];
     lanes total = {0};
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         if (!any(rate[b])) continue;
@@ -60,11 +60,7 @@ INLINE double viscous_forces(const mesh *m, int n, const double *u, const stored
         for (int q = 0; q < m->at.count; q++) {
             tensor F, S, P;
             lanes w = viscous_stress(m, b, q, n, ue, rate[b], strain0, &F, &S);
-#if DIM == 2
-            lanes square = S.a[0][0] * S.a[0][0] + S.a[1][1] * S.a[1][1] + 2.0 * S.a[0][1] * S.a[0][1];
-#else
             lanes square = contracted(S, S);
-#endif
             for (int i = 0; i < LANES; i++)
                 if (w[i] != 0.0) total[i] += square[i] / (2.0 * w[i]);
             EACH(i) EACH(j) P.a[i][j] = DOT(F.a[i], 1, &S.a[0][j], DIM);
@@ -72,13 +68,17 @@ INLINE double viscous_forces(const mesh *m, int n, const double *u, const stored
         }
         spread(fe, m->nodes + b * n * LANES, n, out);
     }
-    return sum(total);
+    r->found[0] = sum(total);
 }
 
-/* Tangent of `viscous_forces` added to the matrix, like `elastic_tangent`. With S weighted by r w:
+/* Tangent of `viscous` added to the matrix, like `add_tangent`. With S weighted by r w:
    grad v S grad w on the diagonal, and r w (F grad w . grad v F^T + grad v . grad w F F^T). */
-INLINE void viscous_tangent(const mesh *m, int n, const double *u, const stored *rate,
-                            const stored *strain0, const int32_t *places, double *data) {
+INLINE void add_viscous(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0];
+    const stored *rate = r->arrays[1], *strain0 = r->arrays[2];
+    const int32_t *places = r->arrays[3];
+    double *data = r->arrays[4];
     int Q = m->at.count;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         if (!any(rate[b])) continue;
@@ -89,13 +89,11 @@ INLINE void viscous_tangent(const mesh *m, int n, const double *u, const stored 
         gather(u, m->nodes + b * n * LANES, n, ue);
         for (int q = 0; q < Q; q++) {
             tensor F, S;
-            const double *g = m->at.reference + DIM * n * q;
-            const stored *A = m->at.inverse + DIM * DIM * (b * Q + q);
+            shape_gradients(m, b, q, n, shape[q]);
             w[q] = viscous_stress(m, b, q, n, ue, rate[b], strain0, &F, &S);
             EACH(i) EACH(j) B[q].a[i][j] = DOT(F.a[i], 1, F.a[j], 1);
             for (int k = 0; k < n; k++) {
-                lanes *v = shape[q] + DIM * k;
-                EACH(i) v[i] = DOT(A + i, DIM, g + DIM * k, 1);
+                const lanes *v = shape[q] + DIM * k;
                 EACH(i) push[q][DIM * k + i] = DOT(F.a[i], 1, v, 1);
                 EACH(i) traction[q][DIM * k + i] = DOT(S.a[i], 1, v, 1);
             }
