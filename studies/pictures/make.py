@@ -39,8 +39,7 @@ EXAMPLES = (
     "pressure stress whole status slide stiffness area tractions energies layers electrovibration hover "
 )
 EXAMPLES += (
-    "textures laws spectrum history rendered texture beside sweep map samples footprint "
-EXAMPLES += "insulator design edge"
+    "textures laws spectrum history rendered texture beside sweep map samples footprint insulator design edge"
 )
 for name in EXAMPLES.split():
     file = f"{name}.gif" if name == "slide" else f"{name}.png"
