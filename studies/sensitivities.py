@@ -14,7 +14,6 @@ needs (10), which counts what touches, and has no derivative.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -71,7 +70,7 @@ ASSUMPTIONS = {
 PAPER: dict[str, Printed] = {}
 
 
-def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+def main(quick: bool = False) -> Study:
     """Relative derivatives in three states, and both figures with their bands."""
     keys = QUICK if quick else tuple(KEYS)
     found, ends = relative(touching(quick), keys)
@@ -107,7 +106,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         lambda: draw(found, hovering, pressed),
         {"keys": keys, "depth_mm": DEPTH},
         {"What decides": decides(found)},
-    ).finish(out, quick)
+    )
 
 
 def touching(quick: bool) -> ev.Scene:

@@ -43,7 +43,7 @@ ROOMS = {
     ),
     "surface": (
         {"numpy", "scipy"},
-        "ways friction adhesion elastic surfaces relief textures usersurface pad skin",
+        "ways friction adhesion patches elastic surfaces relief textures usersurface pad skin",
     ),
     "contact": (
         {"numpy", "scipy"},

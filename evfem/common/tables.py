@@ -166,9 +166,9 @@ class Headed:
     def column(self, key: str, given: int | str, bases: Collection[str | None]) -> Floats:
         """A column by its name or its number from 1, in one of the units `bases`."""
         called = [*self.names, *map(str, range(1, len(self.names) + 1))]
-        if str(given).lower() not in called:
+        if (name := str(given).lower()) not in called:
             raise unknown(key, str(given), called, f"{quoted(given)}, which is no column")
-        i = called.index(str(given).lower()) % len(self.names)
+        i = called.index(name) % len(self.names)
         unit = self.units[i]
         base, factor = (None, 1.0) if unit is None else UNITS.get(unit, (unit, 1.0))
         if unit is not None and base not in bases:
@@ -206,16 +206,14 @@ def read_headed(
     it; other lines that begin with # or % are left out. Raises `InputError` with `key` for anything
     else, and for missing numbers without `gaps`.
     """
-    lines = [(n, line.strip(" \r")) for n, line in enumerate(_text(path, key, allowed).split("\n"), 1)]
-    lines = [(n, line) for n, line in lines if line]
+    text = enumerate(_text(path, key, allowed).split("\n"), 1)
+    lines = [(n, stripped) for n, line in text if (stripped := line.strip(" \r"))]
     plain = [(n, line) for n, line in lines if line[0] not in "#%"]
     found = (_numbers(_cells(line, _separator(line))) for _, line in plain)
     first = next((i for i, row in enumerate(found) if len(row) > 1 and np.isfinite(row).any()), None)
     if first is None:
-        start = lines[0][1] if lines else ""
-        raise InputError(
-            key, f"{path.name} without a line of numbers (it starts with {start[:40]!r})", allowed
-        )
+        start = lines[0][1][:40] if lines else ""
+        raise InputError(key, f"{path.name} without a line of numbers (it starts with {start!r})", allowed)
     rows, separator = plain[first:], _separator(plain[first][1])
     if len(rows) > MOST_ROWS:
         raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")

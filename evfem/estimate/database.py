@@ -201,8 +201,7 @@ def compute_database(
 
 def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
     """Both files of the database, by the pads beside them."""
-    rows: list[list[str]] = []
-    kernels: list[list[str]] = []
+    rows, kernels = list[list[str]](), list[list[str]]()
     for ridged in (False, True):
         textures = tuple(one for one in done if one.ridged == ridged)
         friction = np.array([[done[one].outputs[name] for name in CURVE] for one in textures], dtype=float)

@@ -65,32 +65,24 @@ def reduced(texture: Texture) -> Reduced:
     """
     if texture.quantity != "height":
         raise InputError("texture", f"{texture.name}, {texture.quantity}", "a texture of heights")
-    x, height = _even(texture)
+    size, start = int(np.clip(2 ** np.ceil(np.log2(texture.x.size)), 1024, 2048)), texture.x[0]
+    x = start + np.arange(size) * (texture.length / size)
+    height = np.interp(x, *texture.over(start, start + texture.length))
     if not np.ptp(height) > 1e-12:
         raise InputError("texture", f"{texture.name}, which is level", "heights that differ")
     height = height - height.mean()
-    length = texture.period or texture.length
     if texture.period is not None:
-        power = np.abs(np.fft.rfft(height))[1 : x.size // 4] ** 2
+        power = np.abs(np.fft.rfft(height))[1 : size // 4] ** 2
         second = np.zeros_like(power)
         second[: power.size // 2] = power[1::2][: power.size // 2]
         second = np.minimum(second, power)  # a harmonic, not a wave of its own that hides the first
-        found = [length / (1 + int(np.argmax(power + second)))]
+        found = [texture.period / (1 + int(np.argmax(power + second)))]
     else:
-        found = list(np.geomspace(length / 1.5, 8.0 * length / x.size, TRIED))
+        found = list(np.geomspace(texture.length / 1.5, 8.0 * texture.length / size, TRIED))
     tried = [_harmonics(x, height, wavelength) for wavelength in found]
     # of twice the wavelength the second harmonic is the wave itself
     first = [one for one in tried if np.hypot(one.in_phase, one.in_quadrature) <= 1.0]
     return max(first or tried, key=lambda one: one.explain)
-
-
-def _even(texture: Texture) -> tuple[Floats, Floats]:
-    """Heights at even spacing, 1024 or 2048 of them."""
-    size = int(np.clip(2 ** np.ceil(np.log2(texture.x.size)), 1024, 2048))
-    start = texture.x[0]
-    x = start + np.arange(size) * (texture.length / size)
-    rows = texture.over(start, start + texture.length)
-    return x, np.interp(x, *rows)
 
 
 def _harmonics(x: Floats, height: Floats, wavelength: float) -> Reduced:

@@ -192,15 +192,6 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
     return Scale(ONE_SIGN if middle is None else BOTH_SIGNS, low, high, extend)
 
 
-def shown_values(mesh: Mesh, frame: Frame, field: str, window: Window) -> Floats:
-    """Values inside a window (left, right, bottom, top in mm): of cells, nodes, or the pad's nodes."""
-    place, values = mesh.points + frame.displacement, values_of(frame, field)
-    if field in CELL_FIELDS:
-        return values[within(place[mesh.cells].mean(axis=1), window)]
-    there = within(place, window)
-    return values[there & np.isfinite(frame.gap)] if field in POINT_FIELDS else values[there]
-
-
 def within(place: Floats, window: Window) -> Any:
     """Points (N, 2) in the window, (N,) bool."""
     left, right, bottom, top = window

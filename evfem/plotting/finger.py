@@ -156,8 +156,12 @@ class View:
         return self.field
 
     def shown(self, window: fields.Window) -> Floats:
-        """The values inside a window."""
-        return fields.shown_values(self.result.mesh, self.frame, self.field, window)
+        """The values inside a window (left, right, bottom, top in mm): of cells, nodes or pad's nodes."""
+        place, values = self.points, fields.values_of(self.frame, self.field)
+        if self.field in fields.CELL_FIELDS:
+            return values[fields.within(place[self.result.mesh.cells].mean(axis=1), window)]
+        there = fields.within(place, window)
+        return values[there & np.isfinite(self.frame.gap)] if self.field in POINT_FIELDS else values[there]
 
     def draw(self, ax: Axes, window: fields.Window, scale: fields.Scale) -> Any:
         """Draw the view into axes, and return what a colour bar needs."""

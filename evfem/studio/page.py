@@ -77,10 +77,23 @@ def answer(state: State) -> dict[str, Any]:
     wish, felt = (np.interp(x, found.curve.x, one) for one in (found.curve.friction, found.felt))
     frequency, wished = spectrum_of(x, wish, state.touch.speed)
     given = spectrum_of(x, felt, state.touch.speed)[1]
-    layers = state.device.encoding.layers
+    layers, signal = state.device.encoding.layers, found.signal
     lost = {
-        "is slipperier than the display: it cannot be rendered": found.signal.share_not_renderable,
-        "is too fast for the amplifier": found.signal.share_limited,
+        "is slipperier than the display: it cannot be rendered": signal.share_not_renderable,
+        "is too fast for the amplifier": signal.share_limited,
+    }
+    warned = [f"{share:.0%} of the slide {text}" for text, share in lost.items() if share > LOST]
+    numbers = {
+        "rms": signal.rms,
+        "peak": signal.largest,
+        "carrier": signal.carrier,
+        "mean": float(curve.friction.mean()),
+        "range": float(np.ptp(curve.friction)),
+        "lost": float(found.lost.mean()),
+        "force_error": found.force_error,
+        "change_error": found.change_error,
+        "spectrum_error": found.spectrum_error,
+        "laws": float(layers.thickness / layers.reduced),
     }
     return {
         "quantity": state.texture.quantity,
@@ -96,12 +109,9 @@ def answer(state: State) -> dict[str, Any]:
         "frequency": _short(frequency),
         "wish": _short(wished),
         "given": _short(given),
-        "numbers": _numbers(found) | {"laws": float(layers.thickness / layers.reduced)},
+        "numbers": {name: None if value != value else value for name, value in numbers.items()},
         "bands": [[None if value != value else round(value, 6) for value in band] for band in found.bands],
-        "notes": [
-            *notes,
-            *(f"{share:.0%} of the slide {text}" for text, share in lost.items() if share > LOST),
-        ],
+        "notes": [*notes, *warned],
         "texture": repr(state.texture),
         "licence": state.texture.licence,
         "provenance": list(state.texture.provenance),
@@ -114,21 +124,6 @@ def _rendered(state: State) -> tuple[Rendering, tuple[str, ...]]:
     if state.exact is not None:
         return render_exact(found.curve, state.exact, state.touch, state.device), found.notes
     return render(found.curve, state.touch, state.device), found.notes
-
-
-def _numbers(found: Rendering) -> dict[str, float | None]:
-    told = {
-        "rms": found.signal.rms,
-        "peak": found.signal.largest,
-        "carrier": found.signal.carrier,
-        "mean": float(found.curve.friction.mean()),
-        "range": float(np.ptp(found.curve.friction)),
-        "lost": float(found.lost.mean()),
-        "force_error": found.force_error,
-        "change_error": found.change_error,
-        "spectrum_error": found.spectrum_error,
-    }
-    return {name: None if value != value else value for name, value in told.items()}
 
 
 def _short(values: Floats) -> list[float]:
@@ -157,11 +152,10 @@ def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
         path = Path(folder) / safe
         path.write_bytes(data)
         _, importer = importer_of(path)
-        known = {
-            key.name: _number(text) if float in key.types else text
-            for key in keys_of(importer)
-            if (text := options.get(key.name))
-        }
+        known: dict[str, Any] = {}
+        for key in keys_of(importer):
+            if text := options.get(key.name):
+                known[key.name] = _number(text) if float in key.types else text
         texture = read(importer, known | {"name": Path(safe).stem[:80] or "file"}, "")(path)
     if texture.quantity == "friction_spectrum":
         mean, rms = (_number(options.get(key) or usual) for key, usual in (("mean", "0.4"), ("rms", "0.02")))

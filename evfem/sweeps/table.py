@@ -128,20 +128,18 @@ class SweepResult:
         """
         if not all(isinstance(q, (int, float)) and 0.0 <= q <= 1.0 for q in quantiles):
             raise InputError("quantiles", quantiles, "numbers from 0 to 1")
-        names = self._numeric if columns is None else columns
-        found: dict[str, list[Any]] = {}
-        for name in names:
+        rows: list[dict[str, Any]] = []
+        for name in self._numeric if columns is None else columns:
             values = self[name]
             if isinstance(values, list):
                 raise InputError("columns", quoted(name), f"columns of numbers: {', '.join(self._numeric)}")
             values = values[~np.isnan(values)]
-            row = {"column": name, "unit": self.units.get(name, ""), "points": values.size}
+            row: dict[str, Any] = {"column": name, "unit": self.units.get(name, ""), "points": values.size}
             row["mean"] = np.mean(values) if values.size else math.nan
             row["deviation"] = np.std(values, ddof=1) if values.size > 1 else math.nan
             row |= {f"q{q:g}": np.quantile(values, q) if values.size else math.nan for q in quantiles}
-            for key, value in row.items():
-                found.setdefault(key, []).append(value)
-        return frame({key: np.array(values) for key, values in found.items()})
+            rows.append(row)
+        return frame({key: np.array([row[key] for row in rows]) for key in rows[0]} if rows else {})
 
     @property
     def _numeric(self) -> list[str]:

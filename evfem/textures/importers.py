@@ -82,11 +82,9 @@ class Image(Heights, kind="image"):
             raise InputError("file", f"{path.name}, {grey.shape[1]} x {grey.shape[0]} pixels", allowed)
         line = round(self.row * (grey.shape[0] - 1))
         height = grey[line] * self.depth
-        notes = [
-            f"Row {line + 1} of {grey.shape[0]}, {self.pixel:g} mm per pixel.",
-            numbers,
-            f"Heights are grey values, white set {self.depth:g} mm above black: they were not measured.",
-        ]
+        white = f"white set {self.depth:g} mm above black: they were not measured."
+        pixels = f"Row {line + 1} of {grey.shape[0]}, {self.pixel:g} mm per pixel."
+        notes = [pixels, numbers, f"Heights are grey values, {white}"]
         return self.heights(path, "image", np.arange(height.size) * self.pixel, height, notes)
 
 

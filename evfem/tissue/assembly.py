@@ -57,10 +57,6 @@ class VolumeMeasure:
             sampled = trace(H) if self.small_strain else np.log1p(volume_change(H))
         return projected(self.projection, sampled)
 
-    def at_samples(self, values: Floats) -> Floats:
-        """Transpose of Pi: what acts on theta (C, Q), gathered where ln J is sampled (C, S)."""
-        return gathered(self.projection, values)
-
     def slope(self, H: Floats) -> Floats:
         """d ln J / dF = F^-T, or the unit matrix of a trace, (dim, dim, C, S)."""
         unit = identity(len(H), 2)
@@ -72,7 +68,8 @@ class VolumeMeasure:
     @cached_property
     def to_gradient(self) -> Floats:
         """(C, S dim, n): displacements of one component to its gradient at the samples."""
-        return _flat_rows(self.gradient)
+        C, S, n, dim = self.gradient.shape
+        return np.swapaxes(self.gradient, 2, 3).reshape(C, S * dim, n)
 
     def push(self, H: Floats) -> Floats:
         """d ln J by the nodal displacements, (C, S, n, dim)."""
@@ -80,7 +77,7 @@ class VolumeMeasure:
 
     def pressure_forces(self, H: Floats, q: Floats) -> Floats:
         """Nodal forces (C, n, dim) of q dtheta(v), from grad u (dim, dim, C, S), weighted q (C, Q)."""
-        stress = (self.at_samples(q) * transpose(self.slope(H))).transpose(2, 3, 0, 1)
+        stress = (gathered(self.projection, q) * transpose(self.slope(H))).transpose(2, 3, 0, 1)
         return np.swapaxes(self.to_gradient, 1, 2) @ stress.reshape(len(q), -1, len(H))
 
     def rows(self, push: Floats) -> Floats:
@@ -92,7 +89,7 @@ class VolumeMeasure:
         """Second derivative of ln J, -F^-T grad(du)^T F^-T : grad v, times q (C, Q): (C, n, dim, n, dim)."""
         C, S, n, dim = push.shape
         flat = push.reshape(C, S, n * dim)
-        products = np.swapaxes(flat, 1, 2) @ (-self.at_samples(q)[..., None] * flat)
+        products = np.swapaxes(flat, 1, 2) @ (-gathered(self.projection, q)[..., None] * flat)
         return products.reshape(C, n, dim, n, dim).transpose(0, 1, 4, 3, 2)
 
 
@@ -134,12 +131,6 @@ def points_of(space: Space, cells: Ints, small_strain: bool = False) -> Points:
         space.points[:, cells],
         VolumeMeasure(sample, projection, small_strain),
     )
-
-
-def _flat_rows(gradient: Floats) -> Floats:
-    """Gradients (C, Q, n, dim) as (C, Q dim, n)."""
-    C, Q, n, dim = gradient.shape
-    return np.swapaxes(gradient, 2, 3).reshape(C, Q * dim, n)
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,7 +118,8 @@ class Dynamics:
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, space.dim))
         self._inner0, self._start, self.past = self.at_rest, self._v0, Past()
-        self._strain0: Any = None
+        self._strain0: Any = None  # what the stress counts from
+        self._strain_begun: Any = None
 
     def _masses(self) -> Floats:
         """Mass matrices per unit density (E, n, n)."""
@@ -146,19 +147,20 @@ class Dynamics:
             self.branches.begin(u, inner, step)
         if step == 0.0:
             return
-        self._start = self._begun(velocity)
-        if self.viscosity is not None:
-            self._strain0 = self._strain_before(u)
-            if self.loops is None:
-                self._damping.w.step, self._damping.w.strain0 = self._damped, self._strain0
-
-    def _begun(self, velocity: Floats) -> Floats:
-        """What the inertia has of the time before, over the mass (N, dim)."""
-        return velocity / self.step
-
-    def _strain_before(self, u: Floats) -> Any:
-        """The strain that the stress counts from, as `_strain`."""
-        return self._strain(u)
+        self.difference = Difference.over(step, self.past.seconds)
+        lag, self._start = self.difference.lag, velocity / step
+        if lag:
+            means, accelerations = self.past.rates
+            self._start = self._start + lag * (means / step + accelerations / self.difference.share)
+        if self.viscosity is None:
+            return
+        self._strain_begun = self._strain0 = self._strain(u)
+        if lag:
+            earlier = self._strain(u - self.past.seconds * means)
+            growth = (self._strain_begun - earlier) / self.past.seconds
+            self._strain0 = self._strain_begun + lag * self._damped * growth
+        if self.loops is None:
+            self._damping.w.step, self._damping.w.strain0 = self._damped, self._strain0
 
     @property
     def _damped(self) -> float:
@@ -215,7 +217,9 @@ class Dynamics:
         """Nodal velocities (N, dim) in mm/s at the end of the step; zero when no time passes."""
         if self.step == 0.0:
             return np.zeros_like(u)
-        return (u - self._u0) / self.step
+        mean = (u - self._u0) / self.step
+        lag = self.difference.lag
+        return self.difference.share * mean - lag * self.past.rates[0] if lag else mean
 
     def rates(self, u: Floats) -> Floats:
         """Mean velocities and accelerations (2, N, dim) over a step that ends at u, of tissue with mass."""
@@ -238,7 +242,7 @@ class Dynamics:
         """The share of the Kelvin-Voigt stress in `dissipation`."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
-        return self._damping_from(self._strain0, self.step, u)
+        return self._damping_from(self._strain_begun, self.step, u)
 
     def _damping_from(self, strain: Any, seconds: float, u: Floats) -> float:
         """Dissipation of strain that grows evenly to that of u in so many seconds."""
@@ -301,36 +305,10 @@ class Inertial(Dynamics, name="inertial"):
     def _masses(self) -> Floats:
         return without_pad(self.space, super()._masses())
 
-    def _begun(self, velocity: Floats) -> Floats:
-        self.difference = Difference.over(self.step, self.past.seconds)
-        begun = velocity / self.step
-        if lag := self.difference.lag:
-            means, accelerations = self.past.rates
-            begun = begun + lag * (means / self.step + accelerations / self.difference.share)
-        return begun
-
-    def _strain_before(self, u: Floats) -> Any:
-        self._strain_begun = strain = self._strain(u)
-        if not self.difference.lag:
-            return strain
-        earlier = self._strain(u - self.past.seconds * self.past.rates[0])
-        return strain + self.difference.lag * self._damped / self.past.seconds * (strain - earlier)
-
-    def velocity(self, u: Floats) -> Floats:
-        mean = super().velocity(u)
-        if self.step == 0.0 or not self.difference.lag:
-            return mean
-        return self.difference.share * mean - self.difference.lag * self.past.rates[0]
-
     def rates(self, u: Floats) -> Floats:
         if self.step == 0.0:
             return np.zeros((2, *u.shape))
         return np.stack([u - self._u0, self.velocity(u) - self._v0]) / self.step
-
-    def damping(self, u: Floats) -> float:
-        if self.step == 0.0 or self.viscosity is None:
-            return 0.0
-        return self._damping_from(self._strain_begun, self.step, u)
 
     def _damped_potential(self, u: Floats, way: Floats, places: Floats) -> Floats:
         if self.viscosity is None:

@@ -71,7 +71,9 @@ class Tissue:
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, dim); nan where a cell is inverted."""
         if self.loops is not None:
-            return self._looped(self.loops, u)[0]
+            out = np.zeros_like(u)
+            self.loops.forces(*self._request(u), out)
+            return out
         fe = np.empty((*self.space.nodes.shape, self.space.dim))
         for _, integral in self.regions:
             fe[integral.points.cells] = integral.cell_forces(u)
@@ -124,7 +126,7 @@ class Tissue:
     def energy(self, u: Floats) -> float:
         """Stored energy: N mm, in the plane per mm of depth."""
         if self.loops is not None:
-            return self._looped(self.loops, u)[1]
+            return float(self.loops.forces(*self._request(u), np.zeros_like(u))[0])
         total = 0.0
         for law, integral in self.regions:
             field = integral.field(u)
@@ -152,12 +154,6 @@ class Tissue:
     @cached_property
     def _moduli(self) -> tuple[Floats, Floats]:
         return padded(self.mu), padded(self.lmbda)
-
-    def _looped(self, loops: Any, u: Floats) -> tuple[Floats, float]:
-        """Nodal forces (N, dim) and stored energy by the compiled loops."""
-        out = np.zeros_like(u)
-        energy, _ = loops.forces(*self._request(u), out)
-        return out, energy
 
     def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
         """theta (E, Q) at u by the compiled loops, or its change along du (N, dim)."""
