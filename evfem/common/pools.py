@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
-from multiprocessing import Pipe, get_context, parent_process
+from multiprocessing import Pipe, current_process, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -26,7 +26,7 @@ from evfem.errors import InputError, quoted
 
 Pool = Callable[[Callable[[Any], Any], Mapping[Any, Any]], Iterator[tuple[Any, Any]]]
 
-GUARD = 'workers=1, or the call of sweep below if __name__ == "__main__": in a script'
+GUARD = 'workers=1, or the call below if __name__ == "__main__": in a script'
 
 
 class Died(Exception):
@@ -129,6 +129,8 @@ def _serve(line: Connection) -> None:
 @contextmanager
 def processes(workers: int) -> Iterator[Pool]:
     """A pool of at most so many processes, started when needed; InputError where none can start."""
+    if getattr(current_process(), "_inheriting", False):  # a worker imports a script without the guard
+        raise SystemExit  # the script itself says so below
     if parent_process() is not None:
         raise InputError("workers", "processes inside a process", GUARD)
     pool = _Processes(workers)
@@ -167,9 +169,9 @@ class _Processes:
             try:
                 worker.line.send((bool, None))
                 worker.line.recv()
-            except (EOFError, OSError) as error:
+            except (EOFError, OSError):
                 worker.end()
-                raise InputError("workers", f"{self.workers}, and no process can start", GUARD) from error
+                raise InputError("workers", f"{self.workers}, and no process can start", GUARD) from None
             self.proven = True
         return worker
 

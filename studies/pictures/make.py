@@ -38,7 +38,9 @@ OF_PAGES = {
 EXAMPLES = (
     "pressure stress whole status slide stiffness area tractions energies layers electrovibration hover "
 )
-EXAMPLES += "textures laws spectrum history rendered texture beside sweep map samples footprint"
+EXAMPLES += (
+    "textures laws spectrum history rendered texture beside sweep map samples footprint insulator design edge"
+)
 for name in EXAMPLES.split():
     file = f"{name}.gif" if name == "slide" else f"{name}.png"
     OF_PAGES[f"gallery-{file}"] = ("gallery.md", file)
