@@ -2,7 +2,7 @@
 
 Large systems are factorised in single precision, which takes half of the time and memory, and refined: the
 solution is that of double precision. Source: N. J. Higham, Accuracy and Stability of Numerical Algorithms,
-2nd ed., SIAM 2002, ch. 12 (iterative refinement).
+2nd ed., SIAM 2002, ch. 12 (iterative refinement), doi:10.1137/1.9780898718027.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ class ElasticLayer(Layered, Checked):
     """An elastic layer bonded to a rigid base: Young's modulus `E` in MPa, Poisson's ratio, thickness in mm.
 
     >>> gel = ElasticLayer(E=0.2, nu=0.48, thickness=2.0)
-    >>> gel.compliance([0.0, 0.1], [0.1, 0.1]).round(3)[0].tolist()      # mm per N/mm
+    >>> (gel.compliance([0.0, 0.1], [0.1, 0.1]).round(3) + 0.0)[0].tolist()      # mm per N/mm
     [8.806, 5.416, 0.0, -0.071]
     """
 
@@ -117,7 +117,7 @@ class ElasticStack(Layered):
     """Elastic layers bonded to one another, the first on top, the last to a rigid base.
 
     >>> coating, bulk = ElasticLayer(1.0, 0.3, 0.2), ElasticLayer(0.08, 0.48, 5.0)
-    >>> ElasticStack([coating, bulk]).compliance([0.0], [0.1]).round(2).tolist()[0]
+    >>> (ElasticStack([coating, bulk]).compliance([0.0], [0.1]).round(2) + 0.0).tolist()[0]
     [16.99, 0.0]
     """
 

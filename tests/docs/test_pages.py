@@ -2,7 +2,8 @@
 that it uses exist, what it lists is complete, it builds.
 
 A page's Python blocks run in order, in one namespace and a folder of their own. A `text` block after one is
-what it prints, `...` standing for anything. TOML blocks are scenes or sweeps, `evfem` lines in `sh` blocks
+what it prints, `...` standing for anything. TOML blocks are scenes, sweeps or
+sensitivities, `evfem` lines in `sh` blocks
 are understood by the command. `<!-- not run: reason -->` or `<!-- needs vtk -->` before a block says why it
 does not run here; `<!-- needs fast -->` that it takes minutes without PARDISO.
 """
@@ -13,6 +14,7 @@ import runpy
 import shlex
 import subprocess
 import sys
+import tomllib
 from contextlib import ExitStack
 from importlib import import_module
 from importlib.util import find_spec
@@ -24,7 +26,9 @@ import pytest
 import evfem
 from evfem import cli, studies
 from evfem.electrostatics.laws import FORCE_LAWS
+from evfem.response.file import SensitivityTable
 from evfem.scene import file as scenefile
+from evfem.scene import keys
 from evfem.scene.motion import Motion
 from evfem.simulation.result import COLUMNS
 from evfem.surface.friction import NamedFriction
@@ -80,7 +84,10 @@ def run(page, wanted, capsys):
         elif kind == "text" and printed is not None:
             assert doctest.OutputChecker().check_output(text, printed, FLAGS), f"{place}\n{printed}"
         elif kind == "toml":
-            (sweepfile if "\n[scene" in text else scenefile).loads(text, ".")
+            if "\nby = " in text:
+                keys.read(SensitivityTable, tomllib.loads(text), "")
+            else:
+                (sweepfile if "\n[scene" in text else scenefile).loads(text, ".")
         elif kind == "sh":
             understood(text)
 

@@ -115,7 +115,10 @@ def test_a_field_that_breaks_solids_down_is_doubted():
     [
         (ev.Press(indentation=6.0), "motion 0 presses 6 mm deep, but the bone is 4.9 mm above the skin"),
         (ev.Press(indentation=4.8), None),
-        (ev.Press(force=50.0), "motion 0 presses with 50 N/mm, 3 MPa over the whole finger: forces are in"),
+        (
+            ev.Press(force=50.0),
+            "motion 0 presses with 50 N/mm, 3 MPa over the whole finger: forces are in N/mm",
+        ),
         (ev.Press(force=10.0), None),
     ],
 )
