@@ -122,6 +122,12 @@ class Equations:
             state.contact_force[:, 1:] - self.old.contact_force[:, 1:]
         )
 
+    def held(self, state: State) -> State:
+        """The state whose nodes that slip nowhere stick: in space their slips have no direction."""
+        still = sizes(self._slip(state)) <= self.interface.tolerance * self.interface.length
+        status = np.where((state.status >= FORWARD) & still, STICK, state.status)
+        return state if state.bone.size == 2 else replace(state, status=status)
+
     def bound(self, state: State, place: Floats, way: Floats) -> Floats:
         """Bound of friction (P,) in N/mm at places (P, d) with slips of the size `way` (P,)."""
         return self.interface.limit(self.old, state, self.interface.jumps.at(place), way)

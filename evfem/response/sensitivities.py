@@ -181,7 +181,7 @@ class _Differentiated:
             return
         assert self.ledger.end is not None
         books, sums = (before[1], self.ledger.end), (before[0], self.ledger.sums)
-        part = Accepted(old, new, here.margins(new), span, pins.place.copy(), books, sums)
+        part = Accepted(old, here.held(new), here.margins(new), span, pins.place.copy(), books, sums)
         for line in self._followed:
             self._follow(line, part, here)
 
