@@ -29,7 +29,7 @@ WORK: Mapping[str, tuple[tuple[str, str, str], ...]] = {
     "solve": tuple(("newton.condensation", name, "forward backward") for name in ("Pardiso", "SuperLU")),
     "contact": (
         ("contact.condensed", "LinearContactStep", "solve"),
-        ("contact.condensed", "", "_inverse"),
+        ("contact.condensed", "", "inverse"),
         ("newton.interface", "Interface", "candidates obeyed shallowest_penetration contact_forces"),
         ("newton.linearisation", "Linearisation", "choose_candidates"),
     ),

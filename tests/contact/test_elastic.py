@@ -132,11 +132,14 @@ def test_two_layers_of_unlike_thickness_under_a_cylinder(below, half_width, expe
         assert one == pytest.approx(wanted, rel=off)
 
 
-@pytest.mark.slow  # the table of a stack 2500 times as thick as its upper layer
-@pytest.mark.parametrize(("half_width", "load"), [(0.5, 0.0037056526), (1.0, 0.0111773257)])
-def test_a_coated_half_plane_under_a_cylinder(half_width, load):
-    stack = ev.ElasticStack([ev.ElasticLayer(*COATED), ev.ElasticLayer(0.08, 0.48, 500.0)])
-    assert under_cylinder([stack], half_width)[0] == pytest.approx(load, rel=2e-5)
+@pytest.mark.slow
+def test_a_coated_half_plane_under_a_cylinder():
+    """What a finite depth H adds to the load falls with 1/H^2."""
+    loads = []
+    for depth in (25.0, 50.0):
+        stack = ev.ElasticStack([ev.ElasticLayer(*COATED), ev.ElasticLayer(0.08, 0.48, depth)])
+        loads.append(under_cylinder([stack], 1.0)[0])
+    assert (4.0 * loads[1] - loads[0]) / 3.0 == pytest.approx(0.0111773257, rel=2e-5)
 
 
 def grid(count, distance, seed=3):
