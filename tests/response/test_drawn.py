@@ -4,7 +4,9 @@ import pytest
 from tools.derivatives import rows_of
 
 
-@pytest.mark.parametrize("number", [4, 5, 10, pytest.param(62, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "number", [4, 10, *(pytest.param(number, marks=pytest.mark.slow) for number in (5, 62))]
+)
 def test_derivatives_of_a_drawn_scene_are_those_of_differences(number):
     rows = rows_of(43, number)
     assert [row["found"] for row in rows] == ["agrees"] * 3
