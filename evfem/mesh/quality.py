@@ -132,7 +132,8 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
             fault = f"neighbouring cells with different mid-nodes on {sharing}"
             refuse(fault, "one mid-node per edge" + (" and face" if mesh.dim == 3 else ""))
     cell, ones = np.repeat(np.arange(len(of_cell)), of_cell.shape[1]), np.ones(of_cell.size, dtype=np.int8)
-    table = coo_array((ones, (cell, of_cell.ravel())), shape=(len(of_cell), len(sides))).tocsr()
+    places = cell.astype(np.int32), of_cell.ravel().astype(np.int32)  # all that older scipy takes
+    table = coo_array((ones, places), shape=(len(of_cell), len(sides))).tocsr()
     parts, _ = connected_components(table @ table.T, directed=False)
     if parts > 1:
         refuse(f"{parts} separate parts", f"one body, its cells joined by common {side}s")
