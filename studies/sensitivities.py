@@ -1,7 +1,7 @@
 """Which of Table 2's parameters decide the forces, at rest, in partial and in full slip?
 
-The paper's ridged finger is pressed to a depth that gives about 0.05 N/mm, then slid: 0.1 mm, where a part
-of the contact slips, and 3 mm, where all of it does. Derivatives of normal and tangential force and of the
+The paper's ridged finger is pressed to a depth that gives about 0.05 N/mm, then slid: 0.6 mm, where a part
+of the contact slips, and 3 mm more, where all of it does. Derivatives of normal and tangential force and of the
 attraction are those of `ev.sensitivities`; a width of contact counts nodes, and is differenced between runs
 with a parameter 10 % smaller and larger. Expected: the indentation given, the soft layers decide the normal
 force; friction decides the tangential one in full slip alone, stiffness in partial slip; the voltage counts
@@ -114,7 +114,7 @@ def main(quick: bool = False) -> Study:
 def touching(quick: bool) -> ev.Scene:
     """The finger pressed, then in partial and in full slip."""
     finger = ev.FingerPad(ridges=not quick, resolution="coarse")
-    slides = (ev.Slide(0.1, steps=2), ev.Slide(3.0, steps=3))
+    slides = (ev.Slide(0.6, steps=4), ev.Slide(3.0, steps=3))
     motion = (ev.Press(indentation=DEPTH, steps=3), *slides)
     return ev.Scene(finger, paper_display(friction()), ev.Kaczmarek(), 1000.0, motion)
 
@@ -225,6 +225,9 @@ def _draw_hover(ax: Any, hovering: dict[str, Any]) -> None:
         ax.plot(place - 0.15, np.median(participants()[case]), "_", color="black", markersize=10)
         force, sd = 1e3 * OUT_OF_PLANE * np.array([one.result.electrostatic_force[-1], last_sd(one)])
         ax.errorbar(place + 0.15, force, sd, fmt="o", color=COLOURS["kaczmarek"], capsize=4)
+    ax.plot([], [], color=COLOURS["measured"], linewidth=5, label="median measured, its interval")
+    ax.errorbar([], [], [], fmt="o", color=COLOURS["kaczmarek"], capsize=4, label="computed, one sd")
+    ax.legend(fontsize="x-small", loc="lower right")
     ax.set_xticks(range(len(hovering)), list(hovering))
     ax.set(ylabel="force of Fig. 5 (mN)", ylim=(0.0, None), xlim=(-0.5, len(hovering) - 0.5))
 
