@@ -1,7 +1,7 @@
 """Which of Table 2's parameters decide the forces, at rest, in partial and in full slip?
 
 The paper's ridged finger is pressed to a depth that gives about 0.05 N/mm, then slid: 0.6 mm, where a part
-of the contact slips, and 3 mm more, where all of it does. Derivatives of normal and tangential force and of the
+of the contact slips, then 3 mm, where all of it does. Derivatives of normal and tangential force and of the
 attraction are those of `ev.sensitivities`; a width of contact counts nodes, and is differenced between runs
 with a parameter 10 % smaller and larger. Expected: the indentation given, the soft layers decide the normal
 force; friction decides the tangential one in full slip alone, stiffness in partial slip; the voltage counts
