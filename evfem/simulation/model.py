@@ -113,6 +113,8 @@ def make_model(scene: Scene) -> Model:
 def linearised(model: Model, state: State) -> Model:
     """The same with its tissue linear about `state`; contact, friction and attraction are as before."""
     scene, attraction, limits = model.scene, model.attraction, model.equilibrium.body.limits
+    if model.mesh.dim == 3:  # all of the skin would be kept, and was not tried
+        raise InputError("linearised", "a finger in three dimensions", "a finger in the plane")
     if scene.forms or model.body.dynamics is not None:
         given = "a form of its own" if scene.forms else f"dynamics = {scene.solver.dynamics}"
         raise InputError("linearised", f"a scene with {given}", "tissue without forms, at rest")

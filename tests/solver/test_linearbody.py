@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.domes import dome_scene
 
 import evfem as ev
 from evfem.simulation.run import Run
@@ -138,6 +139,9 @@ def test_what_is_not_linearised_is_refused():
     timed = ev.Scene(finger, ev.Flat(), motion=slow, solver=ev.Solver(dynamics="viscous"))
     with pytest.raises(ev.InputError, match="tissue without forms, at rest"):
         ev.loop(timed, linearised=True)
+    solid = dome_scene(ev.Press(indentation=0.05, steps=1))
+    with pytest.raises(ev.InputError, match="a finger in the plane"):
+        ev.loop(solid, linearised=True)
     loop = ev.loop(scene(ev.Display(), ev.Kaczmarek()), linearised=True)
     with pytest.raises(ev.InputError, match="largest_voltage"):
         loop.step(voltage=500.0)
