@@ -120,9 +120,10 @@ def run(place, *more):
 
 
 def replaced(path, **changes):
-    """The same archive with some arrays changed, its checksums right."""
+    """The same archive with some arrays changed or, where None, left out; its checksums right."""
     arrays = load_arrays(path, "checkpoint", CHECKPOINT_FORMAT)
-    save_arrays(path, arrays | {name.replace("__", "/"): a for name, a in changes.items()})
+    arrays |= {name.replace("__", "/"): a for name, a in changes.items()}
+    save_arrays(path, {name: array for name, array in arrays.items() if array is not None})
 
 
 def row_changed(path, change):
@@ -154,12 +155,25 @@ DAMAGES = {
     "another version": (lambda p: replaced(p, version=np.array("0.0.1")), NOT_OURS),
     "another scene": (lambda p: replaced(p, scene=np.array("0" * 64)), "another scene"),
     "no state": (lambda p: replaced(p, state__u=np.zeros(0)), "no usable u"),
+    "lacking": (lambda p: replaced(p, state__reaction=None), "no usable reaction"),
+    "another kind": (lambda p: replaced(p, state__status=np.zeros(25)), "no usable status"),
+    "node -1": (lambda p: replaced(p, state__candidates=np.array([-1, 2])), "no usable candidates"),
     "text": (lambda p: replaced(p, state__time=np.array("now")), "no usable time"),
     "not finite": (lambda p: replaced(p, state__time=np.array(np.nan)), "no usable time"),
     "nodes elsewhere": (lambda p: replaced(p, state__candidates=np.array([3, 9999])), "no usable candidates"),
     "nodes twice": (lambda p: replaced(p, state__candidates=np.array([3, 3])), "no usable candidates"),
     "status 7": (lambda p: replaced(p, state__status=np.full(25, 7)), "no usable status"),
     "part 0": (lambda p: replaced(p, state__substep=np.array(0.0)), "no usable substep"),
+    "part 1.5": (lambda p: replaced(p, state__substep=np.array(1.5)), "no usable substep"),
+    "column lost": (
+        lambda p: row_changed(p, lambda rows: [row.pop("min_gap") for row in rows]),
+        "of another version: with missing or unknown columns min_gap;",
+    ),
+    "column too many": (
+        lambda p: row_changed(p, lambda rows: [row.update(extra=1.0) for row in rows]),
+        "of another version: with missing or unknown columns extra;",
+    ),
+    "columns of a row": (lambda p: row_changed(p, lambda rows: rows[1].pop("min_gap")), "columns of row 2"),
     "no rows": (lambda p: row_changed(p, list.clear), "damaged"),
     "row lost": (lambda p: row_changed(p, lambda rows: rows.pop(2)), "damaged"),
     "row not finite": (lambda p: row_changed(p, lambda rows: rows[6].update(position=1e999)), "damaged"),

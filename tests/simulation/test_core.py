@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tools.meshes import both_sides, contact_block, graded, parabola
 
 import evfem as ev
-from evfem.mesh.mesh import Mesh
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*exceeds the load:UserWarning")
 
@@ -18,32 +18,15 @@ VOLTAGE = float(np.sqrt(2.0 * GAP * WORK / ev.eps_0))
 SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
 
 
-def graded(begin, end, first):
-    """Places that grow by 15 % a cell from `first` on."""
-    places = [0.0]
-    while places[-1] < end - begin:
-        places.append(places[-1] + first)
-        first *= 1.15
-    return begin + np.array(places) * (end - begin) / places[-1]
-
-
 def block(distance):
-    """The block, its nodes `distance` (mm) apart within 2.4 mm of its middle."""
-    even = 2.0 * distance * np.arange(round(1.2 / distance) + 1)
-    right = np.concatenate([even, graded(even[-1], 25.0, 2.0 * distance)[1:]])
-    x = np.concatenate([-right[:0:-1], right])
-    x, y = np.meshgrid(x, graded(0.0, 25.0, 2.0 * distance))
-    rows, columns = x.shape
-    low = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    cells = np.stack([low, low + 1, low + columns + 1, low + columns], axis=1)
-    sets = {"pad": np.arange(columns), "bone": np.arange(columns) + columns * (rows - 1)}
-    points = np.column_stack([x.ravel(), (y + x**2 / (2.0 * RADIUS) * (1.0 - y / 25.0)).ravel()])
-    return Mesh(points, cells, "quad", np.zeros(len(cells), dtype=int), {"block": 0}, sets)
+    """The block, its nodes `distance` (mm) apart within 2.4 mm of its middle once its cells are raised."""
+    x, y = (graded(fine, 2.0 * distance, 25.0, 1.15) for fine in (2.4, 0.0))
+    return contact_block(both_sides(x), y, 25.0, parabola(RADIUS), quadratic=False)
 
 
 def scene(motion, voltage, **solver):
     solver = {"core": "auto"} | solver
-    law = {"block": ev.LinearElastic(E=0.1, nu=0.3)}
+    law = {"tissue": ev.LinearElastic(E=0.1, nu=0.3)}
     finger = ev.MeshedFinger(block(0.1), law, electrical=SKIN)
     display = ev.Display(ev.Layer(GAP - 1e-7, 1.0), friction=0.0)  # and the skin
     return ev.Scene(finger, display, ev.StrongTroxel(), voltage, motion, solver=ev.Solver(**solver))
@@ -72,14 +55,6 @@ def test_every_way_leads_to_the_state_of_johnson_kendall_and_roberts():
     wide = np.linspace(1.0, 2.0, 1001)
     of_theory = np.interp(loads[0] / SCALE, wide**2 - np.sqrt(wide), wide)
     assert 0.5 * widths[0] == pytest.approx(of_theory, abs=said["edge"])
-
-
-def test_a_block_is_pulled_off_at_the_load_of_the_theory():
-    """3 (1/16)^(2/3) C: 0.472470 C."""
-    motion = [ev.Press(indentation=0.0, steps=1), ev.Press(indentation=-0.03, steps=30)]
-    pulled = simulated(motion, VOLTAGE)
-    assert pulled.contact_width[-1] == 0.0
-    assert -pulled.applied_force.min() / SCALE == pytest.approx(0.472470, rel=0.03)
 
 
 def pressed(friction=0.0, core="auto", law=None, voltage=100.0, **options):

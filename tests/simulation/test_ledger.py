@@ -287,23 +287,6 @@ def test_friction_dissipates_on_the_way_along_the_profile():
     assert (np.array(each) > 0.0).any()
 
 
-def test_what_is_given_is_stored_or_dissipated():
-    """With the columns of integrator and snaps, each of which has something in it here."""
-    result = run()[0]
-    given = result.external_work + result.electrostatic_work
-    kept = (
-        result.stored_energy
-        + result.kinetic_energy
-        + result.friction_dissipation
-        + result.viscous_dissipation
-        + result.integrator_dissipation
-        + result.snap_dissipation
-    )
-    np.testing.assert_allclose(given, kept, atol=1e-6 * np.abs(kept).max())
-    for name in ("integrator_dissipation", "snap_dissipation"):
-        assert np.abs(getattr(result, name)).max() > 1e-4 * np.abs(kept).max(), name
-
-
 def shares(state):
     """Left and right end of every pad node's share of the outline: 1/6, 4/6, 1/6 of each edge."""
     result, model, _ = run()
@@ -315,28 +298,6 @@ def shares(state):
             left[node] = min(left[node], a + begin * L)
             right[node] = max(right[node], a + finish * L)
     return left[model.pad.nodes], right[model.pad.nodes]
-
-
-def test_widths_of_contact_lie_between_the_last_node_that_touches_and_the_next():
-    result = run()[0]
-
-    def inner(_, state):
-        x, touching = positions(state)[:, 0], state.status > 0
-        return np.ptp(x[touching]) if touching.any() else 0.0
-
-    def outer(_, state):
-        x = np.sort(positions(state)[:, 0])
-        touching = np.isin(x, positions(state)[state.status > 0, 0])
-        beside = touching | np.append(touching[1:], False) | np.append(False, touching[:-1])
-        return np.ptp(x[beside]) if touching.any() else 0.0
-
-    least, most = column("contact_width", inner)[1], column("contact_width", outer)[1]
-    spacing = 0.5 * (np.array(most) - least)
-    assert (result.contact_width >= least - 0.5 * spacing).all()
-    assert (result.contact_width <= most - 0.5 * spacing).all()
-    assert (result.real_contact_width <= result.contact_width + 1e-12).all()
-    assert (result.contact_width[0], result.real_contact_width[0]) == (0.0, 0.0)
-    assert result.real_contact_width[-1] > 0.0
 
 
 def test_contact_pressures_are_nodal_forces_over_their_shares():

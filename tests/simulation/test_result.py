@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import sys
-import zipfile
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +12,6 @@ from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
 
 from evfem.errors import InputError, StorageError
-from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.history import MEANINGS, csv_header, csv_line
 from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, Result, load
 
@@ -70,68 +68,6 @@ def test_rows_with_a_missing_or_unknown_column_are_refused():
         Result.from_rows([{k: v for k, v in row.items() if k != "time"}], [], fake_result().mesh, {})
     with pytest.raises(InputError, match="'extra'"):
         Result.from_rows([row | {"extra": 1}], [], fake_result().mesh, {})
-
-
-def damaged(tmp_path, how):
-    """A file that is no result: `how` says in which way."""
-    path = tmp_path / "run.npz"
-    fake_result().save(path)
-    whole = path.read_bytes()
-    if how == "cut off":
-        path.write_bytes(whole[: len(whole) // 2])
-    elif how == "empty":
-        path.write_bytes(b"")
-    elif how == "text":
-        path.write_text("step,motion\n1,press\n")
-    elif how == "flipped":
-        middle = whole.index(b"NUMPY") + 130  # inside the text of the first array
-        path.write_bytes(whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :])
-    elif how == "one array":
-        with open(path, "wb") as file:
-            np.save(file, np.ones(3))
-    elif how == "foreign archive":
-        np.savez(path, a=np.ones(3))
-    elif how == "pickle":
-        np.savez(path, format=np.array([{"a": 1}], dtype=object))
-    elif how == "zip of text":
-        with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("format.npy", "evfem-result-1")
-    return path
-
-
-HOWS = ("cut off", "empty", "text", "flipped", "one array", "foreign archive", "pickle", "zip of text")
-
-
-@pytest.mark.parametrize("how", HOWS)
-def test_files_that_are_no_results_get_a_sentence(how, tmp_path):
-    path = damaged(tmp_path, how)
-    with pytest.raises(InputError) as caught:
-        load(path)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-def test_missing_files_and_missing_arrays_get_a_sentence(tmp_path):
-    with pytest.raises(InputError, match="does not exist"):
-        load(tmp_path / "nothing.npz")
-    fake_result().save(tmp_path / "run.npz")
-    with np.load(tmp_path / "run.npz") as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    np.savez(tmp_path / "less.npz", **{k: v for k, v in arrays.items() if k != "mesh/points"})
-    with pytest.raises(InputError, match=r"damaged.*mesh/points"):
-        load(tmp_path / "less.npz")
-    added = tuple(f"history/{name}" for name in ("integrator_dissipation", "snap_dissipation", "relaxations"))
-    np.savez(tmp_path / "older.npz", **{k: v for k, v in arrays.items() if k not in added})
-    older = load(tmp_path / "older.npz")
-    assert np.isnan([older.integrator_dissipation, older.snap_dissipation]).all()
-    assert not older.relaxations.any()
-    older.save(tmp_path / "older again.npz")
-    assert load(tmp_path / "older again.npz").relaxations.dtype.kind == "i"
-    assert older.time.tolist() == load(tmp_path / "run.npz").time.tolist()
-    arrays["frames/gap"] = arrays["frames/gap"][:, :-1]
-    np.savez(tmp_path / "short.npz", **arrays)
-    with pytest.raises(InputError, match="gap of shape"):
-        load(tmp_path / "short.npz")
 
 
 @pytest.mark.parametrize("lacking", COLUMNS)
@@ -288,33 +224,3 @@ def test_the_summary_says_the_end_over_the_depth_too():
     whole = result.total.summary()
     assert whole["units"]["force"] == "N"
     assert "total" not in whole
-
-
-def state():
-    return {"displacement": np.arange(6.0) / 7, "history": np.array([1, 2])}
-
-
-def test_a_checkpoint_comes_back_for_its_own_scene_alone(tmp_path):
-    point = Checkpoint(tmp_path / "checkpoint.npz")
-    rows = [fake_row(1) | {"voltage": np.float64(0.1), "substeps": np.int64(2)}, fake_row(2)]
-    point.write("a" * 64, state(), rows)
-    saved = point.read("a" * 64)
-    assert saved.rows == rows
-    assert list(saved.arrays) == ["displacement", "history"]
-    np.testing.assert_array_equal(saved.arrays["displacement"], np.arange(6.0) / 7)
-    with pytest.raises(InputError, match="another scene"):
-        point.read("b" * 64)
-
-
-def test_a_checkpoint_with_other_columns_is_refused_as_of_another_version(tmp_path):
-    point, rows = Checkpoint(tmp_path / "checkpoint.npz"), [fake_row(1), fake_row(2)]
-    point.write("a" * 64, state(), [{k: v for k, v in row.items() if k != "min_gap"} for row in rows])
-    with pytest.raises(InputError, match="of another version: with missing or unknown columns min_gap;"):
-        point.read("a" * 64)
-    point.write("a" * 64, state(), [row | {"extra": 1.0} for row in rows])
-    with pytest.raises(InputError, match="of another version: with missing or unknown columns extra;"):
-        point.read("a" * 64)
-    del rows[1]["min_gap"]
-    point.write("a" * 64, state(), rows)
-    with pytest.raises(InputError, match="damaged: columns of row 2"):
-        point.read("a" * 64)

@@ -8,11 +8,9 @@ from tools.builders import INSULATOR, balance, benchmark_scene, finger
 from tools.meshes import block
 
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
-from evfem.newton.strategy import Strategy
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import Output, Scene, Solver
-from evfem.simulation.result import COLUMNS, Saved
-from evfem.simulation.run import Run, simulate
+from evfem.scene.scene import Output, Scene
+from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -144,13 +142,8 @@ def _holding(hold):
 
 
 def test_rows_are_numbered_by_step_and_motion():
-    motion = [
-        Hover(0.1),
-        Press(indentation=0.2, steps=2),
-        Slide(-0.3, steps=3, speed=10.0),
-        Press(force=0.01, steps=1),
-    ]
-    result = run(Flat(), *motion, output=Output(every=3))
+    there = Hover(0.1), Press(indentation=0.2, steps=2), Slide(-0.3, steps=3, speed=10.0)
+    result = run(Flat(), *there, Press(force=0.01, steps=1), output=Output(every=3))
     assert result.step.tolist() == [1, 2, 3, 4, 5, 6, 7]
     assert result.motion_index.tolist() == [0, 1, 1, 2, 2, 2, 3]
     assert result.motion.tolist() == ["hover", "press", "press", "slide", "slide", "slide", "press"]
@@ -160,46 +153,6 @@ def test_rows_are_numbered_by_step_and_motion():
     assert [frame.step for frame in result.frames] == [3, 6, 7]
     assert (result.tangential_force[3:6] < 0).all()
     assert result.applied_force[-1] == pytest.approx(0.01, rel=1e-7)
-
-
-@pytest.mark.parametrize("at", [1, 3])
-def test_a_resumed_run_goes_on_with_everything(at):
-    """Viscous tissue, a voltage, steps in parts: all that the next step depends on is back at
-    once, and what follows is the same but for rounding, with the same number of iterations.
-    """
-    kept, rows = {}, []
-
-    class Observer:
-        def step(self, row, frame, checkpoint):
-            rows.append(row)
-            kept[row["step"]] = {name: np.copy(array) for name, array in checkpoint().items()}
-
-    motion = Press(indentation=0.4, steps=1, speed=20.0), Slide(0.3, steps=3, speed=20.0)
-    solver = Solver(dynamics="viscous", strategy=Strategy(iterations=4))
-    body = finger(block(8, 3, sag=0.4), viscosity=5e-3)
-    scene = Scene(body, Display(), Kaczmarek(), 2000.0, motion, solver=solver)
-    simulate(scene, observers=[Observer()])
-    saved = kept[at]
-    assert saved["time"] > 0.0
-    assert saved["factorised"]
-    assert saved["duration"] > 0.0
-    assert (saved["sums"][[0, 1, 3, 4, 5]] != 0.0).all()
-    assert not saved["sums"][[2, *range(6, saved["sums"].size)]].any()  # nothing adheres, snaps or leaks
-    assert np.abs(saved["internal_forces"]).max() > 1e-3
-    assert kept[1]["substep"] < 1.0
-    run = Run(scene, Saved(saved, rows[:at]))
-    again = run.checkpoint()
-    assert again.keys() == saved.keys()
-    for name, array in saved.items():
-        np.testing.assert_array_equal(again[name], array, err_msg=name)
-    for request in run.requests():
-        run.advance(request)
-        there, here = rows[len(run.rows) - 1], run.rows[-1]
-        for name in set(COLUMNS) - {"seconds", "motion"}:
-            assert here[name] == pytest.approx(there[name], rel=1e-11, abs=1e-15), name
-    for name, array in run.checkpoint().items():
-        rounding = 1e-11 * np.abs(array).max(initial=1e-3)
-        np.testing.assert_allclose(array, kept[4][name], atol=rounding, err_msg=name)
 
 
 def test_a_motion_begins_where_the_last_one_ended():

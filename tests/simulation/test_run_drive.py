@@ -8,7 +8,6 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.electrostatics import alternating_pressure, step_pressure
-from evfem.electrostatics.laws import eps_0
 
 SKIN = ev.Dielectric(1136.0, (), 2e-4)
 SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
@@ -134,26 +133,6 @@ def test_an_open_circuit_keeps_the_force_on_a_flat_pad_whatever_the_gap():
     np.testing.assert_allclose(found.voltage, expected, rtol=2e-6)
     with pytest.raises(ev.InputError, match="with a resolved drive"):
         replace(free, drive=None)
-
-
-def test_a_prescribed_charge_pulls_a_flat_pad_alike_at_every_gap():
-    """F = Q^2 / (2 eps_0 A), U = Q (g + s) / (eps_0 A); A shrinks by 4e-7 under the pull."""
-    mesh = block(8, 3)
-    flat = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(10.0, 0.3)}, ELECTRICAL)
-    motion = [ev.Hover(0.2, steps=1), ev.Hover(0.4, steps=1), ev.Wait(0.1, steps=2), ev.Hover(1.7, steps=1)]
-    drive = ev.Drive(skin=ev.Dielectric(1136.0), resolved=True)
-    held = ev.Scene(flat, SCREEN, ev.StrongTroxel(), ev.ChargeControl(0.05), motion, drive=drive)
-    found = ev.simulate(held)
-    width = float(np.ptp(mesh.points[mesh.node_sets["pad"], 0]))
-    charge = 0.05e-6  # C per m of depth, N/V
-    expected = charge**2 / (2.0 * eps_0 * width)
-    np.testing.assert_allclose(found.electrostatic_force, expected, rtol=1e-6)
-    np.testing.assert_allclose(found.electrostatic_force, found.electrostatic_force[0], rtol=1e-12)
-    gaps = np.array([0.2, 0.4, 0.4, 0.4, 1.7]) + 0.30 / 1136.0 + 0.001 / 3.9
-    np.testing.assert_allclose(found.voltage, charge * gaps / (eps_0 * width), rtol=1e-5)
-    np.testing.assert_allclose(found.field_energy, 0.5 * charge * found.voltage, rtol=1e-12)
-    with pytest.raises(ev.InputError, match="with a resolved drive"):
-        replace(held, drive=None)
 
 
 def test_another_law_tells_no_balance_of_the_source():

@@ -7,7 +7,7 @@ from tools.meshes import block
 
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.electrostatics.signals import VoltageProfile
-from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.scene import Scene
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Display
@@ -97,21 +97,6 @@ def tributary(mesh, displacement):
     for start, end, middle in mesh.sides_of("pad"):
         length[[start, end, middle]] += max(x[end] - x[start], 0.0) * np.array([1.0, 1.0, 4.0]) / 6.0
     return length
-
-
-def test_a_voltage_ramp_goes_in_equal_steps_and_back():
-    motion = [
-        Press(force=0.03, steps=2),
-        VoltageRamp(2000.0, steps=4, hold="force"),
-        VoltageRamp(0.0, steps=2),
-    ]
-    result = run(Display(friction=0.0), *motion, law=Kaczmarek())
-    np.testing.assert_allclose(result.voltage, [0.0, 0.0, 500.0, 1000.0, 1500.0, 2000.0, 1000.0, 0.0])
-    np.testing.assert_allclose(result.applied_force[1:6], 0.03, rtol=1e-7)
-    assert (np.diff(result.normal_force[1:6]) > 0).all()
-    # held at the indentation reached, without voltage: what a press to it needs
-    plain = run(Display(friction=0.0), Press(indentation=float(result.indentation[-1]), steps=1))
-    assert result.applied_force[-1] == pytest.approx(plain.applied_force[-1], rel=1e-7)
 
 
 def test_a_voltage_profile_follows_the_bone():

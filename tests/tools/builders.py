@@ -55,11 +55,12 @@ def balance(result):
 
 
 def left_over(result):
-    """The largest work or energy of any row that no column has, relative to the largest of all."""
+    """The largest work or energy that no column has, relative to the largest of its row (at least 1e-12)."""
     given = [result.external_work, result.electrostatic_work, result.adhesive_work]
     kept = [result.stored_energy, result.kinetic_energy, result.friction_dissipation]
     kept += [result.viscous_dissipation, result.integrator_dissipation, result.snap_dissipation]
-    return np.abs(np.sum(given, axis=0) - np.sum(kept, axis=0)).max() / np.abs(given + kept).max()
+    left = np.abs(np.sum(given, axis=0) - np.sum(kept, axis=0))
+    return (left / np.maximum(np.abs(given + kept).max(axis=0), 1e-12)).max()
 
 
 def resumed(scene, after, folder=None):
