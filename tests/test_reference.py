@@ -75,32 +75,6 @@ def test_bonded_layer_load_is_the_slope_of_its_energy(ratio, nu):
     assert (layer.pressure(np.linspace(-0.999, 0.999, 99)) > 0.0).all()
 
 
-@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
-@pytest.mark.parametrize("s", [0.01, 0.3, 1.0, 4.0])
-def test_compliance_of_the_bonded_layer_solves_the_equations_of_elasticity(s, nu):
-    # u = U sin kx, v = V cos kx, tau = T sin kx, sigma_y = S cos kx: U' = T/mu + k V, V' = (S - l k U)/(l +
-    # 2 mu), T' = k ((l + 2 mu) k U + l V'), S' = -k T; U = V = 0 below, T = 0, S = -1 on top (h = 1, k = s,
-    # mu = 1)
-    from scipy.linalg import expm
-
-    lam = 2.0 * nu / (1.0 - 2.0 * nu)
-    stiff = lam + 2.0
-    rate = np.array(
-        [
-            [0.0, s, 1.0, 0.0],
-            [-lam * s / stiff, 0.0, 0.0, 1.0 / stiff],
-            [s * s * (stiff - lam * lam / stiff), 0.0, 0.0, s * lam / stiff],
-            [0.0, 0.0, -s, 0.0],
-        ]
-    )
-    top = expm(rate)[:, 2:]
-    base_tractions = np.linalg.solve(top[2:], [0.0, -1.0])
-    depth = -(top[1] @ base_tractions)
-    modulus = plane_modulus(2.0 * (1.0 + nu), nu)
-    layer = BondedLayer(1.0, 1.0, 1.0, 2.0 * (1.0 + nu), nu)
-    assert 2.0 * layer._stiffening(np.array(s)) / (modulus * s) == pytest.approx(depth, rel=1e-9)
-
-
 def test_bonded_layer_from_its_load():
     layer = BondedLayer(half_width=1.3, thickness=0.8, radius=20.0, E=0.06, nu=0.48)
     again = BondedLayer.from_load(layer.load, 0.8, 20.0, 0.06, 0.48)
@@ -110,11 +84,6 @@ def test_bonded_layer_from_its_load():
 def test_tube_has_the_printed_number_and_rests_without_pressure():
     assert tube_pressure(1.5, 1.0, 2.0, 1.0) == pytest.approx(0.4282284091, abs=5e-11)
     assert tube_pressure(1.0, 1.0, 2.0, 1.0) == 0.0
-
-
-def test_tube_widens_like_a_linear_one_at_first():
-    # incompressible thick wall, Lame: p = 2 mu (u/A)(1 - A^2/B^2)
-    assert tube_pressure(1.0 + 1e-6, 1.0, 2.0, 5.0) == pytest.approx(2 * 5.0 * 1e-6 * 0.75, rel=1e-5)
 
 
 def test_tube_radius_is_the_inverse_of_the_pressure():
@@ -134,12 +103,6 @@ def test_cylinder_force_is_the_slope_of_the_capacitors_energy():
     slope = (energy(0.25 + h) - energy(0.25 - h)) / (2 * h)
     assert cylinder_force(0.25, 8.34, 2000.0) == pytest.approx(slope, rel=1e-6)
     assert cylinder_force(0.25, 8.34, 2000.0) == pytest.approx(0.906597e-3, abs=5e-10)  # N/mm
-
-
-def test_near_cylinder_is_the_sum_of_small_plate_capacitors():
-    # integral of eps_0 U^2 / (2 (d + x^2/2R)^2) = eps_0 U^2 pi sqrt(2R) / (4 d^1.5)
-    plates = eps_0 * 100.0**2 * math.pi * math.sqrt(2 * 8.0) / (4.0 * 1e-5**1.5)
-    assert cylinder_force(1e-5, 8.0, 100.0) == pytest.approx(plates, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -98,10 +98,6 @@ def test_a_file_that_comes_into_the_place_of_one_while_the_run_is_at_work_is_lef
     assert (tmp_path / "forces.png").read_text() == "mine"
 
 
-def listed(path):
-    return [name for name in (path / ".evfem-files").read_text().splitlines() if name]
-
-
 class Killed(BaseException):
     """As a kill: nothing after it is done, so that what is on disk stays as it is."""
 

@@ -1,6 +1,5 @@
 """The command in a terminal of 80 columns: a real pseudo-terminal, whose text is read as it arrives."""
 
-import io
 import os
 import pty
 import re
@@ -139,18 +138,6 @@ def test_a_plan_fits_wherever_it_is_printed():
     # hypodermis and nail of Table 2: E / (2 (1 + nu))
     assert f"shear moduli {0.034 / 2.96:.3g} to {17 / 2.6:.3g} MPa" in " ".join(shown)
     assert "every accepted step: residual below 1e-08 of the largest reaction" in shown[-1]
-
-
-def test_a_long_line_is_broken_between_words_in_a_terminal_alone(monkeypatch):
-    text = "mesh.vtu: " + "given a-very-long-name; " * 10
-    monkeypatch.setenv("COLUMNS", "80")
-    stream = io.StringIO()
-    assert notices.wrapped(text, stream) == text
-    stream.isatty = lambda: True
-    broken = notices.wrapped(text, stream).split("\n")
-    assert max(map(len, broken)) < 80
-    assert all(line.startswith("  ") for line in broken[1:])
-    assert " ".join(line.strip() for line in broken) == text.strip()
 
 
 STATUS = """

@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node, shifted
+from tools.steps import MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node
 
-from evfem.contact.signorini import FORWARD, OPEN, STICK
+from evfem.contact.signorini import FORWARD
 from evfem.contact.stability import SLOPES, StabilityRatio
-from evfem.newton.control import FollowFriction, GivenVoltage, Indentation, Target
+from evfem.newton.control import Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.interface import PenaltyInterface
 from evfem.newton.state import Folded, Limits, StepFailed
-from evfem.newton.strategy import Strategy
 from evfem.surface.friction import RateFriction
 from evfem.surface.surfaces import Flat
 
@@ -62,60 +61,6 @@ def test_an_outline_that_folds_over_itself_is_refused():
         accepted(interface, old, [replace(good, u=swapped), good])
 
 
-def test_iterates_that_are_never_right_fail_the_step():
-    interface, old, good = legal(FLAT)
-    drifted = shifted(good, node(STICK), 2.0 * TOLERANCE, 0)
-    with pytest.raises(StepFailed, match="no equilibrium in 2 iterations"):
-        accepted(interface, old, [drifted] * 3, (0.0, 0.0, 0.0))
-
-
-def wishing(force, x=0.1):
-    return Target(x, Indentation(0.0), FollowFriction(force, 1000.0))
-
-
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_wish_that_the_voltage_could_meet_is_not_passed_over(way):
-    """At 0 V more friction than wished for cannot be helped, less can. The reaction along x is the
-    friction that the bone feels.
-    """
-    interface, old, good = legal(FLAT)
-    good = replace(good, bone=np.array([0.1 * way, 0.0]), reaction=np.array([way * 0.1, -2.0]))
-    slack = TOLERANCE * 2.0
-    for missing, number in ((-10.0, 0), (0.5 * slack, 0), (2.0 * slack, 1)):
-        target = wishing(way * (0.1 + missing), 0.1 * way)
-        assert accepted(interface, old, [good, replace(good)], target=target) == number
-
-
-def test_a_voltage_that_is_kept_needs_a_pad_that_sticks():
-    """Where a wish cannot be met the old voltage is kept, but only as long as some node sticks."""
-    interface, old, good = legal(FLAT)
-    slipping = replace(good, status=np.where(good.status == STICK, OPEN, good.status))
-    u, force = good.u.copy(), good.contact_force.copy()
-    u[PAD.nodes[good.status == STICK], 1] += GAP
-    force[good.status == STICK] = 0.0
-    slipping = replace(slipping, u=u, contact_force=force)
-
-    class Helpless(FollowFriction):
-        """A wish that has no answer, and then the voltage as it was."""
-
-        def accepts(self, forward, reaction, slack):
-            return False
-
-        def fallback(self, old, found):
-            return GivenVoltage(old.voltage)
-
-    for state in (good, slipping):
-        script = Script([state, state], (0.0, 0.0, 0.0))
-        script.advance = lambda old, state, target, balance: state
-        equilibrium = Equilibrium(script, interface, None, Limits(TOLERANCE, Strategy(iterations=1)))
-        target = Target(0.0, Indentation(0.0), Helpless(1.0, 1000.0))
-        if state is good:
-            assert equilibrium.step(old, target) is good
-        else:
-            with pytest.raises(StepFailed, match="prescribed friction force"):
-                equilibrium.step(old, target)
-
-
 def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     """Displaced by dx, a node that slips at F(s), s = s0 + dx - C (F - F0), has dF/dx = F' / (1 + C
     F'); and what holds it at rest is the law's tangent there, however much the interface yields.
@@ -154,32 +99,3 @@ def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     # the motion by which the contact problem has the node at rest, and its whole force then
     dx = -(found.slip[k, 0] - found.interface_compliance[k, 1] * held)
     assert held + series * dx == pytest.approx(bound(slip) - steep * slip, rel=1e-4)
-
-
-def test_a_node_that_sticks_again_yields_and_slips_in_series():
-    """Displaced by dx it slips by s = dx + C (F - F0) under B + K s, or not at all under less: the
-    contact problem, which knows F + T dx with the growth T, says both.
-    """
-    interface, old, new = legal(FLAT, PenaltyInterface)
-    interface.penalties, law = (50.0, 2e3), RateFriction(speed=1.0, exponent=0.7)
-    k, nothing, every = node(STICK), np.zeros(PAD.nodes.size), np.arange(PAD.nodes.size)
-    normal, shear = new.contact_force[k]
-    length, give = PAD.length(MESH.points[PAD.nodes, 0])[k], interface.compliance(old)[k, 1]
-    # the force before is such that it sticks under these penalties
-    before = np.zeros_like(old.contact_force)
-    old = replace(old, age=nothing, contact_force=before)
-    before[k, 1] = shear + interface.candidates(old, new, every, nothing, nothing).slip[k, 0] / give
-    interface.law, interface.duration, steep = law, 2e-3, 0.7 / give
-    interface._oscillating.nodes[k], interface._oscillating._slope[k] = True, steep * interface.duration
-    found = interface.candidates(old, new, every, nothing, nothing)
-    rest = float(law.bound(normal / length, MU, 0.0, 0.0)) * length
-    growth, way = found.slip_stiffness[k], -np.sign(shear)
-    limit = found.friction[k] * normal + found.cohesion[k]
-    assert growth == pytest.approx(steep / 1.7, rel=1e-12)
-    for slip, force in ((0.0, 0.9 * rest), (1e-4, rest + 1e-4 * steep)):
-        dx = way * slip - give * (-way * force - shear)
-        taken = -way * force + growth * dx  # what of the force is left to the contact problem
-        seen = found.slip[k, 0] + dx + found.interface_compliance[k, 1] * taken
-        assert seen == pytest.approx(1.7 * way * slip, abs=1e-12)
-        assert (abs(taken) == pytest.approx(limit, rel=1e-9)) == (slip > 0.0)
-        assert abs(taken) <= limit * (1.0 + 1e-9)

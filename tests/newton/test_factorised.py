@@ -7,13 +7,10 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
-from evfem.contact.signorini import FORWARD, OPEN
-from evfem.contact.stability import StabilityRatio
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.newton.anderson import Anderson
 from evfem.newton.control import FollowFriction, Force, GivenVoltage, Indentation, Target
-from evfem.newton.factorised import FactorisedBody
-from evfem.scene.motion import Hover, Press, VoltageRamp
+from evfem.scene.motion import Hover, Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
@@ -105,16 +102,6 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)
 
 
-@pytest.mark.parametrize("travel", [25.0, 2500.0])
-def test_the_rounding_of_forces_is_that_of_a_rigid_travel(pressed, travel):
-    """No force changes where a body moves as a whole: what does is rounding, and counts as such."""
-    body, state, _ = pressed
-    body.linearisation.factorise(state)
-    way = np.array([travel, 0.0])
-    rounding = np.abs(body.body.forces(state.u + way) - body.body.forces(state.u)).max()
-    assert rounding < body._rounding(replace(state, bone=state.bone + way)) < 1e3 * rounding
-
-
 def test_forces_that_are_rounding_of_the_attraction_are_no_imbalance(pressed, monkeypatch):
     """Contact carries the attraction, so the force on the bone may be much smaller than both."""
     body, accepted, target = pressed
@@ -126,27 +113,6 @@ def test_forces_that_are_rounding_of_the_attraction_are_no_imbalance(pressed, mo
     rounding = 1e-3 * pulled / body.limits.tolerance
     assert rounding > reaction
     assert residual(pressed, moved) == pytest.approx(off * reaction / rounding, rel=1e-12)
-
-
-def test_an_iterate_of_a_scaled_down_attraction_is_not_mixed(monkeypatch):
-    """It is a part of the way to where it leads, and its residual no step of the map that is mixed."""
-    mix, solve, scaled, mixed = Anderson.next_iterate, FactorisedBody._solve, [], []
-
-    def solved(self, step):
-        found = solve(self, step)
-        scaled.append(found.reduced)
-        return found
-
-    def next_iterate(self, before, after):
-        mixed.append(scaled[-1])
-        return mix(self, before, after)
-
-    monkeypatch.setattr(FactorisedBody, "_solve", solved)
-    monkeypatch.setattr(Anderson, "next_iterate", next_iterate)
-    simulate(Scene(ROUND, Display(), Kaczmarek(), 0.0, [Hover(gap=0.005), VoltageRamp(6000.0, steps=1)]))
-    assert any(scaled)
-    assert mixed
-    assert not any(mixed)
 
 
 @pytest.mark.parametrize(("squeeze", "taken"), [(0.9, True), (0.96, False), (1.2, False)])
@@ -181,18 +147,3 @@ def test_a_combination_of_iterates_whose_bone_leaves_is_not_taken(pressed, monke
         balance = body.balance(state, state.attraction, asked)[1]
         after = body.advance(state, begun, asked, balance)
         assert np.array_equal(after.u, combined.u) == moved
-
-
-def test_a_finger_leaves_an_equilibrium_only_by_the_tangent_there(pressed, monkeypatch):
-    """An older one may say that slopes win where the finger is held."""
-    body, state, _ = pressed
-    frame = replace(body.interface.surface_at(state), curvature=np.full((state.status.size, 1, 1), -1.0))
-    monkeypatch.setattr(body.interface, "surface_at", lambda state: frame)
-    slipping = replace(state, status=np.where(state.status == OPEN, OPEN, FORWARD))
-
-    def pushed_out(old, state, target):
-        return None if body.linearisation.made_at(slipping) else StabilityRatio(1.03, "slopes")
-
-    monkeypatch.setattr(body, "_pushed_out", pushed_out)
-    body.linearisation.factorise(replace(state, u=state.u.copy()))
-    assert body.leaves(state, slipping, None) is None

@@ -1,7 +1,5 @@
 """A spring, a damper and a mass between drive and bone, against what they do by themselves."""
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,7 +8,6 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.errors import InputError
-from evfem.newton.hand import HandControl
 from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
 
@@ -132,20 +129,6 @@ def test_the_period_of_stick_slip_is_that_of_a_mass_on_a_spring():
     assert again == pytest.approx(second, abs=0.02)
 
 
-@pytest.mark.parametrize("dynamics", ["viscous", "inertial"])
-def test_a_finger_with_time_of_its_own_goes_with_a_hand(dynamics):
-    pad = ev.FingerPad(ridges=False, resolution="coarse", viscosity=1e-3)
-    motion = [ev.Press(force=0.05, steps=2), ev.Slide(0.3, steps=6, speed=20.0, hold="force")]
-    scene = ev.Scene(
-        pad, ev.Flat(friction=0.4), motion=motion, hand=ev.Hand(0.2, 1e-4, 1e-7),
-        solver=ev.Solver(dynamics=dynamics), output=OUTPUT, friction_law=ev.RateFriction(20.0, ratio=1.2),
-    )  # fmt: skip
-    result = ev.simulate(scene)
-    assert left_over(result) < 1e-6
-    assert 0.0 < result.position[-1] < 0.3
-    assert result.substeps.max() == 1
-
-
 def test_a_scene_file_says_it_and_what_cannot_be_is_refused():
     scene = ev.Scene(
         coarse_pad(), ev.Flat(), motion=[ev.Press(force=0.05), slid(1.0, 5)], hand=ev.Hand(0.1, mass=1e-7)
@@ -174,22 +157,6 @@ def test_the_hand_of_a_finger_has_the_published_slopes():
     assert hand.stiffness / (2.0 * np.pi * hand.damping) == pytest.approx(13.8 * 50.0)
     with pytest.raises(ev.InputError, match="speed"):
         ev.Hand.of_finger(0.0)
-
-
-def test_what_a_hand_lacks_beyond_its_rounding_is_nothing_at_the_nearest_place_alone():
-    """Against exact fractions: at the double next to the place where spring and mass balance a force
-    nothing is missing, and a few doubles further something is.
-    """
-    rng, k, m, dt = np.random.default_rng(3), Fraction(K), Fraction(M), Fraction(1e-7)
-    for x0, v0, R in rng.uniform([1.0, -90.0, -1.0], [2.0, 90.0, 1.0], (50, 3)).tolist():
-        grip = HandControl(ev.Hand(K, 0.0, M), 1.5, 1e-7, (1.5, x0, v0))
-        rate = m / dt**2
-        exact = (k * Fraction(1.5) + rate * (Fraction(x0) + Fraction(v0) * dt) - Fraction(R)) / (k + rate)
-        x, reaction = float(exact), np.array([R, 0.0])
-        assert grip.unbalanced(x, reaction) == 0.0
-        for way in (-1.0, 1.0):
-            beyond = grip.unbalanced(x + way * 16.0 * np.spacing(x), reaction)
-            assert 0.0 < beyond < abs(grip.missing(x + way * 16.0 * np.spacing(x), reaction))
 
 
 @pytest.mark.filterwarnings("ignore:motion . has steps of")

@@ -12,7 +12,7 @@ from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.roughness import PowerRoughness
 from evfem.newton.condensation import Singular
-from evfem.newton.linearisation import limited_gain, no_progress
+from evfem.newton.linearisation import no_progress
 from evfem.newton.state import StepFailed
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
@@ -130,69 +130,6 @@ def test_a_singular_tangent_is_a_failed_step():
 
 # -- how long it is kept ---------------------------------------------------------------------------------
 
-#: relative residuals, tolerance 1e-8, and whether patience 8 wants a new factorisation
-HISTORIES = [
-    ([1.0], False),
-    ([1e-2, 1e-3], False),  # five more tenths
-    ([1e-2, 4e-3], True),  # fourteen more
-    ([1e-3, 6e-4], True),  # stalls
-    ([1e-3, 2e-3], True),  # grows
-    ([10.0, 0.2], True),  # still far away, however quick
-    ([2e-8, 9e-9], False),  # there
-    ([0.0, 0.04], True),  # grows from a balanced start
-    ([0.0, 0.0], False),  # balanced, contact not settled
-]
-
-
-@pytest.mark.parametrize(("history", "anew"), HISTORIES)
-def test_a_factorisation_is_kept_while_few_iterations_are_left(history, anew):
-    linear, _, state = made(solver=Solver(tolerance=1e-8))
-    linear.choose_candidates(state, 0.2)
-    assert linear.refactorise_if_needed(state, history)  # there is none
-    assert linear.refactorise_if_needed(state, history) == anew
-    assert linear.record.factorisations == 1 + anew
-    linear.factor = None
-    assert linear.reusable is None
-    assert linear.refactorise_if_needed(state, history)
-
-
-@pytest.mark.parametrize(("factor", "anew"), [(0.6, True), (0.7, False), (1.4, False), (1.6, True)])
-def test_another_time_step_asks_for_a_new_factorisation(factor, anew):
-    body = replace(ROUND, viscosity=0.01)
-    scene = Scene(
-        body, Display(y=-0.1), motion=[Press(indentation=0.1, speed=1.0)], solver=Solver(dynamics="viscous")
-    )
-    model = make_model(scene)
-    linear, state = model.equilibrium.body.linearisation, model.equilibrium.rest(np.zeros(2), 0.0)
-    linear.choose_candidates(state, 0.2)
-    linear.start_clock(state, 1e-3)
-    linear.factorise(state)
-    linear.start_clock(state, factor * 1e-3)
-    assert model.body.dynamics.step == factor * 1e-3
-    assert linear.refactorise_if_needed(state, [1.0]) == anew
-
-
-@pytest.mark.parametrize("how", ["air", "no air", "frozen"])
-def test_a_resumed_run_makes_the_same_factorisation_again(how):
-    """To the last bit; who touched then carries the attraction where there is no air."""
-    options = {"voltage": 2e5, "air_layer": how != "no air"}
-    linear, model, state = made(**options)
-    state = bent(model, state)
-    linear.begin(
-        replace(state, status=np.where(np.arange(state.status.size) % 2, STICK, OPEN)), how == "frozen"
-    )
-    linear.choose_candidates(state, 0.6)
-    linear.factorise(state)
-    at, before = linear.reusable, linear.tangent
-    again, _, _ = made(**options)
-    again.candidates = linear.candidates
-    again.restore(at)
-    np.testing.assert_array_equal(again.tangent.schur, before.schur)
-    np.testing.assert_array_equal(again.tangent.compliance, before.compliance)
-    # which is that of the voltage, but where it is frozen
-    again.restore(replace(at, state=replace(at.state, voltage=1e5)))
-    assert np.array_equal(again.tangent.compliance, before.compliance) == (how == "frozen")
-
 
 # -- the attraction's part -------------------------------------------------------------------------------
 
@@ -223,60 +160,6 @@ def test_fall_and_closing_are_those_of_the_law(law, surface):
     assert np.abs(closing[~free]).max() < 1e-9 * closing.max()
 
 
-@pytest.mark.parametrize(("direction", "neighbours"), [("vertical", 1e-6), ("normal", 5e-3)])
-def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_axes(direction, neighbours):
-    """The change of the force on a sloped surface per contact force, by central differences, turned into
-    the frames of the nodes; and what is lost with the contact force. Along the normal of the surface
-    a potential also pushes the neighbours apart, which is left out.
-    """
-    rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
-    wave = Sinusoid(terms=[[0.15, 2.0, 0.4]], y=-0.2, insulator=THIN)
-    linear, model, state = made(
-        wave, voltage=60.0, law=StrongTroxel(), direction=direction, roughness_gap=rough
-    )
-    pressing = 0.002 + 0.001 * np.arange(state.status.size)
-    force = np.column_stack([pressing, np.zeros_like(pressing)])
-    state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
-    place, surface = model.equilibrium.interface.resting(state), linear.interface.surface_at(state)
-    slope = surface.slope[:, 0]
-
-    def pull(pressed):
-        x, y = model.attraction.forces(place, 60.0, linear.touching, pressed).T
-        along_normal, along_tangent = y - slope * x, x + slope * y
-        return np.stack([along_normal, along_tangent], axis=1) / surface.stretch[:, None]
-
-    found, h = linear.roughness(state), 1e-6
-    assert np.abs(slope).max() > 0.1
-    gain = -(pull(pressing + h) - pull(pressing - h)) / (2.0 * h)
-    np.testing.assert_allclose(found.gain, gain, atol=neighbours * gain.max())
-    loss = pull(0.0 * pressing) - pull(pressing)
-    np.testing.assert_allclose(found.loss_on_opening, loss, atol=neighbours * loss.max())
-    np.testing.assert_array_equal(found.present, pressing)
-    assert 0.01 < found.gain.max() < STABLE
-
-
-def test_beyond_a_fold_the_tangent_repels_and_before_it_is_exact():
-    """The scalar problem f(p) = p - 2 sqrt(p) + b folds at p = 1, where the gain 1 / sqrt(p) is 1. An
-    iteration with the limited gain comes fast to the upper root, from below the fold too, and leaves
-    the lower one.
-    """
-
-    def followed(p, b):
-        for count in range(1, 200):
-            step = -(p - 2.0 * np.sqrt(p) + b) / (1.0 - limited_gain(np.array([p**-0.5]))[0])
-            p = max(p + step, 1e-3)
-            if abs(step) < 1e-10:
-                return p, count
-        return p, count
-
-    for b in (0.999, 0.9, 0.0):
-        low, high = (1.0 - np.sqrt(1.0 - b)) ** 2, (1.0 + np.sqrt(1.0 - b)) ** 2
-        for begin in (1.01 * low + 1e-2, 1.0, high + 1.0):
-            p, count = followed(begin, b)
-            assert p == pytest.approx(high, rel=1e-8)
-            assert count < 40
-
-
 def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_it():
     """The same wave at twenty times the voltage: most gains are above 0.9 now."""
     rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
@@ -297,33 +180,6 @@ def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_i
     np.testing.assert_allclose(tangent[held], slope[held] * normal[held], rtol=1e-12)
 
 
-@pytest.mark.parametrize("direction", ["vertical", "normal"])
-def test_the_coupling_knows_lengths_but_not_the_nodes_own_gaps(direction):
-    """Over level ground the stiffness that the attraction adds vanishes for a pad that slides as a
-    whole; its weakening with a node's own gap belongs to the contact problem.
-    """
-    linear, model, state = made(voltage=2e5, body=FINE, direction=direction)
-    x = model.mesh.points[model.pad.nodes, 0]
-    linear.candidates = c = np.flatnonzero(np.abs(x) < 1.0)
-    linear.factorise(state)
-    tangent = linear.tangent
-    coupling = tangent.schur[:-2, :-2] - np.linalg.inv(tangent.compliance)
-    size = np.abs(coupling).max()
-    assert size > 1e-3 * tangent.schur.max()
-    np.testing.assert_allclose(coupling[:, 0::2].sum(axis=1), 0.0, atol=1e-7 * size)
-    np.testing.assert_allclose(np.diagonal(coupling)[1::2], 0.0, atol=1e-7 * size)
-    # between neighbours, a middle of an edge and its end, it is the derivative of the attraction
-    j, k = (int(np.argmin(np.abs(x - place))) for place in (0.05, 0.1))
-    place, nobody = linear.interface.positions(state.u), np.zeros(state.status.size, dtype=bool)
-    step = np.zeros_like(place)
-    step[k, 0] = 1e-6
-    ahead, behind = (model.attraction.forces(place + s * step, 2e5, nobody) for s in (1, -1))
-    row, column = (int(np.flatnonzero(c == node)[0]) for node in (j, k))
-    found = coupling[2 * row : 2 * row + 2, 2 * column]
-    np.testing.assert_allclose(found, (ahead - behind)[j] / 2e-6, atol=1e-5 * size)
-    assert np.abs(found).max() > 0.1 * size
-
-
 @pytest.mark.parametrize("how", ["no law", "no voltage", "frozen"])
 def test_an_attraction_that_does_not_change_has_no_part(how):
     linear, _, state = made() if how == "no law" else made(voltage=500.0)
@@ -335,20 +191,6 @@ def test_an_attraction_that_does_not_change_has_no_part(how):
     linear.choose_candidates(state, 0.6)
     linear.factorise(state)
     np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)
-
-
-def test_what_the_deepest_press_may_reach_is_chosen_at_once():
-    """The outline is a parabola: what lies 0.8 mm above its lowest point is reached by that much."""
-    steep, surface, chosen = finger(block(40, 2, sag=1.5)), Display(y=-0.1, insulator=INSULATOR), []
-    for motion in ([Press(indentation=0.1), Press(indentation=0.8)], [Press(force=0.1)]):
-        model = make_model(Scene(steep, surface, motion=motion))
-        linear = model.equilibrium.body.linearisation
-        linear.choose_candidates(model.equilibrium.rest(np.zeros(2), 0.0), 0.101)
-        chosen.append(set(linear.candidates))
-    height = model.mesh.points[model.pad.nodes, 1]
-    inside = set(np.flatnonzero(height - height.min() <= 0.8))
-    assert inside <= chosen[0]
-    assert not inside <= chosen[1]
 
 
 # -- the field's own stiffness ---------------------------------------------------------------------------

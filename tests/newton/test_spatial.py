@@ -173,45 +173,6 @@ def test_what_is_attracted_more_than_a_body_holds_is_a_candidate(stiff, many):
     assert (steep.size > 0.2 * model.pad.free.sum()) == many
 
 
-class Kept:
-    """A condensation that keeps what it is given."""
-
-    def __init__(self, size):
-        self.schur = np.eye(size)
-
-    def factorise(self, upper):
-        self.upper = upper
-
-
-@pytest.mark.parametrize("voltage", [100.0, 4000.0])
-def test_the_tangent_knows_how_the_attraction_of_open_nodes_weakens(voltage):
-    """As far as any body holds it: twice the shear modulus over the height, 2 mm, on a node's area."""
-    display = ev.Display(y=-0.02, insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
-    body, model, state = at_rest(voltage, display)
-    linear = body.linearisation
-    linear.begin(state, False)
-    linear.choose_candidates(state, 0.0)
-    linear.candidates = linear.candidates[:1]
-    upper = []
-    for linear.frozen in (True, False):  # a frozen attraction has no stiffness
-        linear.factor = Kept(6)
-        linear.factorise(state)
-        upper.append(linear.factor.upper.copy())
-    taken = np.zeros(body.body.pattern.size)
-    taken[:] = (upper[0] - upper[1])[body.body.pattern.diagonal]
-    rate, area = (
-        linear.negative_stiffness(state),
-        model.pad.tributary(model.equilibrium.interface.positions(state.u)),
-    )
-    most = 2.0 * model.scene.finger.law.shear_modulus / 2.0 * area
-    expected = np.where(model.pad.free, np.minimum(rate, most), 0.0)
-    expected[linear.candidates] = 0.0
-    assert ((rate > most)[expected > 0.0]).any() == (voltage > 1000.0)
-    at = body.body.unknowns[model.pad.nodes[expected > 0.0]]
-    assert_allclose(taken[at[:, 1]], expected[expected > 0.0], rtol=1e-6)
-    assert_allclose(taken[at[:, [0, 2]]], 0.0, atol=1e-12)
-
-
 # -- each condition under every law, where all others hold ------------------------------------------------
 
 LAWS = {
@@ -274,9 +235,3 @@ def test_contact_does_not_pull(normal, obeys):
     """Without friction, so that no cone is broken beside it."""
     interface, old, new, _ = touching(ev.Flat(friction=0.0), [normal, 0.0, 0.0], MOVED, SLIP)
     assert interface.obeyed(old, new) is obeys
-
-
-def test_attraction_in_space_is_vertical():
-    result = ev.simulate(dome_scene(ev.Press(indentation=0.05, steps=1)))
-    assert result.electrostatic_force[0] > 0.0
-    assert not result.electrostatic_force_x.any()

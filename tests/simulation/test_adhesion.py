@@ -211,10 +211,7 @@ FULL = {"law": ev.StrongTroxel(), "voltage": 10.0, "field": "full"}
         (lambda: ev.Dugdale(stress=-1.0, reach=0.01), r"adhesion\.stress"),
         (lambda: ev.Capillary(0.07, 90.0, 0.01), r"adhesion\.contact_angle"),
         (lambda: scene_of(adhesion=0.1), "Dugdale, Capillary"),
-        (
-            lambda: scene_of(adhesion=MOIST, law=ev.StrongTroxel(), voltage=10.0, field="full"),
-            "full with adh",
-        ),
+        (lambda: scene_of(ev.Display(), adhesion=MOIST, **FULL), "full with adhesion"),
     ],
 )
 def test_what_is_no_adhesion_is_refused(make, message):

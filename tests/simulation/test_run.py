@@ -4,17 +4,26 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, balance, benchmark_scene, finger
+from tools.builders import INSULATOR, balance, benchmark_scene, coarse_pad, finger, resumed
 from tools.meshes import block
 
+from evfem import ElasticLayer, Hand
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
-from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import Output, Scene
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.result import COLUMNS
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Display, Flat, Sinusoid
+from evfem.tissue.laws import NeoHookean
 
 ROUND = finger(block(8, 3, sag=0.4))
 PRESS_AND_SLIDE = (Press(indentation=0.3, steps=3), Slide(0.4, steps=4))
+IN_TIME = (
+    Press(indentation=0.2, steps=2, speed=100.0),
+    Slide(0.3, steps=3, speed=50.0, hold="force"),
+    Wait(0.02, steps=2, spacing="log", hold="force"),
+)
 
 # Reference values of the benchmark (N/mm): F_n at 0.5, 1.0, 1.5 mm, and in B after a slide of 3 mm: F_n, F_t;
 # F_t at slides of 0.1 and 0.5 mm; extrapolated from quadratic elements of two other packages that agree
@@ -153,6 +162,35 @@ def test_rows_are_numbered_by_step_and_motion():
     assert [frame.step for frame in result.frames] == [3, 6, 7]
     assert (result.tangential_force[3:6] < 0).all()
     assert result.applied_force[-1] == pytest.approx(0.01, rel=1e-7)
+
+
+def in_time():
+    """Heavy tissue with branches behind a hand, and probes."""
+    law = NeoHookean(E=0.1, nu=0.4, density=1e-6, relaxation=((0.5, 2e-3),))
+    body = MeshedFinger(block(8, 3, sag=0.4), {"tissue": law}, viscosity=1e-3)
+    output, solver = Output(probes={"two": [[-0.7, 0.6], [0.7, 0.6]]}), Solver(dynamics="inertial")
+    hand = Hand(0.2, 1e-4, 1e-7)
+    return Scene(body, Flat(friction=0.4), motion=IN_TIME, solver=solver, hand=hand, output=output)
+
+
+SOFT = Display(elastic=ElasticLayer(E=0.2, nu=0.48, thickness=2.0))
+RESUMED = {
+    "time": in_time(),
+    "nearly incompressible": Scene(finger(block(8, 3, sag=0.4), nu=0.49999), Flat(), motion=PRESS_AND_SLIDE),
+    "elastic surface": Scene(coarse_pad(), SOFT, StrongTroxel(), 800.0, PRESS_AND_SLIDE),
+}
+
+
+@pytest.mark.parametrize("after", [1, 4, 5])
+@pytest.mark.parametrize("name", RESUMED)
+@pytest.mark.filterwarnings("ignore:motion . has steps of", "ignore:probes have")
+def test_a_resumed_run_repeats_itself(name, after, tmp_path):
+    """In the middle of a motion and between two."""
+    whole, again = resumed(RESUMED[name], after, tmp_path)
+    for column in set(COLUMNS) - {"motion", "seconds"}:
+        np.testing.assert_allclose(again[column], whole[column], rtol=1e-11, atol=1e-15, err_msg=column)
+    for found, expected in zip(again.probes.values(), whole.probes.values(), strict=True):
+        np.testing.assert_allclose(found.cauchy_stress, expected.cauchy_stress, rtol=1e-9, atol=1e-15)
 
 
 def test_a_motion_begins_where_the_last_one_ended():

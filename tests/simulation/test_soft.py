@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from tools.builders import left_over, pad_state, resumed
+from tools.builders import left_over, pad_state
 from tools.domes import Dome, dome, dome_scene
 from tools.meshes import both_sides, contact_block, graded, parabola
 
@@ -160,13 +160,6 @@ def test_a_frictionless_surface_does_not_hold_back():
     surface = ev.Flat(friction=0.0, elastic=SOFT)
     result = ev.simulate(ev.Scene(finger, surface, motion=[ev.Press(indentation=0.6, steps=2)]))
     assert abs(result.tangential_force[-1]) < 1e-8 * result.normal_force[-1]
-
-
-def test_a_resumed_run_repeats_itself(tmp_path):
-    motion = [ev.Press(force=0.05, steps=2), ev.Slide(0.8, steps=4)]
-    whole, again = resumed(ev.Scene(PAD, ev.Display(elastic=SOFT), ev.StrongTroxel(), 800.0, motion), 3)
-    for name in ("applied_force", "tangential_force", "surface_sink", "stored_energy"):
-        assert again[name].tolist() == whole[name].tolist()
 
 
 def test_a_result_keeps_how_the_surface_has_sunk(tmp_path):

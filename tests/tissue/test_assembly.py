@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from tools.grids import CELLS, bend, rectangle
+from tools.grids import bend, rectangle
 
 import evfem as ev
 from evfem.errors import InputError
 from evfem.tissue.userforms import make_term, tried
 
 MU, LMBDA = 0.7, 1.9
-every_element = pytest.mark.parametrize("element", list(CELLS))
 
 
 # -- theta in a user's form ------------------------------------------------------------------------------

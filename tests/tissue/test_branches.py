@@ -6,14 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tools.builders import resumed
 from tools.grids import rectangle, tangent_of
 from tools.meshes import block, held
 from tools.solids import block as solid
 from tools.solids import box
 
 import evfem as ev
-from evfem.tissue.branches import Branches, branches_of, make_branches
+from evfem.tissue.branches import Branches, branches_of
 
 SKIN = ((0.8, 0.004), (0.5, 0.07), (0.4, 1.4))
 SMALL = 1e-5  # mm: strain so small that everything is linear
@@ -89,34 +88,8 @@ def test_books_close(strokes):
     assert left[0] / left[1] == pytest.approx(4.0, rel=0.02)
 
 
-def held_shear(amount, times):
-    """Cauchy shear stress of one branch, m = tau = 1, at the times after simple shear at once."""
-    space = rectangle("q1", (1, 1))
-    law = ev.NeoHookean(E=3.0, nu=0.5 - 1e-9, relaxation=((1.0, 1.0),))
-    branch, u = branch_of(space, law), np.zeros((space.size, 2))
-    sheared = amount * space.mesh.points[:, 1:] * [1.0, 0.0]
-    kept, now, found = branch.at_rest, 0.0, []
-    for time in [1e-9, *np.geomspace(1e-3, times[-1], 200), *times]:
-        if time > now or not found:
-            branch.begin(u, kept, time - now)
-            kept, now, u = branch.inner(sheared), time, sheared
-            found.append((time, branch.forces(sheared)[space.mesh.node_sets["top"], 0].sum()))
-    return np.interp(times, *np.array(found).T)
-
-
 def branch_of(space, law):
     return Branches(space, branches_of(space, {"lower": law}, SimpleNamespace()))
-
-
-@pytest.mark.parametrize(
-    ("amount", "exact"),
-    [(0.5, (0.4458524103, 0.2898796172, 0.0644208744)), (1.0, (0.8545077099, 0.5122113229))],
-)
-def test_shear_relaxes_as_the_law_at_finite_strain(amount, exact):
-    """Not as amount * exp(-t), the linear law."""
-    times = (0.1, 0.5, 2.0)[: len(exact)]
-    for time, stress in zip(times, exact, strict=True):
-        assert held_shear(amount, [time])[0] == pytest.approx(stress, rel=2e-5)
 
 
 @pytest.mark.parametrize("solid_too", [False, True], ids=["plane", "space"])
@@ -151,19 +124,6 @@ def test_creep_under_a_held_force():
     np.testing.assert_allclose(left, np.exp(-waited / (tau * (1.0 + share))), atol=1e-4)
 
 
-def test_both_limits():
-    """A branch that is fast against the motion is not felt; a slow one is elastic tissue beside."""
-    motion = [ev.Press(indentation=SMALL, speed=SMALL / 0.01, steps=4)]
-    elastic = column(ev.simulate(flat(tissue(), motion, "quasistatic")), "applied_force")
-    for time, more, miss in ((1e-14, 0.0, 1e-9), (1e12, 2.0, 2e-5)):
-        law = tissue(relaxation=((2.0, time),), bulk_relaxation=True)
-        got = ev.simulate(flat(law, motion))
-        np.testing.assert_allclose(column(got, "applied_force"), (1.0 + more) * elastic, rtol=miss)
-        assert (
-            column(got, "viscous_dissipation")[-1] <= 1e-9 * column(got, "external_work")[-1] + more * 1e-18
-        )
-
-
 def test_a_motion_without_time_ends_at_rest():
     """The force is that of tissue without branches; what they had stored is lost."""
     timed = ev.Press(indentation=0.1, speed=2.0, steps=2)
@@ -175,19 +135,6 @@ def test_a_motion_without_time_ends_at_rest():
     stored = column(got, "stored_energy")[1] - column(rest, "stored_energy")[0]
     lost = np.diff(column(got, "viscous_dissipation"))[1:]
     np.testing.assert_allclose(lost, [stored, 0.0], rtol=1e-6, atol=1e-15)
-
-
-def test_a_run_that_goes_on_is_the_same(tmp_path):
-    """From a checkpoint within the slide, to the last digit; also the loss."""
-    whole, again = resumed(flat(tissue(relaxation=SKIN), stroke(2)), 5, tmp_path)
-    for name in ("applied_force", "applied_tangential_force", "stored_energy", "viscous_dissipation"):
-        np.testing.assert_array_equal(column(again, name), column(whole, name))
-
-
-def test_bulk_branches_go_through_the_form():
-    space = rectangle("q1", (1, 1))
-    rows = branches_of(space, {"lower": tissue(relaxation=SKIN, bulk_relaxation=True)}, SimpleNamespace())
-    assert type(make_branches(space, rows)) is Branches
 
 
 @pytest.mark.parametrize("bulk", [False, True])

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.linalg import eigh, expm
-from tools.builders import resumed
 from tools.grids import rectangle, solve, tangent_of
 from tools.meshes import block
 
@@ -113,22 +112,6 @@ def test_the_order_is_two_with_mass_viscosity_and_branches(kind, pattern):
         errors.append(np.abs(u[chain.free] - exact).max() / SMALL)
     assert errors[1] < 0.01
     assert 3.7 < errors[0] / errors[1] < 4.4
-
-
-def test_a_free_oscillation_keeps_its_frequency_and_its_amplitude():
-    """y' = i omega y by BDF2: the root of 3/2 z - 2 + 1/(2 z) = i x z near 1, x = omega h. After the step
-    of backward Euler at the start the amplitude is that of this root, 1 - x^4/4 a step.
-    """
-    chain, count = Chain(), 40
-    x = 2.0 * np.pi / count
-    z = (2.0 + np.sqrt(1.0 + 2j * x)) / (3.0 - 2j * x)
-    assert abs(z) == pytest.approx(1.0 - 0.25 * x**4, abs=2.0 * x**6)
-    size = []
-    for periods in (1, 4):
-        u, v = chain.run([x / chain.omega], 2.0 * np.pi * periods / chain.omega)
-        amount = (u - 1j * v / chain.omega)[chain.free]
-        size.append(amount[np.abs(chain.u[chain.free]).argmax()])
-    assert size[1] / size[0] == pytest.approx(z ** (3 * count), rel=1e-5)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -248,25 +231,6 @@ def slid(way, hand=None, E=0.1):
     ]
     solver = ev.Solver(dynamics="inertial", tolerance=1e-10)
     return ev.Scene(finger, ev.Flat(friction=0.4), motion=motion, solver=solver, hand=hand)
-
-
-@pytest.mark.filterwarnings("ignore:motion . has steps of")
-@pytest.mark.parametrize("hand", [None, ev.Hand(0.2, 1e-4, 1e-7)], ids=["", "hand"])
-def test_a_mirrored_run_is_the_mirror_image(hand):
-    right, left = (ev.simulate(slid(way, hand)) for way in (1.0, -1.0))
-    for name in ("applied_force", "kinetic_energy", "integrator_dissipation"):
-        most = np.abs(right[name]).max()
-        np.testing.assert_allclose(left[name], right[name], atol=1e-7 * most, err_msg=name)
-    np.testing.assert_allclose(left.position, -right.position, atol=1e-9)
-
-
-@pytest.mark.filterwarnings("ignore:motion . has steps of")
-@pytest.mark.parametrize("step", [2, 4, 7, 13])
-def test_a_resumed_run_gives_the_same_numbers(step, tmp_path):
-    """In the middle of a motion, where the part before counts, and between two, to the last digit."""
-    whole, again = resumed(slid(1.0, ev.Hand(0.2, 1e-4, 1e-7)), step, tmp_path)
-    for name in ("applied_force", "applied_tangential_force", "kinetic_energy", "integrator_dissipation"):
-        np.testing.assert_array_equal(again[name], whole[name], err_msg=name)
 
 
 @pytest.mark.filterwarnings("ignore:motion . has steps of")

@@ -34,12 +34,6 @@ def deformations(n=3, shape=(4, 3), size=0.25):
     return np.eye(n).reshape(n, n, *[1] * len(shape)) + rng.uniform(-size, size, (n, n, *shape))
 
 
-def split_states(shape=(4, 3)):
-    """In-plane F and a theta that is not ln det F."""
-    F = deformations(2, shape)
-    return F, np.log(det(F)) + rng.uniform(-0.1, 0.1, shape)
-
-
 def difference(function, x, rank, h=1e-5):
     """Central difference of function(x) by x (first `rank` axes), with the axes of `complex_step`."""
     columns = []
@@ -85,56 +79,10 @@ def test_split_form_is_the_full_form_where_theta_is_the_volume_change(law, shape
     np.testing.assert_allclose(law.split_sigma_zz(F, theta), P[2, 2] / J, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("law", [*BUILT_IN, split(ENERGY, 2), split(STRESS, 2)], **names)
-def test_split_derivatives_against_central_differences(law):
-    F, theta = split_states()
-    S, q = law.split_stress(F, theta)
-    A, c, k = law.split_tangent(F, theta)
-    np.testing.assert_allclose(
-        S, difference(lambda F: law.split_energy(F, theta), F, 2), rtol=1e-6, atol=1e-8
-    )
-    np.testing.assert_allclose(
-        q, difference(lambda t: law.split_energy(F, t), theta, 0), rtol=1e-6, atol=1e-8
-    )
-    np.testing.assert_allclose(
-        A, difference(lambda F: law.split_stress(F, theta)[0], F, 2), rtol=1e-6, atol=1e-7
-    )
-    np.testing.assert_allclose(
-        c, difference(lambda F: law.split_stress(F, theta)[1], F, 2), rtol=1e-6, atol=1e-7
-    )
-    np.testing.assert_allclose(
-        c, difference(lambda t: law.split_stress(F, t)[0], theta, 0), rtol=1e-6, atol=1e-7
-    )
-    by_theta = difference(lambda t: law.split_stress(F, t)[1], theta, 0)
-    np.testing.assert_allclose(np.broadcast_to(k, theta.shape), by_theta, rtol=1e-6, atol=1e-7)
-    assert S.shape == c.shape == F.shape
-    assert q.shape == theta.shape
-    assert A.shape == (2, 2, *F.shape)
-
-
 def test_neo_hookean_stress_by_hand():
     # F = diag(2, 1, 1), mu = lmbda = 1.2 by E and nu: P11 = mu (2 - 1/2) + lmbda ln 2 / 2, P22 = lmbda ln 2
     P = NeoHookean(E=3.0, nu=0.25).P(np.diag([2.0, 1.0, 1.0]))
     np.testing.assert_allclose(np.diag(P), [1.8 + 0.6 * np.log(2.0)] + [1.2 * np.log(2.0)] * 2, rtol=1e-14)
-
-
-@pytest.mark.parametrize("user", [ENERGY, STRESS], **names)
-def test_wrapped_users_law_is_the_same_law_where_theta_is_ln_det_F(user):
-    built_in = NeoHookean(
-        E=1.3 * (3 * 2.1 + 2 * 1.3) / (2.1 + 1.3), nu=2.1 / (2 * (2.1 + 1.3))
-    )  # mu 1.3, lmbda 2.1
-    F = deformations(2)
-    theta = np.log(det(F))
-    law = split(user, 2)
-    S, q = law.split_stress(F, theta)
-    np.testing.assert_allclose(
-        S + q * transpose(inv(F)), built_in.P(embed(F))[:2, :2], rtol=1e-12, atol=1e-13
-    )
-    np.testing.assert_allclose(law.split_energy(F, theta), built_in.psi(embed(F)), rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(
-        law.split_sigma_zz(F, theta), built_in.split_sigma_zz(F, theta), rtol=1e-12, atol=1e-13
-    )
-    assert law.shear_modulus == pytest.approx(1.3, rel=1e-10)
 
 
 def test_energy_of_a_stress_only_law_survives_large_turns():
