@@ -5,10 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from evfem.estimate.display import BANDS, Device, ExactCurve, exact_voltage, playback, render, render_exact
-from evfem.estimate.rendering import record
-from evfem.estimate.touch import FrictionCurve, Touch, friction_of, touch_scene
-from evfem.textures.library import reference
+from evfem.estimate.display import BANDS, Device, ExactCurve, playback, render, render_exact
+from evfem.estimate.touch import FrictionCurve, Touch
 
 X = np.arange(400) * 0.02  # 8 mm, at 20 mm/s 0.4 s
 TOUCH = Touch(load=0.05)
@@ -72,22 +70,6 @@ def test_a_file_has_a_round_full_scale_and_both_frictions():
     assert natural == 0.3
     share = (found.signal.largest / told.full_scale) ** 2
     assert natural + share * (largest - natural) == pytest.approx(found.curve.friction.max())
-
-
-@pytest.mark.slow
-def test_the_exact_voltage_gives_the_force_of_the_texture():
-    touch = Touch(ridged=False, length=0.5)
-    device = Device(friction=0.2)
-    recorded = record(touch_scene(reference("wave-2mm"), touch))
-    found, comparison = exact_voltage(recorded, device)
-    slipping = comparison.position > touch.friction * touch.load * 100.0
-    wanted = recorded.result.applied_tangential_force.max()
-    assert np.abs(comparison.error[slipping]).max() < 1e-6 * wanted
-    assert found.x[-1] == pytest.approx(0.5)
-    assert found.voltage.min() > 100.0
-    rendered = render_exact(friction_of(recorded.result), found, touch, device)
-    assert rendered.force_error < 1e-6
-    assert not rendered.lost.any()
 
 
 def test_a_voltage_that_was_found_is_compared_like_one_of_the_closed_forms():

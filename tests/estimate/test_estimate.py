@@ -50,17 +50,6 @@ def test_a_texture_that_ends_is_reduced_to_its_main_wave():
     assert 0.9 < found.explain < 0.995
 
 
-def test_a_plain_wave_that_ends_is_no_second_harmonic():
-    x = np.arange(0.0, 11.98, 0.02)  # 9.6 periods
-    found = reduced(Texture("cloth", "measured", x, 0.02 * np.sin(2.0 * np.pi * x / 1.25), "CC0-1.0"))
-    assert found.wavelength == pytest.approx(1.25, rel=0.01)
-    assert found.amplitude == pytest.approx(0.02, rel=0.02)
-    turn = 2.0 * np.pi / found.wavelength * (x[::10] - found.x0)
-    second = found.in_phase * np.sin(2.0 * turn) + found.in_quadrature * np.cos(2.0 * turn)
-    height = found.amplitude * (np.sin(turn) + second)
-    assert height == pytest.approx(0.02 * np.sin(2.0 * np.pi * x[::10] / 1.25), abs=0.004)
-
-
 def test_the_scene_of_the_database_has_the_profile_of_the_formula():
     texture = Parametric(wavelength=2.0, slope=0.1, in_phase=0.2, in_quadrature=-0.3)
     surface = scene(texture).surface

@@ -160,6 +160,38 @@ def test_fall_and_closing_are_those_of_the_law(law, surface):
     assert np.abs(closing[~free]).max() < 1e-9 * closing.max()
 
 
+@pytest.mark.parametrize(("direction", "neighbours"), [("vertical", 1e-6), ("normal", 5e-3)])
+def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_axes(direction, neighbours):
+    """The change of the force on a sloped surface per contact force, by central differences, turned into
+    the frames of the nodes; and what is lost with the contact force. Along the normal of the surface
+    a potential also pushes the neighbours apart, which is left out.
+    """
+    rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
+    wave = Sinusoid(terms=[[0.15, 2.0, 0.4]], y=-0.2, insulator=THIN)
+    linear, model, state = made(
+        wave, voltage=60.0, law=StrongTroxel(), direction=direction, roughness_gap=rough
+    )
+    pressing = 0.002 + 0.001 * np.arange(state.status.size)
+    force = np.column_stack([pressing, np.zeros_like(pressing)])
+    state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
+    place, surface = model.equilibrium.interface.resting(state), linear.interface.surface_at(state)
+    slope = surface.slope[:, 0]
+
+    def pull(pressed):
+        x, y = model.attraction.forces(place, 60.0, linear.touching, pressed).T
+        along_normal, along_tangent = y - slope * x, x + slope * y
+        return np.stack([along_normal, along_tangent], axis=1) / surface.stretch[:, None]
+
+    found, h = linear.roughness(state), 1e-6
+    assert np.abs(slope).max() > 0.1
+    gain = -(pull(pressing + h) - pull(pressing - h)) / (2.0 * h)
+    np.testing.assert_allclose(found.gain, gain, atol=neighbours * gain.max())
+    loss = pull(0.0 * pressing) - pull(pressing)
+    np.testing.assert_allclose(found.loss_on_opening, loss, atol=neighbours * loss.max())
+    np.testing.assert_array_equal(found.present, pressing)
+    assert 0.01 < found.gain.max() < STABLE
+
+
 def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_it():
     """The same wave at twenty times the voltage: most gains are above 0.9 now."""
     rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
@@ -91,10 +90,3 @@ def test_given_axes_are_left_to_their_figure():
     for draw in (forces, contact_pressure, deformed):
         assert draw(fake_result(), ax=ax) is ax
     assert not hasattr(ax, "_repr_png_")
-
-
-def test_panels_have_one_figure(tmp_path):
-    panels = signal(fake_result())
-    assert {ax.figure for ax in panels} == {panels.figure}
-    panels.figure.savefig(tmp_path / "signal.png")
-    assert (Path(tmp_path) / "signal.png").read_bytes().startswith(PNG)

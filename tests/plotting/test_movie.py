@@ -140,28 +140,3 @@ def test_bad_input_is_refused_before_anything_is_drawn(tmp_path, monkeypatch):
     with pytest.raises(StorageError, match="no folder"):
         animate(result, tmp_path / "nowhere" / "slide.gif")
     assert os.listdir(tmp_path) == []
-
-
-def test_a_bar_counts_the_frames(tmp_path, monkeypatch):
-    counted = []
-
-    class Bar:
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *error):
-            counted.append("closed")
-
-        def update(self, number=1):
-            counted.append(number)
-
-    def bar(total, unit, wanted):
-        counted.append((total, unit, wanted))
-        return Bar()
-
-    monkeypatch.setattr(movies.notices, "bar", bar)
-    monkeypatch.setattr(movies.notices, "drawable", lambda: True)
-    animate(fake_result(), tmp_path / "slide.gif")
-    assert counted == [(2, "frame", True), 1, 1, "closed"]
-    animate(fake_result(), tmp_path / "slide.gif", progress=False)
-    assert counted[4] == (2, "frame", False)

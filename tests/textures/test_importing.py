@@ -174,14 +174,6 @@ def test_an_acceleration_is_divided_by_the_square_of_the_frequency(tmp_path):
     assert power[0] / power[1] == pytest.approx(1.0, rel=0.02)
 
 
-@pytest.mark.parametrize("rate", [1000, 8000, 48_000])
-def test_a_wave_has_its_length_at_every_rate(tmp_path, rate):
-    """A grating of 2 mm under 20 mm/s is 10 Hz, however often it is sampled."""
-    samples = 0.5 * np.sin(2 * np.pi * 10.0 * np.arange(rate) / rate)
-    texture = Recording(**SOURCE, speed=20.0, quantity="height")(wav(tmp_path / "g.wav", samples, rate))
-    assert texture.x[np.argmax(texture.values)] == pytest.approx(0.5, rel=1e-3)
-
-
 def hand_held(time):
     """Acceleration of a surface of 0.5 mm at 50 mm/s, and of a hand that drifts by 50 times as much."""
     wave, drift = 2 * np.pi * 100.0, 2 * np.pi * 3.0
@@ -216,18 +208,6 @@ def test_what_a_recording_holds_and_which_channel_must_be_said(tmp_path):
     wrong = csv(tmp_path / "a.csv", "time,acceleration", time, one)
     with pytest.raises(InputError, match="quantity: given height, of acceleration"):
         Recording(**SOURCE, speed=50.0, quantity="height")(wrong)
-
-
-def test_a_channel_of_a_wav_is_chosen_by_its_number(tmp_path):
-    from scipy.io import wavfile
-
-    time = np.arange(4000) / 2000.0
-    both = np.column_stack([np.sin(200 * np.pi * time), np.sin(100 * np.pi * time)])
-    wavfile.write(tmp_path / "s.wav", 2000, both)
-    with pytest.raises(InputError, match=r"channel: given nothing, of 2; allowed: 1 \| 2"):
-        Recording(**SOURCE, speed=50.0, quantity="height")(tmp_path / "s.wav")
-    texture = Recording(**SOURCE, speed=50.0, quantity="height", channel=2)(tmp_path / "s.wav")
-    assert texture.x[np.argmax(texture.values)] == pytest.approx(1.0, rel=5e-3)
 
 
 def test_a_spectrum_becomes_friction_of_the_size_that_is_said(tmp_path):

@@ -218,27 +218,3 @@ def test_a_bar_that_hits_a_wall_is_in_contact_for_two_crossings_and_rebounds(sha
     assert energy.max() < 1.0 + 1e-12
     assert energy[-1] > 0.95
     assert bar.state.velocity[:, 1].mean() / bar.SPEED == pytest.approx(1.0, abs=0.05 * share)
-
-
-def slid(way, hand=None, E=0.1):
-    """A round block of heavy tissue that is pressed, slides along +x or -x, and waits."""
-    law = ev.NeoHookean(E=E, nu=0.4, density=1e-6, relaxation=((0.5, 2e-3),))
-    finger = ev.MeshedFinger(block(8, 3, sag=0.4), {"tissue": law}, viscosity=1e-3)
-    motion = [
-        ev.Press(indentation=0.2, steps=4, speed=100.0),
-        ev.Slide(0.3 * way, steps=6, speed=50.0, hold="force"),
-        ev.Wait(0.02, steps=6, spacing="log", hold="force"),
-    ]
-    solver = ev.Solver(dynamics="inertial", tolerance=1e-10)
-    return ev.Scene(finger, ev.Flat(friction=0.4), motion=motion, solver=solver, hand=hand)
-
-
-@pytest.mark.filterwarnings("ignore:motion . has steps of")
-def test_sensitivities_count_the_part_before():
-    """Beside central differences of two runs."""
-    key = "finger.materials.tissue.E"
-    found = ev.sensitivities(slid(1.0), [key])
-    ends = [ev.simulate(slid(1.0, E=0.1 * (1.0 + way))) for way in (-1e-4, 1e-4)]
-    for name in ("applied_force", "applied_tangential_force", "kinetic_energy"):
-        expected = (ends[1][name] - ends[0][name]) / 2e-5
-        np.testing.assert_allclose(found[name, key], expected, atol=1e-6 * np.abs(expected).max())
