@@ -78,37 +78,6 @@ def test_step_response():
     assert found[5] == pytest.approx(0.0, abs=1e-20)
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-3, 0.1])
-@pytest.mark.parametrize(
-    "sigmas", [(2e-4, 1e-8, 1e-9), (2e-4, 1e-8, 0.0), (2e-4, 0.0, 0.0), (0.0, 1e-8, 0.0)]
-)
-def test_step_response_is_that_of_the_charges_by_a_matrix_exponential(gap, sigmas):
-    """The three layers written as a system of three equations, by scipy's matrix exponential."""
-    from scipy.linalg import expm
-
-    film = ev.Layer(0.001, ev.Dielectric(3.9, (), sigmas[2]))
-    given = SKIN | {"skin_conductivity": sigmas[0], "insulator": film, "gap_conductivity": sigmas[1]}
-    s = np.array([0.30 / 1136.0, gap, 0.001 / 3.9])
-    k = np.array(sigmas) / (eps_0 * np.array([1136.0, 1.0, 3.9]))
-
-    def displacements(x, U):
-        D = (U - x[0] * (s[1] + s[2]) - x[1] * s[2]) / s.sum()
-        return np.array([D, D + x[0], D + x[0] + x[1]])
-
-    def rate(x, U):
-        J = k * displacements(x, U)
-        return np.array([J[0] - J[1], J[1] - J[2]])
-
-    system = np.zeros((3, 3))
-    system[:2, 2] = rate(np.zeros(2), 100.0)
-    system[:2, :2] = np.stack([rate(e, 0.0) for e in np.eye(2)], axis=1)
-    for time in (1e-5, 3e-4, 4e-3):
-        x = expm(system * time)[:2, 2]
-        expected = 0.5 * eps_0 * displacements(x, 100.0)[1] ** 2
-        found = step_pressure(time, gap, 100.0, **given)
-        assert found == pytest.approx(expected, rel=1e-9, abs=1e-15)
-
-
 @pytest.mark.parametrize(
     ("frequency", "square", "sine"),
     [(15.0, 0.260073, 0.071624), (60.0, 0.775157, 0.363952), (1920.0, 0.999700, 0.499818)],

@@ -36,22 +36,6 @@ def test_traction_is_the_printed_equation(law):
     np.testing.assert_allclose(law.traction(GAPS, 1414.0, TABLE_2), expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_attraction_is_the_derivative_of_the_potential(law):
-    step = 1e-30
-    for layers in (TABLE_2, Layers(0.3, 0.3), Layers(0.3, 0.3 + 1e-9), Layers(0.3, 0.2), Layers(1e-6, 2.0)):
-        slope = law.potential(GAPS + 1j * step, 700.0, layers).imag / step
-        np.testing.assert_allclose(slope, law.traction(GAPS, 700.0, layers), rtol=1e-13)
-        # an independent check without complex numbers: sixth-order central difference
-        h = 1e-3 * (GAPS + law.gap_eps_r * layers.reduced)
-        weights = {1: 45.0, 2: -9.0, 3: 1.0}
-        pairs = (
-            w * (law.potential(GAPS + k * h, 700.0, layers) - law.potential(GAPS - k * h, 700.0, layers))
-            for k, w in weights.items()
-        )
-        np.testing.assert_allclose(sum(pairs) / (60 * h), law.traction(GAPS, 700.0, layers), rtol=1e-8)
-
-
 def test_potential_is_smooth_where_thickness_meets_reduced_thickness():
     # series and logarithm meet at D - s = 1e-3 (g + s); ln(1 + r) / r in 40 decimal digits
     reference = {

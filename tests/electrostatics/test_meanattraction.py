@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from evfem import FILM
-from evfem.electrostatics import Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics import eps_0
 from evfem.field.columns import Columns
 from evfem.field.meanattraction import mean_pull
 
@@ -50,18 +49,6 @@ def groove(number):
     return x, np.stack([0.0 * x - 0.09, 0.0 * x, gap, gap + 0.38])
 
 
-def test_flat_skin_is_pulled_as_the_law_of_the_complex_length_says():
-    skin, frequency, leak = Layer(0.38, 1650.0), 250.0, 1e-7
-    layers = Layers.of(skin, FILM, frequency=frequency, gap_conductivity=leak)
-    gap = 1.0 + leak / (2j * np.pi * frequency * eps_0)
-    x = np.linspace(0.0, 2.0, 5)
-    levels = np.repeat(np.cumsum([-0.09, 0.09, 0.02, 0.38])[:, None], 5, axis=1)
-    pull = mean_pull(Columns((3.35, gap, 1650.0), (INSULATOR, ROWS, SKIN)), x, levels)
-    law = StrongTroxel().traction(0.02, 1.0, layers)
-    assert layers.loss < -0.1  # mm: most of the voltage leaks away
-    assert -pull.forces[:, 1].sum() == pytest.approx(2.0 * law, rel=1e-10)
-
-
 def test_without_conduction_it_is_the_derivative_of_the_energy():
     """Exactly across, in the third order along: there the lines lean instead of moving."""
     apart = []
@@ -73,20 +60,3 @@ def test_without_conduction_it_is_the_derivative_of_the_energy():
         apart.append(np.abs(pull.forces[:, 0] - along).max() / np.abs(along).max())
     assert apart[0] < 1e-5
     assert np.log2(apart[0] / apart[1]) > 2.5
-
-
-def test_pulls_are_difference_quotients_at_a_fixed_potential():
-    """Up and down with losses, of the mean energy in gap and skin while the potential stays."""
-    lossy, (x, levels) = (3.35, 1.0 - 0.8j, 20.0 - 60.0j), groove(33)
-    columns = Columns(lossy, (INSULATOR, ROWS, SKIN))
-    pull = mean_pull(columns, x, levels)
-    rise = np.random.default_rng(2).normal(size=x.size)
-    step = 1e-4
-
-    def energy(s):
-        cells, _ = columns.cells(x, levels + s * np.outer([0.0, 0.0, 1.0, 1.0], rise), None)
-        return 0.5 * eps_0 * cells.energy(cells.squares(pull.phi))
-
-    quotients = [energy(k * step) - energy(-k * step) for k in (1, 2, 3)]
-    slope = (45.0 * quotients[0] - 9.0 * quotients[1] + quotients[2]) / (60.0 * step)
-    assert pull.forces[:, 1] @ rise == pytest.approx(slope, rel=1e-7)

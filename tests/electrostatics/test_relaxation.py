@@ -1,12 +1,9 @@
 """Layers that relax: charges and polarisations against a matrix exponential and the phasor."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.electrostatics import alternating_pressure
 from evfem.electrostatics.dielectrics import debye_layer, seen_at
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.relaxation import Sandwich
@@ -72,43 +69,6 @@ def test_without_poles_and_without_seconds_it_is_the_sandwich():
             getattr(stack, name)(GAPS, 70.0, start) for stack, start in zip((plain, same), both, strict=True)
         )
         np.testing.assert_allclose(other, one, rtol=1e-11)
-
-
-@pytest.mark.parametrize("frequency", [75.0, 1000.0])
-@pytest.mark.parametrize("name", ["gabriel_dry", "gabriel_wet", "raicu"])
-def test_time_domain_against_the_phasor(name, frequency):
-    """The periodic state under a sine in 4000 straight parts, whose mean pressure is the phasor's."""
-    parts = 4000
-    skin = ev.electrostatics.SKINS[name].debye(1.0, 1e5)
-    layer = ev.Layer(0.30, skin)
-    given = {"frequency": frequency, "gap_conductivity": LEAK, "gap_eps_r": 1.0}
-    stack = Sandwich.of(layer, ev.TOUCHSCREEN, **given)
-    size, step = stack.states, 1.0 / (parts * frequency)
-    volts = 100.0 * np.sin(2.0 * np.pi * np.arange(parts + 1) / parts)
-    # one part is linear in its start and in the voltages of its two ends
-    units = np.eye(size)[:, :, None] * np.ones(3)
-    onward = stack.after(GAPS, units, 0.0, 0.0, step).transpose(2, 0, 1)
-    none = np.zeros((size, 3))
-    pushes = [stack.after(GAPS, none, *ends, step).T for ends in ((1.0, 0.0), (0.0, 1.0))]
-    free, driven = np.broadcast_to(np.eye(size), onward.shape), np.zeros((3, size))
-    states = []
-    for before, after in pairwise(volts):
-        free = onward @ free
-        driven = (onward @ driven[..., None])[..., 0] + before * pushes[0] + after * pushes[1]
-        states.append((free, driven))
-    start = np.linalg.solve(np.eye(size) - free, driven[..., None])
-    charges = np.array([(free @ start)[..., 0] + driven for free, driven in states]).transpose(2, 0, 1)
-    field = stack.fields(GAPS, volts[1:, None], charges)[1]
-    mean = alternating_pressure(
-        GAPS, 100.0 / np.sqrt(2.0), frequency, skin=skin, skin_thickness=0.30,
-        insulator=ev.TOUCHSCREEN, gap_conductivity=LEAK,
-    )  # fmt: skip
-    np.testing.assert_allclose(np.mean(0.5 * eps_0 * field**2, axis=0), mean, rtol=1e-6)
-    # and what a force law sees has the same field
-    law = ev.StrongTroxel().traction(
-        GAPS, stack.effective(GAPS, volts[1:, None], charges), ev.Layers(stack.reference, 0.301)
-    )
-    np.testing.assert_allclose(law, 0.5 * eps_0 * field**2, rtol=1e-10)
 
 
 def test_what_becomes_a_sum_of_debye_poles():
