@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.meshes import between
 
 from evfem.errors import InputError
-from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.faces import layer_thickness
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import scaled_jacobian
@@ -14,26 +14,14 @@ from evfem.mesh.quality import scaled_jacobian
 
 def strip(columns=4, order=1):
     """[0, 4] x [0, 3]: `under` (2 high) below `layer` (1 high)."""
-    x, y = np.meshgrid(np.linspace(0.0, 4.0, columns + 1), [0.0, 2.0, 3.0])
-    node = np.arange(x.size).reshape(x.shape)
-    corners = [node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]]
-    cells = np.stack([c.ravel() for c in corners], axis=1)
-    region = np.repeat([7, 9], columns)
-    sets = {"top": node[-1], "bottom": node[0]}
-    mesh = Mesh(
-        np.column_stack([x.ravel(), y.ravel()]), cells, "quad", region, {"under": 7, "layer": 9}, sets
-    )
+    mesh = between(*np.meshgrid(np.linspace(0.0, 4.0, columns + 1), [0.0, 2.0, 3.0]))
+    mesh = replace(mesh, region=np.repeat([7, 9], columns), region_names={"under": 7, "layer": 9})
     return raised(mesh) if order == 2 else mesh
 
 
 def triangle(kind="triangle", apex=(0.5, 0.75**0.5)):
-    mesh = Mesh(
-        np.array([[0.0, 0.0], [1.0, 0.0], apex]),
-        np.array([[0, 1, 2]]),
-        "triangle",
-        np.zeros(1, int),
-        {"skin": 0},
-    )
+    points = np.array([[0.0, 0.0], [1.0, 0.0], apex])
+    mesh = Mesh(points, np.array([[0, 1, 2]]), "triangle", np.zeros(1, int), {"skin": 0})
     return raised(mesh) if kind == "triangle6" else mesh
 
 
@@ -70,27 +58,6 @@ def test_thickness_of_a_flat_layer_is_its_height(order):
     half = len(nodes) // 2
     np.testing.assert_allclose(thickness[:half], 1.0, rtol=1e-13)
     np.testing.assert_allclose(thickness[half:], 2.0, rtol=1e-13)
-
-
-def test_thickness_follows_a_curved_quadratic_interface():
-    # one cell above another, the common edge through (0, 0), (1, 0.3), (2, 0): y = 0.3 x (2 - x)
-    mesh = raised(
-        Mesh(
-            np.array([[0.0, -1.0], [2.0, -1.0], [2.0, 0.0], [0.0, 0.0], [2.0, 1.0], [0.0, 1.0]]),
-            np.array([[0, 1, 2, 3], [3, 2, 4, 5]]),
-            "quad",
-            np.array([0, 1]),
-            {"under": 0, "layer": 1},
-        )
-    )
-    points = mesh.points.copy()
-    middle = np.flatnonzero((points == [1.0, 0.0]).all(axis=1))[0]
-    points[middle] = [1.0, 0.3]
-    mesh = Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names)
-    x = np.linspace(0.0, 2.0, 200001)
-    for node in mesh.cells[1, [2, 3, 6]]:
-        brute = np.hypot(x - points[node, 0], 0.3 * x * (2.0 - x) - points[node, 1]).min()
-        assert layer_thickness(mesh, "layer", np.array([node]))[0] == pytest.approx(brute, rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["triangle", "triangle6"])
@@ -154,11 +121,6 @@ def test_the_middle_of_a_bent_triangle_is_that_of_its_coordinates():
     points[bent.cells[0, 3]] += [0.0, -0.3]  # N_3 = 4 r s is 4/9 in the middle
     moved = replace(bent, points=points).centres - bent.centres
     np.testing.assert_allclose(moved, [[0.0, -0.3 * 4.0 / 9.0]], atol=1e-15)
-
-
-def test_the_middle_of_every_cell_of_a_ridged_pad_lies_in_it():
-    mesh = FingerPad(resolution="coarse").mesh()
-    np.testing.assert_array_equal(mesh.cells_at(mesh.centres), np.arange(len(mesh.cells)))
 
 
 def test_a_point_on_an_edge_lies_in_one_of_its_cells():
