@@ -65,13 +65,6 @@ def test_a_thin_layer_is_a_bed_of_springs_and_shears():
     assert own[1, 1] == pytest.approx(H / long / mu, rel=2e-3)
 
 
-def test_layers_of_one_material_are_one_layer():
-    x, lengths = np.linspace(-1.0, 1.0, 7), np.full(7, 0.3)
-    one = ev.ElasticLayer(0.2, 0.48, 2.0).compliance(x, lengths)
-    parts = [ev.ElasticLayer(0.2, 0.48, 0.5), ev.ElasticLayer(0.2, 0.48, 1.5)]
-    np.testing.assert_allclose(ev.ElasticStack(parts).compliance(x, lengths), one, atol=1e-9 * one.max())
-
-
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 @pytest.mark.parametrize("thickness", [0.02, 0.5, 20.0])
 def test_the_compliance_is_symmetric_and_positive(nu, thickness):
@@ -151,6 +144,15 @@ def grid(count, distance, seed=3):
     ) * distance**2
 
 
+@pytest.mark.parametrize(
+    ("x", "sizes"), [(np.linspace(-1.0, 1.0, 7), np.full(7, 0.3)), grid(4, 0.7)], ids=["plane", "space"]
+)
+def test_layers_of_one_material_are_one_layer(x, sizes):
+    one = ev.ElasticLayer(0.2, 0.48, 2.0).compliance(x, sizes)
+    parts = [ev.ElasticLayer(0.2, 0.48, 0.5), ev.ElasticLayer(0.2, 0.48, 1.5)]
+    np.testing.assert_allclose(ev.ElasticStack(parts).compliance(x, sizes), one, atol=1e-9 * one.max())
+
+
 def test_a_square_on_a_half_space():
     """Its own mean p L (1 - nu^2)/E x .9464020088; a layer 1e4 times as thick is 1.2 L / H less."""
     middle, corner = (love(np.array([[at, at]]), np.ones(1), np.full(1, 1e-3))[0, 0] for at in (0.0, 0.5))
@@ -190,13 +192,6 @@ def test_the_compliance_in_space_is_symmetric_positive_and_has_that_slope(thickn
             return layer.compliance(x, lengths)
 
     np.testing.assert_allclose(slopes(Own(), x, areas), slope, atol=1e-4 * np.abs(slope).max())
-
-
-def test_layers_of_one_material_in_space_are_one_layer():
-    x, areas = grid(4, 0.7)
-    one = ev.ElasticLayer(0.2, 0.48, 2.0).compliance(x, areas)
-    parts = [ev.ElasticLayer(0.2, 0.48, 0.5), ev.ElasticLayer(0.2, 0.48, 1.5)]
-    np.testing.assert_allclose(ev.ElasticStack(parts).compliance(x, areas), one, atol=1e-9 * one.max())
 
 
 @pytest.mark.parametrize(

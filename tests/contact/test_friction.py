@@ -271,16 +271,6 @@ def test_a_slab_that_rests_ages_and_one_that_touches_anew_is_fresh():
     np.testing.assert_allclose(result.tangential_force[-3:], young, rtol=1e-9)
 
 
-def test_coulomb_is_what_a_scene_has_without_a_law():
-    plain = ev.Scene(
-        benchmark_finger(), ev.Flat(friction=0.4), motion=[ev.Press(force=0.03, steps=2), slid()]
-    )
-    named = ev.Scene(plain.finger, plain.surface, motion=plain.motion, friction_law=ev.Coulomb())
-    one, other = ev.simulate(plain), ev.simulate(named)
-    for name in ("tangential_force", "applied_force", "friction_dissipation", "newton_iterations"):
-        np.testing.assert_array_equal(one[name], other[name])
-
-
 @pytest.mark.parametrize("law", [LOAD_INDEX, ADHESIVE], ids=["load index", "adhesive"])
 def test_every_node_of_a_finger_obeys_and_both_couplings_agree(law):
     found = []

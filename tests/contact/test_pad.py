@@ -34,13 +34,6 @@ def test_edges_that_face_up_carry_nothing():
     assert pad_of(CHAIN).length(np.array([0.0, 1.0, 3.0, 2.5])).tolist() == [0.5, 1.5, 1.0, 0.0]
 
 
-def test_lengths_at_several_places_are_those_at_each():
-    x = np.array([[0.0, 1.0, 3.0, 7.0], [0.0, 1.0, 3.0, 2.5], [0.5, 1.0, 3.0, 3.5]])
-    expected = [pad_of(CHAIN).length(row).tolist() for row in x]
-    assert pad_of(CHAIN).length(x).tolist() == expected
-    assert pad_of(CHAIN).length(x[:, None]).shape == (3, 1, 4)
-
-
 def test_quadratic_edges_share_one_four_one():
     pad = pad_of([[0, 1, 2], [1, 3, 4]])
     # the place of the middle nodes does not matter; 6 mm and 3 mm of projection

@@ -12,9 +12,8 @@ from evfem.contact.attraction import Attraction
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.errors import InputError
 from evfem.mesh.faces import PLACES, shape_functions
-from evfem.surface.pad import surface_state
 from evfem.surface.skin import make_skin
-from evfem.surface.surfaces import Flat, Sinusoid
+from evfem.surface.surfaces import Flat
 
 FACES = {4: "bilinear", 9: "biquadratic"}
 
@@ -131,18 +130,3 @@ def test_a_rigid_ellipsoid_hovers_under_the_quadrature_s_attraction(m):
     pull = Attraction(law, skins, skin, Flat(y=-gap))
     found = -pull.forces(points, 2000.0, np.zeros(len(points), bool)).sum(axis=0)
     assert_allclose(found, [0.0, expected, 0.0], rtol=1e-3)
-
-
-@pytest.mark.parametrize("surface", [Flat(y=-0.2), Sinusoid(y=-0.3)])
-def test_stiffness_of_the_attraction_is_the_derivative_of_its_forces(surface):
-    skin, points = sheet(3, 9, bent)
-    layers = Layers.of(Layer(np.full(len(points), 0.38), 1650.0), Layer(0.09, 3.35))
-    pull, h = Attraction(Kaczmarek(), layers, skin, surface), 1e-6
-    far = np.zeros(len(points), bool)
-    found = pull.stiffness(points, 1000.0, far).toarray()
-    for i in range(points.size):
-        d = h * np.eye(points.size)[i].reshape(points.shape)
-        ends = [pull.forces(points + sign * d, 1000.0, far).ravel() for sign in (1, -1)]
-        assert_allclose(found[:, i], (ends[0] - ends[1]) / (2 * h), atol=1e-8 * np.abs(found).max() + 1e-12)
-    gap = surface_state(surface, points).gap
-    assert gap.min() > 0.0

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from evfem.common.tables import piecewise_linear
 from evfem.electrostatics.laws import Layer
 from evfem.errors import InputError
 from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
@@ -63,10 +62,8 @@ def test_friction_is_linear_between_rows_and_jumps_at_a_repeated_x():
     np.testing.assert_allclose(
         surface.friction_coefficient(x), [0.2, 0.2, 0.25, 0.4, 0.6, 0.3, 0.0, 0.0], atol=1e-15
     )
-
-
-def test_friction_table_of_one_row_is_a_constant():
-    assert Flat(friction=[[2.0, 0.7]]).friction_coefficient(np.array([1.0, 2.0, 3.0])).tolist() == [0.7] * 3
+    for rows, found in (([[0.0, 0.7]], [0.7] * 3), ([[0.0, 0.1], [0.0, 0.3]], [0.1, 0.3, 0.3])):
+        assert Flat(friction=rows).friction_coefficient(np.array([-1.0, 0.0, 1.0])).tolist() == found
 
 
 def test_jumps_and_slopes_of_a_friction_table_are_those_of_the_coefficient():
@@ -80,11 +77,6 @@ def test_jumps_and_slopes_of_a_friction_table_are_those_of_the_coefficient():
     rise = table.friction_coefficient(x + 1e-3) - table.friction_coefficient(x - 1e-3)
     np.testing.assert_allclose(table.friction_slope(x), rise / 2e-3, atol=1e-12)
     assert np.unique(table.friction_slope(x).round(9)).tolist() == [0.0, 0.2, 0.3]
-
-
-def test_friction_that_starts_and_ends_with_a_jump():
-    surface = Flat(friction=[[0.0, 0.1], [0.0, 0.3]])
-    assert surface.friction_coefficient(np.array([-1.0, 0.0, 1.0])).tolist() == [0.1, 0.3, 0.3]
 
 
 def test_has_friction_looks_at_the_whole_table():
@@ -194,8 +186,3 @@ def test_profile_does_not_change_with_the_arrays_it_was_made_from():
     surface = Profile(x, height)
     x += 5.0
     assert surface.x.tolist() == [0.0, 1.0]
-
-
-def test_piecewise_linear_is_numpys_interp_without_jumps():
-    place, value = np.array([0.0, 1.0, 4.0]), np.array([2.0, -1.0, 0.5])
-    np.testing.assert_allclose(piecewise_linear(place, value, X), np.interp(X, place, value), atol=1e-15)
