@@ -62,41 +62,6 @@ def test_the_tables_have_the_numbers_of_the_file():
     assert MEASURED["run"](PEERS) == "One run on 2030-01-02, one thread: evfem 9.9, dolfinx 0.5.\n"
 
 
-RUNS = {
-    "default.steps": 110.0,
-    "default.nodes": 10800.0,
-    "default.MB": 26.4,
-    "default.fast.cpu_s": 4.96,
-    "default.plain.cpu_s": 9.04,
-    **{f"loop.{name}.unknowns": 6312.0 for name in MEASURED["LOOPS"]},
-    **{f"loop.{name}.begin_s": 0.41 for name in MEASURED["LOOPS"]},
-    **{f"loop.{name}.{key}": 0.0113 for name in MEASURED["LOOPS"] for key in ("median_s", "ninth_s")},
-}
-
-
-def test_readme_and_pages_have_the_runs_of_the_command_and_of_loops():
-    runs = {"numbers": RUNS}
-    text = MEASURED["readme"](PEERS, runs)
-    assert "| a slide on 23,000 nodes | error 0.05 %, 3.2 CPU s; fastest other package 64 s |" in text
-    assert "| time to 0.1 % of the friction force | 0.25 CPU s; fastest other package 5 s |" in text
-    assert "| default run, 110 steps, one thread | 5 CPU s with `[fast]`, 9 without |" in text
-    assert "(10,800 nodes, 110 steps, 26 MB of files)" in MEASURED["default_run"](runs)
-    assert '| `FingerPad("coarse")`, 6,300 unknowns | 0.41 s | 11 ms | 11 ms |' in MEASURED["loop_times"](
-        runs
-    )
-
-
-def test_what_breaks_nothing_is_counted_from_its_files():
-    long = [{"question": "9 files", "answer": "read", "where": "test_fuzz"}]
-    last = {"equilibrium": "997", "explained": "3", "scenes": "1000"}
-    case = {"numbers": {"good": 3.0, "cases": 4.0}}
-    text = MEASURED["robustness"](case, [last], long, {"mistake": [1, 2]})
-    assert "| 9 files | read | `test_fuzz` |" in text
-    assert "| hard cases | 3 of 4 end as they should | `evfem study stability` |" in text
-    assert "| 1,000 drawn scenes | 997 equilibria, 3 explained | `evfem study campaign` |" in text
-    assert "| 2 mistakes in the physics |" in text
-
-
 def test_a_campaign_of_the_same_seed_takes_the_place_of_the_older_one():
     numbers = dict.fromkeys(MEASURED["ENDS"], 7.0) | {
         "slowest_over_median": 105.4,
@@ -110,39 +75,6 @@ def test_a_campaign_of_the_same_seed_takes_the_place_of_the_older_one():
     assert [row["seed"] for row in rows] == ["4", "5"]
     assert list(rows[1]) == page("docs/results/campaigns.csv").splitlines()[0].split(",")
     assert "| `timeout` | 7 |" in MEASURED["campaigns"](rows[1:])
-
-
-def test_sentences_of_the_gallery_have_the_numbers_of_their_files():
-    air = {
-        f"finger.{pad}.pressed.{field}_air_share": 0.381
-        for pad in ("ridged", "smooth")
-        for field in ("full", "local")
-    }
-    cases = ("HVHD", "HVLD", "LVLD")
-    many = {
-        f"participants.{key}.{case}": 1.4 for key in ("full_over_measured", "gain_median") for case in cases
-    }
-    grooves = {f"spreading.{kind}{gap}": 1.62 for kind in ("", "filled.") for gap in ("smooth", "5um")}
-    text = MEASURED["fringe"]({"numbers": air | many | grooves})
-    assert "the ridged finger has 38 % of its attraction beside the contact" in text
-    stiff = {f"{one}.{way}.stiffness_N_per_mm": 2.0 for one in ("along", "smooth") for way in "xz"}
-    stiff |= {f"{one}.{way}.stiffness_N_per_mm": 1.9 for one in ("whorl", "loop", "arch") for way in "xz"}
-    text = MEASURED["fingerprint"]({"numbers": stiff | {"along.x.stiffness_N_per_mm": 1.8}})
-    assert "Parallel ridges are 10 % softer across" in text
-    assert "curved ones 5 to 5 % softer" in text
-    areas = {"verdict.smooth.gross_over_adams.1N": 0.3, "verdict.ridged.ridge_over_adams.1N": 0.5}
-    areas |= {
-        f"verdict.ridged.{law}.median_over_measured.HVHD": 1.0 for law in ("kaczmarek", "strong_troxel")
-    }
-    change = {"variant.smooth.area_mm2": 10.0, "variant.all moduli x 0.5.area_mm2": 13.9}
-    change |= {
-        "variant.free rim.area_mm2": 11.2,
-        "variant.wanted_over_unchanged": 1.61,
-        "width_mm.smooth.1N": 4.5,
-    }
-    text = MEASURED["fingertip"]({"numbers": areas | change})
-    assert "half of all moduli add 39 % at 0.5 N" in text
-    assert "more than 12 %" in " ".join(text.split())
 
 
 def test_quick_runs_do_not_get_to_the_pages(tmp_path):

@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem import export
 from evfem.scene.file import loads
 from evfem.scene.scene import default_scene
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 FINGER = ev.FingerPad(ridges=False, resolution="coarse")
-DISPLAY = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
 MOTION = (ev.Press(force=0.05, steps=3), ev.Slide(distance=1.2, steps=6, hold="force"))
 
 
@@ -30,15 +28,14 @@ def block(kind):
 @pytest.fixture(scope="module")
 def example(tmp_path_factory):
     """The README's Python, its simulation on a coarse mesh and with few steps: its names, what it
-    prints, its folder, and a series that was written while it ran.
+    prints, and its folder.
     """
     folder, printed, simulate = tmp_path_factory.mktemp("readme"), io.StringIO(), ev.simulate
-    series = export.ParaViewSeries(folder / "live.pvd")
     names, here = {}, Path.cwd()
 
     def coarse(scene, progress):
         short = replace(scene, finger=FINGER, motion=MOTION, name="slide")
-        return simulate(short, progress=progress, observers=[series])
+        return simulate(short, progress=progress)
 
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
         patch.setattr(ev, "simulate", coarse)
@@ -47,23 +44,11 @@ def example(tmp_path_factory):
             exec(compile(block("python"), "README.md", "exec"), names)
         finally:
             os.chdir(here)
-    return names, printed.getvalue(), folder, series.path
-
-
-@pytest.fixture(scope="module")
-def scene():
-    return ev.Scene(FINGER, DISPLAY, ev.Kaczmarek(), 1000.0, MOTION, name="slide", depth=10.0)
-
-
-@pytest.fixture(scope="module")
-def result(example):
-    """The result, with a series that was written while it ran."""
-    names, _, _, live = example
-    return names["result"], live
+    return names, printed.getvalue(), folder
 
 
 def test_the_readmes_two_scenes_are_the_same_and_the_built_in_one_with_held_load_and_a_depth(example):
-    names, printed, _, _ = example
+    names, printed, _ = example
     press, slide = default_scene().motion
     held = replace(default_scene(), motion=(press, replace(slide, hold="force")), depth=10.0)
     assert names["scene"].digest() == loads(block("toml")).digest() == held.digest()
@@ -71,7 +56,7 @@ def test_the_readmes_two_scenes_are_the_same_and_the_built_in_one_with_held_load
 
 
 def test_the_readmes_example_leaves_the_files_that_it_names(example):
-    _, _, folder, _ = example
+    _, _, folder = example
     named = set(re.findall(r'"(\w+\.\w+)"', block("python")))
     assert named == {"slide.pvd", "forces.png", "slide.npz"}
     assert named <= {path.name for path in folder.iterdir()}
@@ -83,8 +68,8 @@ def test_the_readmes_two_commands_stand():
     )
 
 
-def test_the_forces_are_those_of_a_press_and_full_slip(result):
-    result, _ = result
+def test_the_forces_are_those_of_a_press_and_full_slip(example):
+    result = example[0]["result"]
     assert result.motion.tolist() == ["press"] * 3 + ["slide"] * 6
     np.testing.assert_allclose(result.applied_force[:3], [0.05 / 3, 0.1 / 3, 0.05], rtol=1e-7)
     np.testing.assert_allclose(result.applied_force[3:], 0.05, rtol=1e-7)

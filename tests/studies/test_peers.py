@@ -179,15 +179,6 @@ def test_errors_and_ratios_by_hand():
     assert found["Fn_after_3.0"] == 0.5214
 
 
-def test_cost_of_an_error_between_levels():
-    # error falls with the square of the cost: 4 % at 1 s, 0.04 % at 10 s, so 0.4 % at sqrt(10) s
-    curve = [(1.0, 4.0), (10.0, 0.04)]
-    assert numbers.cost_of(0.4, curve) == pytest.approx(10.0**0.5)
-    assert numbers.cost_of(5.0, curve) == 1.0  # the coarsest level is better than asked for
-    assert numbers.cost_of(0.01, curve) is None  # nothing is extrapolated
-    assert numbers.cost_of(0.4, []) is None
-
-
 def raced(package, element, way, costs, errors):
     """Runs on the levels 0, 1, ...: CPU seconds, and how far off the forces are (%)."""
     found = enumerate(zip(costs, errors, strict=True))

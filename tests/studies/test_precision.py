@@ -114,14 +114,3 @@ def test_exponents_and_sizes():
     assert sizes[0] == 3025
     assert sizes[-1] == 201201
     assert all(n % 2 == 0 for divisions in growth.SIZES for n in divisions)  # cells of 2 x 2
-
-
-def test_clocks_within_clocks(monkeypatch):
-    ticks = iter([0.0, 1.0, 4.0, 10.0])  # outer begins, inner begins, inner ends, outer ends
-    monkeypatch.setattr(shares.time, "process_time", lambda: next(ticks))
-    parts = shares.Parts()
-    inner = parts.timed("solve", lambda: 7)
-    outer = parts.timed("contact", lambda: inner())
-    assert outer() == 7
-    assert parts.spent["solve"] == 3.0
-    assert parts.spent["contact"] == 7.0

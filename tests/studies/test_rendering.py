@@ -2,14 +2,13 @@
 
 import math
 import os
-import pickle
 
 import numpy as np
 import pytest
 from evfem.studies import common, fig13, rendered
 
 from evfem import studies
-from evfem.errors import InputError, NotConverged
+from evfem.errors import InputError
 from evfem.estimate.rendering import ApparentFriction
 
 pytestmark = pytest.mark.solver
@@ -129,11 +128,3 @@ def test_processes_keep_the_order_and_pass_errors_on():
     assert os.getpid() not in others
     with pytest.raises(InputError, match="study"):
         common.side_by_side(studies.run, ["fig98", "fig99"])
-
-
-def test_errors_reach_another_process_whole():
-    refused = pickle.loads(pickle.dumps(InputError("study", 3, "a name")))
-    assert (refused.key, refused.given, refused.allowed) == ("study", 3, "a name")
-    stuck = pickle.loads(pickle.dumps(NotConverged(7, [1.0, 0.5], "smaller steps", None)))
-    assert (stuck.step, stuck.residuals, stuck.advice) == (7, [1.0, 0.5], "smaller steps")
-    assert str(stuck) == str(NotConverged(7, [1.0, 0.5], "smaller steps"))

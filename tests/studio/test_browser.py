@@ -6,7 +6,6 @@ Each test is a way that somebody goes through the page.
 import json
 import multiprocessing
 import shutil
-import threading
 import time
 import urllib.request
 import warnings
@@ -15,7 +14,6 @@ import numpy as np
 import pytest
 
 from evfem.electrostatics.signalfile import read_signal
-from evfem.studio.server import Studio
 
 pytestmark = [pytest.mark.browser, pytest.mark.filterwarnings("ignore::ImportWarning")]
 FLAGS = (
@@ -108,16 +106,6 @@ class Page:
 
     def close(self):
         self.driver.quit()
-
-
-@pytest.fixture(scope="module")
-def server():
-    with Studio() as studio:
-        thread = threading.Thread(target=studio.serve_forever, kwargs={"poll_interval": 0.02})
-        thread.start()
-        yield studio
-        studio.shutdown()
-        thread.join()
 
 
 @pytest.fixture
@@ -302,18 +290,6 @@ def test_closing_the_page_ends_its_run(page):
     page.until(lambda: not multiprocessing.active_children())
 
 
-def test_two_pages_do_not_mix(page, server, tmp_path_factory):
-    other = Page(tmp_path_factory.mktemp("other"), server.url)
-    try:
-        page.set("load", 0.08)
-        other.choose("draw")
-        assert other.js("return state().touch.load") == 0.05
-        assert page.js("return state().texture") == {"reference": "weave"}
-        assert page.text("numbers") != other.text("numbers")
-    finally:
-        other.close()
-
-
 def test_the_page_is_used_by_the_keyboard_alone(page):
     from selenium.webdriver.common.keys import Keys
 
@@ -343,21 +319,3 @@ def test_a_phone_shows_everything_without_scrolling_sideways(page):
     for where in ("pick", "dial", "draw", "upload"):
         page.choose(where)
         assert page.js("return document.documentElement.scrollWidth") <= 360, where
-
-
-def test_nothing_is_asked_of_anybody_else(page, server):
-    page.choose("dial")
-    names = page.js("return performance.getEntriesByType('resource').map((one) => one.name)")
-    assert names
-    assert all(name.startswith((server.url, "data:")) for name in names)
-
-
-def test_another_site_can_neither_ask_nor_frame_the_page(page, server):
-    page.driver.get("data:text/html,<p>another site</p>")
-    said = page.driver.execute_async_script(
-        "const [url, done] = arguments; fetch(url, {method: 'POST', body: '{}'})"
-        ".then((a) => done('read ' + a.status), (e) => done('refused'))",
-        server.url + "answer",
-    )
-    assert said == "refused"
-    page.driver.get_log("browser")

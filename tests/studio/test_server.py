@@ -20,16 +20,6 @@ from evfem.studio import runs
 from evfem.studio.server import ADDRESS, ASSETS, MOST_STATE, MOST_UPLOAD, Studio
 
 
-@pytest.fixture(scope="module")
-def server():
-    with Studio() as studio:
-        thread = threading.Thread(target=studio.serve_forever, kwargs={"poll_interval": 0.02})
-        thread.start()
-        yield studio
-        studio.shutdown()
-        thread.join()
-
-
 def ask(server, method, path, body=None, **headers):
     """Status, headers and body of an answer."""
     port = server.server_address[1]
