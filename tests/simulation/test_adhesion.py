@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulation.test_core import SCALE, WORK, block
 from simulation.test_spheres import paraboloid
-from tools.builders import left_over, resumed
+from tools.builders import left_over
 from tools.domes import Dome, dome_scene
 
 import evfem as ev
@@ -217,12 +217,3 @@ FULL = {"law": ev.StrongTroxel(), "voltage": 10.0, "field": "full"}
 def test_what_is_no_adhesion_is_refused(make, message):
     with pytest.raises(ev.InputError, match=message):
         make()
-
-
-def test_a_resumed_run_remembers_where_it_came_off():
-    motion = [ev.Press(indentation=0.1, steps=1), ev.Press(indentation=-0.25, steps=4)]
-    whole, again = resumed(ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, adhesion=MOIST), 4)
-    for name in ("applied_force", "adhesive_force", "adhesive_work"):
-        assert again[name].tolist() == whole[name].tolist()
-    assert again.warnings == whole.warnings
-    assert any("came off" in one for one in again.warnings)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tools.builders import left_over
-from tools.domes import Dome, dome, dome_scene
+from tools.domes import Dome, dome_scene
 
 import evfem as ev
 from evfem import plotting
@@ -64,20 +64,6 @@ def test_tangential_forces_are_along_the_slide_and_friction_is_drawn_so(angle):
         line = plotting.friction(result, over=there).lines[0]
         assert_allclose(line.get_ydata()[[3, 5]], [0.3, -0.3], atol=1e-3)
         assert_allclose(line.get_xdata(), result[there], atol=1e-15)
-
-
-def test_hover_ramp_and_snap_in_come_to_the_display():
-    """Held 0.02 mm above a thin insulator the dome is pulled down by a voltage that rises."""
-    thin = ev.Display(insulator=ev.Layer(thickness=0.001, eps_r=3.35), friction=0.3)
-    soft = Dome(law=ev.NeoHookean(E=0.01, nu=0.45), shape=dome(radius=40.0))
-    motion = [ev.Hover(gap=0.02), ev.VoltageRamp(400.0, steps=3)]
-    result = simulate(dome_scene(*motion, finger=soft, surface=thin, voltage=0.0))
-    assert result.real_contact_area[0] == 0.0
-    assert result.min_gap[0] > 0.019
-    assert result.real_contact_area[-1] > 0.5
-    assert result.normal_force[-1] > 0.0
-    assert_allclose(result.normal_force - result.electrostatic_force, result.applied_force, atol=1e-8)
-    assert left_over(result) < 1e-5
 
 
 def test_time_adds_viscous_stress_and_inertia():

@@ -39,6 +39,10 @@ def tiles(x, z, coefficients):
     return ev.Flat(friction=ev.FrictionMap(x, z, coefficients), insulator=FILM)
 
 
+#: both waves, the same with x and z exchanged, the same mirrored in x
+EGGS = (eggs(0.0, 90.0), eggs(90.0, 0.0), eggs(180.0, 90.0))
+
+
 def slid(surface, angle, **other):
     return simulate(
         dome_scene(PRESS, ev.Slide(0.6, steps=3, angle=angle, speed=10.0), surface=surface, **other)
@@ -51,7 +55,7 @@ def exponential(speed, **settings):
 
 #: name -> surface, the same with x and z exchanged, the same mirrored in x; further settings
 TWINS = {
-    "sinusoids": (eggs(0.0, 90.0), eggs(90.0, 0.0), eggs(180.0, 90.0), {}),
+    "sinusoids": (*EGGS, {}),
     "relief": (
         ev.Relief(GRID, GRID, HEIGHT, insulator=FILM),
         ev.Relief(GRID, GRID, HEIGHT.T, insulator=FILM),
@@ -64,24 +68,14 @@ TWINS = {
         tiles(-ENDS[::-1], ENDS, QUARTERS[:, ::-1]),
         {},
     ),
-    "rate": (eggs(0.0, 90.0), eggs(90.0, 0.0), eggs(180.0, 90.0), exponential(5.0, exponent=0.5)),
-    "normal": (
-        eggs(0.0, 90.0),
-        eggs(90.0, 0.0),
-        eggs(180.0, 90.0),
-        {"direction": "normal", "voltage": 3000.0, "solver": ITSELF},
-    ),
+    "rate": (*EGGS, exponential(5.0, exponent=0.5)),
+    "normal": (*EGGS, {"direction": "normal", "voltage": 3000.0, "solver": ITSELF}),
     "rough": (
-        *(replace(each, insulator=THIN) for each in (eggs(0.0, 90.0), eggs(90.0, 0.0), eggs(180.0, 90.0))),
+        *(replace(each, insulator=THIN) for each in EGGS),
         {"law": ev.StrongTroxel(), "voltage": 150.0, "roughness_gap": ROUGH, "solver": ITSELF},
     ),
-    "adhesion": (
-        eggs(0.0, 90.0),
-        eggs(90.0, 0.0),
-        eggs(180.0, 90.0),
-        {"law": None, "voltage": 0.0, "adhesion": ev.Dugdale(stress=0.005, reach=0.05)},
-    ),
-    "hand": (eggs(0.0, 90.0), eggs(90.0, 0.0), eggs(180.0, 90.0), {"hand": ev.Hand(0.1, 1e-3, 1e-6)}),
+    "adhesion": (*EGGS, {"law": None, "voltage": 0.0, "adhesion": ev.Dugdale(stress=0.005, reach=0.05)}),
+    "hand": (*EGGS, {"hand": ev.Hand(0.1, 1e-3, 1e-6)}),
 }
 
 
@@ -110,18 +104,6 @@ def test_a_turned_and_a_mirrored_scene_have_turned_and_mirrored_numbers(name):
     assert np.abs(second["tangential_force_x"] - first["tangential_force_x"]).max() > 1e-3
     for result in (first, second, third):
         assert left_over(result) < 1e-6
-
-
-def test_an_angled_surface_is_that_of_a_slide_at_its_angle():
-    """A slide along a side of the dome, at the surface's own angle."""
-    straight = slid(ev.Sinusoid(terms=[WAVES[0]], insulator=FILM), 0.0)
-    for angle in (90.0, 180.0):
-        found = slid(ev.Sinusoid(terms=[WAVES[0]], insulator=FILM, angle=angle), angle)
-        for column in COLUMNS:
-            assert_allclose(found[column][2:], straight[column][2:], rtol=1e-6, atol=1e-9)
-    profile = slid(ev.Profile(GRID, HEIGHT[0], insulator=FILM, angle=90.0), 90.0)
-    wave = slid(ev.Profile(GRID, HEIGHT[0], insulator=FILM), 0.0)
-    assert_allclose(profile.tangential_force[2:], wave.tangential_force[2:], rtol=1e-6, atol=1e-9)
 
 
 def test_sliding_nodes_have_the_friction_of_their_place():
