@@ -84,9 +84,6 @@ def little_memory(megabytes):
         tracemalloc.stop()
 
 
-# -- scenes and tables
-
-
 @pytest.mark.parametrize(
     ("text", "key"),
     [
@@ -170,9 +167,6 @@ def test_heights_next_to_nothing_make_a_level_profile():
     assert profile.height(1.0) == 5e-324
 
 
-# -- meshes
-
-
 LAUGHS = '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]><a>&b;</a>'
 MSH = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n1 0 0 0\n$EndNodes\n$Elements\n{}\n$EndElements\n"
 HOSTILE = {
@@ -225,9 +219,6 @@ def test_an_outline_of_many_short_and_many_long_edges_is_refused():
     mesh = Mesh(points, cells, "triangle", np.zeros(n - 1, int), {"a": 0}, sets)
     with little_memory(1500), pytest.raises(InputError, match="too close for their lengths"):
         check(mesh)
-
-
-# -- archives
 
 
 def archive(path, members, compression=zipfile.ZIP_STORED):

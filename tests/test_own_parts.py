@@ -14,7 +14,6 @@ from tools.meshes import block
 import evfem as ev
 from evfem.errors import InputError
 from evfem.protocols import CompleteSurface, Observer, Surface
-from evfem.runfolder import RunFolder, saved
 from evfem.surface.usersurface import completed
 
 FLAT = ev.Flat(friction=0.3)
@@ -24,9 +23,6 @@ PRESS, SLIDE = ev.Press(indentation=0.15, steps=2), ev.Slide(distance=0.5, steps
 def pad(material: Any = None) -> ev.MeshedFinger:
     """A block, 4 mm wide and 2 mm high, its lower side curved."""
     return ev.MeshedFinger(block(sag=0.3), {"tissue": material or ev.NeoHookean(E=0.1, nu=0.4)}, SKIN)
-
-
-# -- the parts -------------------------------------------------------------------------------------------
 
 
 class ConstantPull:
@@ -111,9 +107,6 @@ def test_a_part_is_short_and_inherits_nothing_of_ours(part: Any) -> None:
     assert not [base for base in getattr(part, "__mro__", ()) if base.__module__.startswith("evfem")]
 
 
-# -- what they do ----------------------------------------------------------------------------------------
-
-
 def test_own_law_pulls_with_its_traction_on_the_projected_width() -> None:
     display = ev.Display(insulator=INSULATOR)
     law = ConstantPull()
@@ -140,9 +133,6 @@ def test_progress_and_live_plot_see_every_step(tmp_path: Path) -> None:
     assert (tmp_path / "live.png").read_bytes().startswith(b"\x89PNG")
 
 
-# -- stopping --------------------------------------------------------------------------------------------
-
-
 def test_a_stop_returns_the_result_so_far() -> None:
     scene = ev.Scene(pad(), FLAT, motion=ev.Press(indentation=0.3, steps=6), output=ev.Output(every=100))
     whole = ev.simulate(scene)
@@ -155,17 +145,6 @@ def test_a_stop_returns_the_result_so_far() -> None:
     assert not result.summary()["complete"]
     assert [frame.step for frame in result.frames] == [3]  # its last fields are kept
     assert "stopped" not in whole.provenance
-
-
-def test_a_stopped_run_can_go_on(tmp_path: Path) -> None:
-    scene = ev.Scene(pad(), FLAT, motion=ev.Press(indentation=0.3, steps=4))
-    whole = ev.simulate(scene)
-    folder = RunFolder(tmp_path / "out", scene, fields=False, plots=False)
-    stop = StopAtForce(float(whole.normal_force[1]))
-    folder.close(ev.simulate(scene, observers=[stop, folder]))
-    assert len(folder.rows) == 2
-    result = ev.simulate(scene, resume=saved(tmp_path / "out", scene))
-    assert result.normal_force.tolist() == whole.normal_force.tolist()
 
 
 def test_observers_hear_of_the_end_of_a_stopped_run() -> None:
@@ -194,9 +173,6 @@ def test_an_observer_that_would_be_told_of_nothing_is_refused_before_the_run(dea
     with pytest.raises(InputError, match=words):
         ev.simulate(ev.Scene(pad(), FLAT, motion=[PRESS]), observers=[heard, deaf])
     assert not hasattr(heard, "lines")
-
-
-# -- surfaces in detail ----------------------------------------------------------------------------------
 
 
 class RealWaves(Waves):

@@ -31,14 +31,6 @@ def test_columns_never_touch_and_zero_has_no_sign():
             assert value < -0.5 or not text.startswith("-")
 
 
-def test_over_a_depth_forces_are_in_newtons_and_lengths_as_they_were():
-    row = dict.fromkeys(COLUMNS, 0.02) | {"step": 1, "motion": "press", "motion_index": 0}
-    head, units, numbers = (line.split() for line in table([row], depth=10.0).splitlines())
-    assert units == ["mm", "mm", "V", "N", "N", "N", "N"]
-    assert numbers[2:] == ["0.020", "0.020", "0"] + ["0.20000"] * 4
-    assert head[2:4] == ["position", "indent."]
-
-
 def test_the_last_row_of_each_motion_is_shown():
     for counts in ((10, 100), (1,), (1, 1, 1), (3, 50, 2, 7)):
         ends = {sum(counts[: k + 1]) - 1 for k in range(len(counts))}

@@ -139,6 +139,5 @@ for name, values in [("measured", people["HVLD"]), *closed.items()]:
     spread = np.std(values, ddof=1) / np.mean(values)
     ratio = max(values) / min(values)
     print(
-        f"{name:<14} median {np.median(values):.2f} mN, spread {spread:.0%}, "
-        f"max / min {ratio:.1f}"
+        f"{name:<14} median {np.median(values):.2f} mN, spread {spread:.0%}, max / min {ratio:.1f}"
     )

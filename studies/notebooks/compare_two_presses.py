@@ -96,8 +96,7 @@ constant = spikes(
 ramp = spikes(np.array([0.0, 100.0, 2100.0]), np.array([0.0, 20.0, 20.0]))
 interval = np.diff(constant)[-1]
 print(
-    f"{interval:.2f} ms; {(ramp <= 100).sum()} and {(ramp > 100).sum()}, "
-    f"{ramp[0]:.2f} to {ramp[-1]:.2f} ms"
+    f"{interval:.2f} ms; {(ramp <= 100).sum()} and {(ramp > 100).sum()}, {ramp[0]:.2f} to {ramp[-1]:.2f} ms"
 )
 
 # %% [markdown]

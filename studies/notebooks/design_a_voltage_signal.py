@@ -56,8 +56,7 @@ real.result
 # %%
 felt = apparent_friction(real.result)
 print(
-    f"full slip from x = {real.full_slip:.2f} mm on; friction at the end "
-    f"{felt.friction[-1]:.4f}"
+    f"full slip from x = {real.full_slip:.2f} mm on; friction at the end {felt.friction[-1]:.4f}"
 )
 
 # %% [markdown]
@@ -72,8 +71,7 @@ layers = Layers.of(ev.Layer(thickness=0.38, eps_r=1650.0), display.insulator)
 encoding = Encoding(law, layers, AreaLaw(112.0), friction=display.friction)
 closed = voltage_for(felt, encoding)
 print(
-    f"at most {closed.largest:.0f} V, {closed.rms:.0f} V rms; carrier "
-    f"amplitude {closed.carrier:.0f} V"
+    f"at most {closed.largest:.0f} V, {closed.rms:.0f} V rms; carrier amplitude {closed.carrier:.0f} V"
 )
 
 # %% [markdown]
@@ -91,8 +89,7 @@ comparisons = {
 }
 for name, found in comparisons.items():
     print(
-        f"{name:<12} relative error {found.relative_l2:.1e}, largest "
-        f"{found.largest_error:.1e} N/mm"
+        f"{name:<12} relative error {found.relative_l2:.1e}, largest {found.largest_error:.1e} N/mm"
     )
 
 # %% [markdown]

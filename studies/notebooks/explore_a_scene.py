@@ -111,7 +111,6 @@ balance = result.normal_force - result.electrostatic_force - result.applied_forc
 added = result.electrostatic_force[-1] / result.applied_force[-1]
 print(f"forces balance to {abs(balance).max():.0e} N/mm")
 print(
-    f"friction coefficient seen from the bone: "
-    f"{result.tangential_force[-1] / result.applied_force[-1]:.4f}"
+    f"friction coefficient seen from the bone: {result.tangential_force[-1] / result.applied_force[-1]:.4f}"
 )
 print(f"the voltage adds {added:.1%} to the load")

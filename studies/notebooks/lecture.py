@@ -91,8 +91,7 @@ def show():
 for load in (0.5 * LOAD, LOAD):
     row = loop.step(force=load)
     print(
-        f"{row.applied_force:.3f} N/mm: {row.indentation:.2f} mm deep, "
-        f"{row.contact_width:.2f} mm wide"
+        f"{row.applied_force:.3f} N/mm: {row.indentation:.2f} mm deep, {row.contact_width:.2f} mm wide"
     )
 figures = [show()]
 
@@ -113,8 +112,7 @@ for position in places[3:]:
     row = loop.step(position=position)
 figures.append(show())
 print(
-    f"friction force {row.tangential_force:.4f} N/mm, {FRICTION} times "
-    f"{row.normal_force:.4f} N/mm"
+    f"friction force {row.tangential_force:.4f} N/mm, {FRICTION} times {row.normal_force:.4f} N/mm"
 )
 
 # %% [markdown]
@@ -137,8 +135,7 @@ for position in np.linspace(1.625, 3.0, 12):
 figures.append(show())
 coefficient = row.tangential_force / row.applied_force
 print(
-    f"friction coefficient seen from the bone: {coefficient:.3f}, without a "
-    f"voltage {FRICTION}"
+    f"friction coefficient seen from the bone: {coefficient:.3f}, without a voltage {FRICTION}"
 )
 
 # %% [markdown]

@@ -83,8 +83,6 @@ def test_a_law_that_grows_faster_than_the_load_has_its_chord():
     assert seen.slope[0] == pytest.approx(0.3 * 2.0, rel=1e-12)  # mu (p / p0)^(n - 1)
 
 
-# -- a slab that hardly deforms, closed forms of the whole pad
-
 SLAB = block(20, 1, width=4.0, height=0.02)
 N, P = 0.04, 0.01  # N/mm on 4 mm
 
@@ -321,8 +319,6 @@ def test_a_run_that_is_resumed_remembers_how_old_its_contact_is():
     whole, again = resumed(slab(AGEING, ev.Wait(10.0, steps=2), slid(1.0)), 3)
     np.testing.assert_array_equal(again.tangential_force, whole.tangential_force)
 
-
-# -- in scenes
 
 TEXT = """
 version = 1

@@ -106,9 +106,6 @@ def test_a_relief_from_a_file_has_its_rows_in_any_order(tmp_path):
         ev.Relief.from_csv(tmp_path / "scan.csv")
 
 
-# -- frames
-
-
 def state(at):
     """The frame of nodes on `EGGS` at these places."""
     return surface_state(EGGS, np.column_stack([at[:, 0], np.zeros(len(at)), at[:, 1]]))
@@ -133,9 +130,6 @@ def test_forces_turn_with_their_nodes():
     force = np.random.default_rng(4).normal(size=(40, 3))
     expected = differences(lambda at: np.einsum("pa,pak->pk", force, state(at).axes), PLACES)
     assert_allclose(state(PLACES).turned(force), expected, atol=1e-8)
-
-
-# -- friction
 
 
 def test_a_map_is_bilinear_between_its_rows_and_constant_beyond():
@@ -188,9 +182,6 @@ def test_a_node_that_comes_to_a_jump_askew_is_pinned_where_its_way_crosses_it():
     assert_allclose(pins.at(beyond), pins.place)
     assert pins.release(np.array([1.0]), np.array([0.9]), 0.0)
     assert_allclose(pins.at(beyond), beyond)
-
-
-# -- attraction along the normal
 
 
 def pulled(surface, direction):

@@ -98,8 +98,6 @@ def test_importing_the_formulas_stays_light():
     assert done.stdout.strip() == "[]"
 
 
-# -- losses under alternating voltage ------------------------------------------------------------------------
-
 LOSSES = [0.3, -0.3, 1e-3, 1e-9, 7.0, np.array([0.0, 1e-6, 0.1, 0.0, 2.0, 30.0])]
 
 

@@ -309,8 +309,6 @@ def test_the_command_writes_what_it_is_asked_for(tmp_path, capsys):
     assert not (tmp_path / "a.wav").exists()
 
 
-# -- as a scene's voltage
-
 KEYS = 'law = "kaczmarek"\nvoltage_file = "voltage.wav"\ninsulator_thickness = 0.09\ninsulator_eps_r = 3.35'
 WITH_WAV = head(KEYS) + PRESS
 

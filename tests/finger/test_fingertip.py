@@ -42,9 +42,6 @@ def volume_of(finger):
     return halves + finger.bone_offset * np.pi * d * f + wedge
 
 
-# -- the smooth pad --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("offset", [0.0, 1.0])
 def test_volume(offset):
     """Curved cells hold it to fourth order, straight ones to second."""
@@ -106,9 +103,6 @@ def test_shape_of_the_cells(ridges, order):
     """The prototype of this mesh had .43 smooth, .22 merged and .33 with a whorl."""
     least = {"none": 0.39, "along": 0.36, "across": 0.27}.get(ridges, 0.26)
     assert scaled_jacobian(tip(ridges=ridges).mesh(order)).min() > least
-
-
-# -- ridges ----------------------------------------------------------------------------------------------
 
 
 def depth_of(finger):
@@ -174,9 +168,6 @@ def test_prints_from_a_table_and_from_an_image(tmp_path):
     assert depth.max() == pytest.approx(0.1, abs=1e-4)
     near = np.argmin(np.hypot(fx - 1.0, fz - 2.0))
     assert depth[near] < 0.01
-
-
-# -- materials, participants, refusals ------------------------------------------------------------------
 
 
 def test_materials_are_those_of_the_cross_section():

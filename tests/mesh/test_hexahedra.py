@@ -5,11 +5,13 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from tools.solids import SIDES, block
 
 import evfem as ev
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
+from evfem.mesh.faces import layer_thickness
 from evfem.mesh.hexahedron import EDGES, FACES, MIRRORED, PLACES
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
@@ -42,9 +44,6 @@ def test_raised_hexahedra():
     low = np.flatnonzero(solid.points[:, 1] == 0.0)
     np.testing.assert_array_equal(solid.node_sets["bottom"], low)
     assert raised(solid) is solid
-
-
-# -- files and checks ------------------------------------------------------------------------------------
 
 
 def solid(order=1, divisions=(2, 2, 2), split=True):
@@ -181,3 +180,30 @@ def test_vtk_reads_the_cells_as_they_are_meant(tmp_path):
         volumes = pyvista.read(tmp_path / "solid.vtu").compute_cell_sizes()["Volume"]
         assert volumes.min() > 0.0
         assert volumes.sum() == pytest.approx(8.0, rel=1e-6)
+
+
+def shell(order):
+    """A cap between spheres of 5 and 4 mm around the origin, the outer half millimetre its skin."""
+    mesh = block((6, 4, 6), split=lambda x, y, z: y < 0.5)
+    mesh = raised(mesh) if order == 2 else mesh
+    p, r, q = mesh.points.T
+    way = np.column_stack([p - 0.5, np.full_like(p, -2.0), q - 0.5])
+    radius = 5.0 - r
+    points = radius[:, None] * way / np.linalg.norm(way, axis=1)[:, None]
+    return replace(mesh, points=points)
+
+
+@pytest.mark.parametrize(("order", "error"), [(1, 4e-3), (2, 2e-5)])
+def test_a_spherical_skin_is_as_thick_as_the_radii_differ(order, error):
+    mesh = shell(order)
+    nodes = mesh.node_sets["bottom"]
+    inner = nodes[(np.abs(mesh.points[nodes][:, ::2]) < 0.8).all(axis=1)]
+    assert_allclose(layer_thickness(mesh, "upper", inner), 0.5, atol=error)
+
+
+def test_a_region_that_is_not_there_or_alone_is_refused():
+    mesh = block((1, 1, 1))
+    with pytest.raises(InputError, match='region: given "bone"'):
+        layer_thickness(mesh, "bone", np.array([0]))
+    with pytest.raises(InputError, match="another one below"):
+        layer_thickness(mesh, "lower", np.array([0]))

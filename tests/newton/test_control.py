@@ -20,9 +20,6 @@ def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
     assert force.missing(0.7, np.array([0.2, -5.0])) == 0.0
 
 
-# -- the voltage that follows a friction force ----------------------------------------------------------
-
-
 class Friction:
     """A pad whose friction force is 2 N/mm plus 3 N/mm for each kV^2: contact problems of one number."""
 

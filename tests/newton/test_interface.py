@@ -26,8 +26,6 @@ def interface_and_state(surface, statuses, solver=None):
     return model.equilibrium.interface, replace(state, status=status)
 
 
-# -- jumps of friction
-
 JUMPS = {"rougher": [[-9.0, 0.2], [0.3, 0.2], [0.3, 0.6]], "smoother": [[-9.0, 0.6], [0.3, 0.6], [0.3, 0.2]]}
 jumps = pytest.mark.parametrize("table", JUMPS.values(), ids=JUMPS.keys())
 

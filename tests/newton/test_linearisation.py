@@ -46,9 +46,6 @@ def gaps(model, surface_y=-0.1):
     return np.interp(x, corner, SAG * (0.5 * corner) ** 2) - surface_y
 
 
-# -- candidates ------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("reach", [0.12, 0.2, 0.6])
 def test_every_node_within_reach_is_a_candidate(reach):
     linear, model, state = made(body=FINE)
@@ -90,9 +87,6 @@ def test_a_candidate_stays_one_when_it_has_let_go():
     assert far in linear.candidates
 
 
-# -- the condensed body ----------------------------------------------------------------------------------
-
-
 def bent(model, state):
     """The state with a smooth deformation, the bone at rest."""
     x, y = model.mesh.points.T
@@ -127,11 +121,6 @@ def test_a_singular_tangent_is_a_failed_step():
     with pytest.raises(StepFailed, match="singular \\(as told\\)"):
         linear.factorise(state)
 
-
-# -- how long it is kept ---------------------------------------------------------------------------------
-
-
-# -- the attraction's part -------------------------------------------------------------------------------
 
 THIN = Layer(1e-3, 3.35)
 attracted = pytest.mark.parametrize("law", [Kaczmarek(), StrongTroxel()], ids=["kaczmarek", "strong_troxel"])
@@ -224,8 +213,6 @@ def test_an_attraction_that_does_not_change_has_no_part(how):
     linear.factorise(state)
     np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)
 
-
-# -- the field's own stiffness ---------------------------------------------------------------------------
 
 #: a voltage whose coupling is not faint
 VOLTS = 4000.0

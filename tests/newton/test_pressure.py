@@ -45,7 +45,6 @@ def without_pressure(monkeypatch):
     monkeypatch.setattr(splitlaw, "INCOMPRESSIBLE", np.inf)
 
 
-# -- iterations
 # ------------------------------------------------------------------------------------------------------
 
 
@@ -60,7 +59,6 @@ def test_a_press_takes_few_iterations_however_little_the_volume_changes(element,
     assert (result.substeps == 1).all()
 
 
-# -- the same equilibria
 # ---------------------------------------------------------------------------------------------
 
 
@@ -77,9 +75,7 @@ def test_the_equilibria_are_those_of_the_displacements_alone(element, monkeypatc
     assert np.abs(difference).max() < 1e-8
 
 
-# -- one linear step
 # -------------------------------------------------------------------------------------------------
 
 
-# -- checkpoints
 # -----------------------------------------------------------------------------------------------------

@@ -110,8 +110,6 @@ def test_turning_forces_are_part_of_the_body():
     assert_allclose(turning.transposed(W.T), W.T @ T)
 
 
-# -- candidates follow the contact
-
 TISSUE = ev.NeoHookean(E=0.1, nu=0.45)
 
 
@@ -172,8 +170,6 @@ def test_what_is_attracted_more_than_a_body_holds_is_a_candidate(stiff, many):
     assert set(steep) <= set(linear.candidates)
     assert (steep.size > 0.2 * model.pad.free.sum()) == many
 
-
-# -- each condition under every law, where all others hold ------------------------------------------------
 
 LAWS = {
     "coulomb": None,

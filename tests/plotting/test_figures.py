@@ -2,12 +2,24 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from tools.fakes import fake_result
+from tools.solids import block
 
-from evfem.plotting import contact_pressure, deformed, forces, history, signal
+from evfem import plotting
+from evfem.calibration.parameters import Parameter
+from evfem.calibration.result import FitResult
+from evfem.errors import InputError
+from evfem.mesh.mesh import raised
+from evfem.plotting import contact_pressure, deformed, forces, history, impedance, signal
+from evfem.plotting.figures import REGIONS
+from evfem.plotting.meshes import DIMMEST, EYE, regions
+from evfem.response.impedance import Impedance
 
 PNG = b"\x89PNG"
 #: a backend that tells which figures `plt.show()` shows, instead of opening windows
@@ -90,3 +102,88 @@ def test_given_axes_are_left_to_their_figure():
     for draw in (forces, contact_pressure, deformed):
         assert draw(fake_result(), ax=ax) is ax
     assert not hasattr(ax, "_repr_png_")
+
+
+def fitted(with_sd):
+    """Three forces and two widths, computed 1, -2, 3, -4 and 5 sd beside what was measured."""
+    measured, scale = np.array([10.0, 20.0, 30.0, 4.0, 5.0]), np.array([2.0, 2.0, 2.0, 0.5, 0.5])
+    names = [f"normal_force at indentation {x}" for x in (0.1, 0.2, 0.3)]
+    names += [f"contact_width.last, motion.0.gap {x}" for x in (0.1, 0.2)]
+    return FitResult(
+        parameters={"surface.friction": Parameter(0.1, 1.0)},
+        values={"surface.friction": 0.3},
+        unknowns=np.zeros(1),
+        errors=np.ones(1),
+        correlation=np.eye(1),
+        singular_values=np.ones(1),
+        names=names,
+        measured=measured,
+        predicted=measured + scale * np.array([1.0, -2.0, 3.0, -4.0, 5.0]),
+        scale=scale,
+        warnings=(),
+        tables={},
+        paths=Path(),
+        provenance={"sd": with_sd},
+    )
+
+
+@pytest.mark.parametrize(("with_sd", "factor", "unit"), [(True, 1.0, "sd"), (False, 100.0, "%")])
+def test_residuals_are_computed_minus_measured_over_their_scale(with_sd, factor, unit):
+    ax = plotting.residuals(fitted(with_sd))
+    drawn = {line.get_label(): line.get_xydata() for line in ax.lines if line.get_marker() == "o"}
+    assert list(drawn) == ["normal force", "contact width"]
+    np.testing.assert_allclose(drawn["normal force"], [[1, factor], [2, -2 * factor], [3, 3 * factor]])
+    np.testing.assert_allclose(drawn["contact width"], [[4, -4 * factor], [5, 5 * factor]])
+    assert f"({unit}" in ax.get_ylabel()
+    bands = [patch for patch in ax.patches if patch.get_label() == "two standard deviations"]
+    assert len(bands) == with_sd
+
+
+def made(unit="N/mm"):
+    return Impedance(np.array([1.0, 10.0, 100.0]), np.array([1.0, 1.0 + 1.0j, -2.0]), "normal", unit)
+
+
+def test_magnitude_and_phase():
+    upper, lower = impedance({"one": made(), "other": made()})
+    np.testing.assert_allclose(upper.get_lines()[0].get_ydata(), [1.0, np.sqrt(2.0), 2.0])
+    np.testing.assert_allclose(lower.get_lines()[1].get_ydata(), [0.0, 45.0, 180.0])
+    assert upper.get_ylabel() == "magnitude (N/mm)"
+    assert lower.get_xlabel() == "frequency (Hz)"
+    assert lower.get_legend() is None
+    assert len(impedance(made())) == 2
+
+
+@pytest.mark.parametrize("found", [{}, {"one": made(), "other": made("N/mm per mm")}])
+def test_what_cannot_be_drawn_together_is_refused(found):
+    with pytest.raises(InputError, match="found: given"):
+        impedance(found)
+
+
+SIZE = (2.0, 3.0, 4.0)
+
+
+def solid(order):
+    mesh = block((2, 3, 4), SIZE, split=lambda x, y, z: y > 1.0)
+    return raised(mesh) if order == 2 else mesh
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_faces_towards_the_eye_are_drawn(order):
+    """Three sides of the block, as wide as they look from there, shaded colours of the regions."""
+    ax = regions(solid(order))
+    polygons, *_ = ax.collections
+    paths = [path.vertices[:-1] for path in polygons.get_paths()]
+    assert len(paths) == 2 * 3 + 2 * 2 + 3 * 2
+    assert {len(path) for path in paths} == {4 if order == 1 else 8}
+    x, y = (np.array([path[:, i] for path in paths]) for i in (0, 1))
+    drawn = 0.5 * np.abs((x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)).sum()
+    towards = np.abs(EYE / np.linalg.norm(EYE))
+    assert drawn == pytest.approx(towards @ [3.0 * 2.0, 2.0 * 2.0, 2.0 * 3.0])
+    plain = np.array([to_rgb(colour) for colour in REGIONS[:2]])
+    colours = polygons.get_facecolors()[:, None, :3]
+    factor = (colours * plain).sum(axis=2) / (plain**2).sum(axis=1)
+    own = np.abs(colours - factor[..., None] * plain).max(axis=2) < 1e-12
+    assert own.any(axis=0).all()
+    assert (own.sum(axis=1) == 1).all()
+    assert ((factor[own] >= DIMMEST) & (factor[own] <= 1.0)).all()
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["lower", "upper"]

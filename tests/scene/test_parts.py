@@ -224,9 +224,6 @@ def test_a_part_that_no_run_could_use_is_refused_with_one_sentence(key, part, wo
         assert words in str(caught.value)
 
 
-# -- materials -------------------------------------------------------------------------------------------
-
-
 class Mine:
     def psi(self, F):
         return psi(F)
@@ -277,9 +274,6 @@ def test_a_term_may_be_what_makes_a_region_stiff():
 
     free = material(lambda F: 0.0 * ev.det(F))
     assert plan(scene(free).with_term(stiff, on=ev.Region("tissue"))).warnings == ()
-
-
-# -- force laws ------------------------------------------------------------------------------------------
 
 
 def one_value(gap, voltage, layers):
@@ -344,8 +338,6 @@ def test_a_law_is_tried_at_negative_voltages_where_a_scene_has_them(name):
         plan(scene(None, PRESS, *motion, law=law(signed), **more))
 
 
-# -- surfaces --------------------------------------------------------------------------------------------
-
 #: ramps of a table, with their slope: neither has a derivative at the kinks
 X = np.linspace(-4.0, 6.0, 101)
 KINKS = surface(
@@ -383,9 +375,6 @@ def test_a_surface_is_tried_along_the_way_alone():
     check_parts(on(surface(short)), 2)
     with pytest.raises(InputError, match="AssertionError"):
         check_parts(replace(on(surface(short)), motion=[PRESS, SLIDE, SLIDE]), 2)
-
-
-# -- friction and roughness ------------------------------------------------------------------------------
 
 
 def test_a_law_of_friction_behind_a_decorator_is_taken():

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.builders import finger
 from tools.meshes import block
 
 import evfem as ev
@@ -16,7 +17,11 @@ from evfem.planning.parts import check_parts
 from evfem.planning.plan import plan, scene_mesh
 from evfem.planning.plausibility import implausible, locking
 from evfem.scene import file as scenefile
-from evfem.scene.scene import default_scene
+from evfem.scene.motion import Press
+from evfem.scene.scene import Scene, default_scene
+from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Flat, Profile, Sinusoid
+from evfem.surface.textures import SelfAffine
 from evfem.tissue.splitlaw import split
 
 ROOT = Path(__file__).parents[2]
@@ -91,9 +96,6 @@ def test_bone_in_a_mesh_of_softer_parts_is_taken():
     assert "of bone, 6.5e+04 MPa" in implausible(asked, mesh, moduli | {"bone": 6.5e4})[0]
 
 
-# -- voltages and lengths --------------------------------------------------------------------------------
-
-
 def test_a_field_that_breaks_solids_down_is_doubted():
     """U / (eps_r s): 1000 V across 0.09 mm are 11 V/um, across the same in m 1160 V/um."""
     charged = scene(law=ev.Kaczmarek(), voltage=1000.0)
@@ -148,9 +150,6 @@ def test_lengths_in_metres_are_doubted():
     assert plan(whole(ev.Press(force=0.05))).warnings == ()
 
 
-# -- slides that never touch -----------------------------------------------------------------------------
-
-
 WEAK = {"law": ev.Kaczmarek(), "voltage": 100.0}
 SLIDES = [
     ((SLIDE,), {}, "motion 0, a slide at first touch, never touches: press before it"),
@@ -170,9 +169,6 @@ SLIDES = [
 def test_a_slide_that_never_touches_is_doubted(motion, more, said):
     found = plan(scene(None, *motion, **more)).warnings
     assert [sentence[: len(said)] for sentence in found] == [said] if said else found == ()
-
-
-# -- what is shipped -------------------------------------------------------------------------------------
 
 
 def sentences(shipped):
@@ -200,9 +196,6 @@ def test_the_built_in_scene_and_those_of_the_pages_stay_silent():
 def test_an_element_that_locks_in_incompressible_tissue_is_doubted(element, nu, said):
     found = [*locking(element, {"tissue": ev.NeoHookean(E=0.1, nu=nu)}, 2)]
     assert found == (["tissue hardly changes volume at all, and q2 cells lock: use q2p1 or q1_fbar"] * said)
-
-
-# -- attractions that no finger bears --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("insulator", "ratio"), [(ev.FILM, 17.345), (ev.TOUCHSCREEN, 782.9)])
@@ -254,9 +247,6 @@ def test_an_attraction_beyond_the_load_is_told_by_plan_run_and_sweep(tmp_path, c
     assert points[1]["message"] == ""
 
 
-# -- steps longer than what swings -----------------------------------------------------------------------
-
-
 def test_steps_longer_than_the_period_of_hand_or_tissue_are_told():
     """The hand's 2 pi sqrt(m / k), of a tissue 2 mm thick 4 h sqrt(rho / G); beyond critical damping neither
     swings, and where no mass moves the tissue does not.
@@ -279,3 +269,47 @@ def test_steps_longer_than_the_period_of_hand_or_tissue_are_told():
     assert len(both) == 2
     assert told(1.0, damping=2.01 * np.sqrt(stiffness * mass), viscosity=1e-3) == []
     assert len(told(1.0, viscosity=1e-9, dynamics="viscous")) == 1
+
+
+X = np.arange(-5.0, 5.001, 0.05)
+#: grooves 0.05 mm deep, 0.1 mm wide, 0.5 mm apart
+GROOVES = Profile(X, np.where(np.round(X / 0.05) % 10 < 2, -0.05, 0.0), friction=0.0)
+
+
+def rubbed(surface, cells=8):
+    return Scene(finger(block(cells, 3)), surface, motion=Press(indentation=0.02, steps=1))
+
+
+def test_grooves_between_the_nodes_are_warned_of():
+    found = plan(rubbed(GROOVES))
+    assert "sharper than the node spacing of the pad (0.25 mm)" in found.warning
+    assert "up to 0.05 of its 0.05 mm" in found.warning
+    assert " ".join(str(found).split()).endswith(f"Warning: {found.warning}")
+    with pytest.warns(UserWarning, match="sharper than the node spacing") as caught:
+        simulate(rubbed(GROOVES))
+    assert [Path(one.filename).name for one in caught] == ["test_plausibility.py"]
+
+
+@pytest.mark.parametrize("surface", [Flat(friction=0.0), Sinusoid(terms=[[0.05, 1.0, 0.0]], friction=0.0)])
+def test_what_the_nodes_can_feel_is_not(surface):
+    assert plan(rubbed(surface)).warning is None
+
+
+def test_how_much_of_the_slope_is_too_fine():
+    long, short = 2.0 * np.pi / 4.0, 2.0 * np.pi * 3.0  # whole waves along the pad
+    fine = Sinusoid(terms=[[0.05, long, 0.0], [3e-3, short, 0.0]], friction=0.0)
+    found = plan(rubbed(fine, cells=6)).warning
+    assert "(0.33 mm)" in found
+    # a wave as long as the spacing has no slope from node to node; the squares of the slopes add up
+    share = 3e-3 * short / np.hypot(3e-3 * short, 0.05 * long)
+    assert float(re.search(r"(\d+)%", found)[1]) == pytest.approx(100.0 * share, abs=1.0)
+
+
+def test_the_shortest_waves_of_roughness_need_five_nodes_each():
+    """Nodes 1/24 mm apart: 0.2083 mm."""
+    for shortest, enough in ((0.21, True), (0.2, False)):
+        rough = SelfAffine(hurst=0.9, rms=0.01, shortest=shortest, friction=0.0)
+        found = plan(rubbed(rough, cells=48)).warning
+        assert (found is None) == enough
+    assert "(0.2 mm) have fewer than 5 nodes of the pad each, which are 0.042 mm apart" in found
+    assert found.endswith("a shortest wave of 0.21 mm")

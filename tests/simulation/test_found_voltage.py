@@ -128,9 +128,6 @@ def test_a_charge_is_kept_by_a_finger_under_a_given_force():
     np.testing.assert_allclose(charge, 0.1 * np.sqrt([0.08, 0.16]), rtol=1e-7)
 
 
-# -- a given gap ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_voltage_is_found_for_every_gap_through_the_pull_in_and_back(dim):
     """U^2 = 2 k x (g + s)^2 / (eps_0 A): up to a third of the gap, down beyond, and the same way back."""
@@ -165,9 +162,6 @@ def test_a_gap_needs_the_monolithic_coupling():
         scene(2, 0.0, [ev.VoltageRamp(gap=0.05)], coupling="staggered")
 
 
-# -- derivatives ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seconds", [0.0, 1e-3])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, seconds):
@@ -197,9 +191,6 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
             assert np.sum(reading.by_position * way) == pytest.approx(slope, rel=2e-5)
         volts = [measure(seen(position, 120.0 + side)).value for side in (1.0, -1.0)]
         assert reading.by_voltage == pytest.approx(500.0 * (volts[0] - volts[1]), rel=1e-9)
-
-
-# -- a given voltage below the pull-in -----------------------------------------------------------------------
 
 
 @cache

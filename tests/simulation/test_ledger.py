@@ -323,9 +323,6 @@ def test_contact_pressures_are_nodal_forces_over_their_shares():
     assert (result.mean_contact_pressure <= result.peak_contact_pressure)[2:].all()
 
 
-# -- fields ----------------------------------------------------------------------------------------------
-
-
 def each_frame():
     result, model, states = run()
     yield from zip(result.frames, states[1:], [model] * len(states), strict=False)

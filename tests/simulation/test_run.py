@@ -48,9 +48,6 @@ def columns(result, *names):
     return np.array([getattr(result, name) for name in names])
 
 
-# -- the benchmark ---------------------------------------------------------------------------------
-
-
 @cache
 def benchmark(kind, level, element=None):
     return simulate(benchmark_scene(kind, level, element))
@@ -92,9 +89,6 @@ def test_full_slip_has_exactly_the_friction_coefficient():
     assert 2.2 < result.position[full].min() < 2.9
 
 
-# -- symmetry --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("options", [{}, {"law": Kaczmarek(), "voltage": 3000.0}], ids=["plain", "attracted"])
 def test_sliding_the_other_way_is_the_mirror_image(options):
     forth, back = (
@@ -113,8 +107,6 @@ def test_sliding_the_other_way_is_the_mirror_image(options):
     np.testing.assert_allclose(columns(back, *signed), -columns(forth, *signed), atol=1e-9)
     assert (forth.tangential_force[3:] > 0).all()
 
-
-# -- balances --------------------------------------------------------------------------------------
 
 BALANCED = {
     "flat": {"surface": Display(friction=0.5)},
@@ -146,9 +138,6 @@ def test_forces_balance_as_vectors_in_every_row(options, hold):
 
 def _holding(hold):
     return Press(force=0.03, steps=3), Slide(0.5, steps=5, hold=hold)
-
-
-# -- history and checkpoints -----------------------------------------------------------------------
 
 
 def test_rows_are_numbered_by_step_and_motion():

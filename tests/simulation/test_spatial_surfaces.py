@@ -139,8 +139,6 @@ def test_the_work_on_waves_falls_to_nothing_without_friction():
     assert lost[1] < 0.3 * lost[0]
 
 
-# -- long cylinders and the plane
-
 SOFT = ev.NeoHookean(E=0.1, nu=0.45)
 LIMITS = {
     "normal, waves": (

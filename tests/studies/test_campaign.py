@@ -24,9 +24,6 @@ from evfem.tissue.space import elements_on
 Ending = ending.Ending
 
 
-# -- drawing
-
-
 @pytest.fixture(scope="module")
 def drawn():
     return [drawing.draw(5, number) for number in range(400)]
@@ -133,8 +130,6 @@ def test_files_beside_a_scene_say_the_same(drawn, tmp_path):
     assert loaded.digest() == tables.scene_of(one).digest()
 
 
-# -- invariants
-
 SCENE = {
     "version": 1,
     "finger": {"resolution": "coarse", "ridges": False},
@@ -226,8 +221,6 @@ def test_a_node_held_at_a_jump_of_friction_breaks_nothing():
     assert invariants.broken(scene, result) == []
 
 
-# -- three dimensions
-
 TIP = {
     "version": 1,
     "finger": {"kind": "fingertip", "resolution": "coarse", "ridges": "none"},
@@ -264,9 +257,6 @@ def test_a_result_in_three_dimensions_has_the_same_invariants(solid):
     assert [one.name for one in invariants.broken(scene, replace(result, in_space=wide))] == ["signs"]
 
 
-# -- ends
-
-
 def ended(monkeypatch, raised):
     def stops(scene):
         raise raised
@@ -293,9 +283,6 @@ def test_rows_before_a_failure_are_checked_too(monkeypatch, correct):
     bad = CORRUPTED["balance"](correct[1])
     found = ended(monkeypatch, NotConverged(7, [1.0], "the residual grows", bad))
     assert (found.outcome, found.kind, found.steps) == ("invariants_broken", "balance", 7)
-
-
-# -- the campaign
 
 
 @pytest.fixture
@@ -359,8 +346,6 @@ def test_a_process_ends_at_its_limit_and_another_takes_its_place():
     assert run._lost(found[0.05], 0.05).outcome == "timeout"
     assert found[60.0].outcome == "equilibrium"
 
-
-# -- the property
 
 #: the normal suite's scenes, none of which takes more than a few seconds
 FEW = (3, 4, 5, 6, 7, 10, 11, 15, 16, 17)

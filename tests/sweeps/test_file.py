@@ -75,9 +75,6 @@ def test_the_file_of_the_scene_is_found_beside_the_sweep(tmp_path):
     assert tomllib.loads(sweep.points()[0].text)["surface"]["friction"] == 0.1
 
 
-# -- samples ---------------------------------------------------------------------------------------------
-
-
 def test_a_latin_hypercube_has_one_value_in_every_stratum_of_every_parameter():
     sample = ev.Samples({"a.b": ev.Uniform(2.0, 4.0), "a.c": ev.Normal(10.0, 3.0)}, count=200, seed=5)
     drawn = sample.draw()
@@ -112,8 +109,6 @@ def test_a_stream_belongs_to_its_parameter_and_seed():
     assert not np.any(ev.Samples({"a.b": one}, 10, seed=4, method="random").draw()["a.b"] == alone)
     assert not np.any(ev.Samples({"a.d": one}, 10, seed=3, method="random").draw()["a.d"] == alone)
 
-
-# -- mistakes --------------------------------------------------------------------------------------------
 
 SAMPLED = "[samples]\ncount = 3\nseed = 1\n[samples.parameters]\n"
 MISTAKES = [
@@ -151,10 +146,7 @@ MISTAKES = [
         f"{SAMPLED}surface.y = {{ between = [0.0, 1.0] }}",
         "samples.parameters.surface.y.uniform: given neither uniform nor normal",
     ),
-    (
-        SAMPLED.replace("seed = 1\n", "") + "surface.y = { normal = [0.0, 1.0] }",
-        "samples.seed: missing",
-    ),
+    (SAMPLED.replace("seed = 1\n", "") + "surface.y = { normal = [0.0, 1.0] }", "samples.seed: missing"),
     (
         SAMPLED.replace("seed = 1", "seed = -1") + "surface.y = { normal = [0.0, 1.0] }",
         "samples.seed: given -1",

@@ -260,9 +260,6 @@ def test_a_file_of_others_that_a_sweep_never_wrote_stops_it(plan, tmp_path, monk
     assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
 
 
-# -- processes -------------------------------------------------------------------------------------------
-
-
 def test_a_process_that_dies_costs_its_own_point_alone(tmp_path):
     words = {"a": "1", "b": "die", "c": "333", "d": "4444", "e": "55555", "f": "666666"}
     jobs = {key: (str(tmp_path / "died"), word) for key, word in words.items()}
@@ -352,9 +349,6 @@ def test_a_folder_in_which_a_sweep_is_at_work_is_refused(plan, tmp_path, capsys)
             assert capsys.readouterr().err == f"evfem: cannot use {out}: another run is at work in it\n"
 
 
-# -- Dask ------------------------------------------------------------------------------------------------
-
-
 def test_a_dask_cluster_gives_the_same_numbers(plan):
     from distributed import LocalCluster
 
@@ -380,9 +374,6 @@ def test_a_dask_cluster_gives_the_same_numbers(plan):
 def test_pools_that_cannot_be(plan, tmp_path, options, sentence):
     with pytest.raises(InputError, match=sentence):
         ev.sweep(plan, tmp_path / "out", **options)
-
-
-# -- units ------------------------------------------------------------------------------------------------
 
 
 def test_outputs_are_over_the_depth_of_the_scenes(plan):
@@ -411,9 +402,6 @@ def test_a_column_has_one_unit():
     spatial = units_of(scenefile.loads(tomli_w.dumps(force)))
     units = table_units(["contact_area.last"], ["motion.0.force"], [spatial])
     assert units == {"contact_area.last": "mm2", "motion.0.force": "N"}
-
-
-# -- the command -----------------------------------------------------------------------------------------
 
 
 def test_the_command_says_what_became_of_the_points(plan, tmp_path, monkeypatch, capsys):

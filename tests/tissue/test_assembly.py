@@ -11,9 +11,6 @@ from evfem.tissue.userforms import make_term, tried
 MU, LMBDA = 0.7, 1.9
 
 
-# -- theta in a user's form ------------------------------------------------------------------------------
-
-
 def test_theta_is_refused_where_it_has_no_meaning():
     space = rectangle("q1", (2, 2))
     with pytest.raises(InputError, match="a use of theta where it is not known"):

@@ -35,9 +35,6 @@ class Sum:
         return sum(term.forces(u) for term in self.terms)
 
 
-# -- viscosity -------------------------------------------------------------------------------------------
-
-
 @every_element
 @pytest.mark.parametrize("compiled", [True, False])
 def test_rotation_is_not_resisted(element, compiled):
@@ -89,9 +86,6 @@ def test_simple_shear_by_hand():
     assert term.dissipation(u) == pytest.approx(6.0 * eta * (g**2 + 0.5 * g**4) / STEP, rel=1e-12)
 
 
-# -- inertia ---------------------------------------------------------------------------------------------
-
-
 def test_free_fall():
     """Backward Euler by hand: after n steps v = n g dt and u = n (n + 1)/2 g dt^2, everywhere, unstrained."""
     space = rectangle("q1_fbar", (2, 2), jitter=0.2)
@@ -109,9 +103,6 @@ def test_free_fall():
         expected = [0.0, 0.5 * n * (n + 1) * gravity * dt**2]
         np.testing.assert_allclose(u, np.broadcast_to(expected, u.shape), atol=1e-12)
         assert term.dissipation(u) < 1e-20
-
-
-# -- which terms there are -------------------------------------------------------------------------------
 
 
 def test_only_what_is_asked_for():

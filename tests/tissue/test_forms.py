@@ -34,9 +34,6 @@ def crooked(u, v, w):
     )
 
 
-# -- forces ----------------------------------------------------------------------------------------------
-
-
 @every_kind
 def test_nail_bed_by_hand(element):
     """A bed of 0.02 MPa/mm moved by (0.3, -0.1) mm: every edge of 0.5 mm shares 0.01 (0.3, -0.1)
@@ -90,9 +87,6 @@ def test_unknown_places_are_refused():
     ):
         with pytest.raises(InputError, match=said):
             make_term(space, nail_bed, on, boundary)
-
-
-# -- in a run --------------------------------------------------------------------------------------------
 
 
 def block_scene(law=NEO_HOOKEAN, element="q2", friction=0.0, **motion):

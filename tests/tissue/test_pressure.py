@@ -82,7 +82,6 @@ def test_the_tangent_is_that_of_displacements_and_pressure(element, law):
     np.testing.assert_allclose(K @ du.ravel(), expected.ravel(), atol=1e-7 * np.abs(expected).max())
 
 
-# -- which laws need it
 # ------------------------------------------------------------------------------------------------
 
 
@@ -109,7 +108,6 @@ def test_laws_of_small_strain_and_stretchable_forms_do_not():
     assert nearly_incompressible(split(as_form, 2), 2)  # lambda / mu = 200
 
 
-# -- iterations
 # ------------------------------------------------------------------------------------------------------
 
 

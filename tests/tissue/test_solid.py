@@ -18,9 +18,6 @@ PLANE = {"hex8": "q1_fbar", "hex27p1": "q2p1"}
 every_element = pytest.mark.parametrize("element", list(PLANE))
 
 
-# -- convergence ----------------------------------------------------------------------------------------
-
-
 def swell(x, y, z):
     """A smooth displacement with volume changes, and F: (3, ...), (3, 3, ...)."""
     s = [np.sin(2 * x + y + z), np.cos(3 * y - z), np.sin(x - 2 * z)]
@@ -72,9 +69,6 @@ def test_order_of_convergence_and_no_locking(element):
     assert stiff == pytest.approx(soft, rel=0.25)
 
 
-# -- plane strain as a special case ---------------------------------------------------------------------
-
-
 @every_element
 def test_strip_between_fixed_sides_is_plane_strain(element):
     """Half as deep as wide, z held: displacements and forces per depth are the plane element's."""
@@ -106,9 +100,6 @@ def test_strip_between_fixed_sides_is_plane_strain(element):
     stress, J = tissue3.cell_stress(u3)
     assert np.abs(stress[:, 4:]).max() < 1e-12
     assert sorted(J) == pytest.approx(sorted(tissue2.cell_stress(u2)[1]), rel=1e-10)
-
-
-# -- time, user's forms, the body ------------------------------------------------------------------------
 
 
 @every_element

@@ -61,9 +61,6 @@ def stress_of(law, F):
     return law.P(F) if hasattr(law, "P") else neo_hookean_stress(F, MU, LMBDA)
 
 
-# -- patch test -----------------------------------------------------------------------------------------
-
-
 @every_law
 @every_element
 @pytest.mark.parametrize("shape", ["distorted", "curved"])
@@ -95,9 +92,6 @@ def test_patch(element, law, shape):
     np.testing.assert_allclose(stress[:, told], np.tile(expected[told], (len(stress), 1)), atol=1e-12)
 
 
-# -- derivatives ----------------------------------------------------------------------------------------
-
-
 @every_law
 @every_element
 def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(element, law):
@@ -117,9 +111,6 @@ def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(elem
         slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
         np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=5e-9 * scale)
     assert abs(K - K.T).max() < 1e-9 * scale
-
-
-# -- twins ----------------------------------------------------------------------------------------------
 
 
 def twin_energy(space, u):
@@ -211,9 +202,6 @@ def test_compiled_loops_are_the_form_of_the_viscosity(element):
 def test_compiled_loops_are_used_where_they_were_built(element, built):
     tissue = Tissue(space_of(element, (1, 1, 1)), {"lower": LAWS["neo_hookean"]})
     assert (tissue.loops is None) == (find_spec(f"evfem.tissue.kernels.{built}") is None)
-
-
-# -- geometry and refusals -------------------------------------------------------------------------------
 
 
 @plane_element

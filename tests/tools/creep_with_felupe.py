@@ -1,4 +1,4 @@
-"""Creep of a block with one Maxwell branch by FElupe (`pip install felupe`), for `tissue/test_creep.py`.
+"""Creep of a block with one Maxwell branch by FElupe (`pip install felupe`), for `tissue/test_branches.py`.
 
 FElupe's branch is of small strain, its step exact for strain that grows evenly. Steps are equal and the block
 is linear, so the forces after the bone has moved within the first step give the displacements under a

@@ -121,8 +121,6 @@ def _scene(rng):
     return rng.choice([PAD, head("square.vtu")]) + surface + voltage + SOLVER + motion
 
 
-# -- damage
-
 #: what numbers and words of a text are replaced with
 NASTY = (
     *("nan", "inf", "-inf", "1e400", "-1e308", "1e308", "5e-324", "0", "-0.0", "-1", "1e-300", "1e300"),

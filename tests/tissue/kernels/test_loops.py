@@ -22,9 +22,6 @@ RANDOM = np.random.default_rng(2)
 STEP = 1e-2
 
 
-# -- layout ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("count", [1, LANES, LANES + 5])
 def test_blocks_hold_every_cell_and_the_last_again(count):
     values = 1.0 + RANDOM.random((count, 3, 2))
@@ -47,9 +44,6 @@ def test_arrays_that_do_not_fit_are_refused(dim, nodes, kind):
     with pytest.raises(ValueError, match=r"kind|do not know"):
         loops(dim).smallest_J(space.cells._replace(sizes=(space.size, 2, nodes, 4, 0, kind)), u)
     assert loops(dim).smallest_J(space.cells, u) == 1.0
-
-
-# -- the volume ------------------------------------------------------------------------------------------
 
 
 def exact_log_J(H):
@@ -77,9 +71,6 @@ def test_the_logarithm_of_the_volume_keeps_its_digits(size):
         exact = exact_log_J(H)
         assert np.sqrt(energy) == pytest.approx(abs(exact), rel=1e-14, abs=4e-15 * size)
         assert pytest.approx(np.exp(exact), rel=1e-14) == J
-
-
-# -- Kelvin-Voigt ----------------------------------------------------------------------------------------
 
 
 def green(space, u):
