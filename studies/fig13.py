@@ -13,7 +13,7 @@ import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
-from evfem.estimate.rendering import Recording, apparent_friction, record, replay, voltage_for
+from evfem.estimate.rendering import Recording, replay
 from evfem.export import paraview
 from evfem.plotting import side_by_side
 
@@ -73,11 +73,7 @@ def _instant(recording: Recording, step: int) -> Instant:
 
 def instants(case: rendered.Case) -> dict[str, Instant]:
     """Reference and display in the step of the slide with the largest voltage by (20a)."""
-    reference = record(rendered.reference_scene(case, every=1))
-    felt = apparent_friction(reference.result)
-    full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
-    _, friction = rendered.display_friction(case, felt, full_slip)
-    signal = voltage_for(felt, rendered.display_encoding(friction))
+    reference, _, _, (_, friction), signal = rendered.felt_on(case, every=1)
     number = int(np.argmax(signal.profile.voltage[1:])) + 1
     press, slide = reference.scene.motion
     assert isinstance(slide, ev.Slide)

@@ -18,7 +18,7 @@ import evfem as ev
 from evfem.common.arrays import Floats
 
 from .common import Series, Study
-from .plots import COLOURS, Figure, panels
+from .plots import FIRST, Figure, panels
 from .relaxation import SHARES, pad
 
 DEPTHS = (0.3, 0.6, 1.0)
@@ -93,11 +93,10 @@ def draw(series: list[Series], depths: tuple[float, ...]) -> Figure:
     """Real and imaginary part, normal and tangential, with the spectrum of the branches."""
     figure, axes = panels(5.6, 2, rows=2)
     kept = {one.name: one for one in series}
-    colours = [COLOURS[name] for name in ("kaczmarek", "strong_troxel", "fe")]
     for row, part in enumerate(("real", "imaginary")):
         for column, axis in enumerate(AXES):
             ax = axes[2 * row + column]
-            for depth, colour in zip(depths, colours, strict=False):
+            for depth, colour in zip(depths, FIRST, strict=False):
                 one = kept[f"{part}.{axis}.{depth:g}_mm"]
                 ax.plot(one.x, one.y, color=colour, lw=1.2, label=f"{depth:g} mm")
             size = kept[f"real.{axis}.{depths[-1]:g}_mm"].y[0] / kept["branches.real"].y[0]

@@ -15,7 +15,7 @@ from typing import Any
 import evfem as ev
 
 from .common import Series, Study
-from .plots import COLOURS, Figure, panels
+from .plots import FIRST, Figure, panels
 
 FILMS, FREQUENCIES = (0.0, 2.0, 5.0, 10.0), (30.0, 250.0, 2000.0)
 LOAD, AMPLITUDE, FRICTION, ROUGH = 0.05, 100.0, 0.3, 1e-3
@@ -78,11 +78,10 @@ def draw(series: list[Series]) -> Figure:
     """Friction with and without a voltage, and what the voltage adds."""
     figure, (left, right) = panels(3.0, 2)
     kept = {one.name: one for one in series}
-    colours = [COLOURS[name] for name in ("kaczmarek", "strong_troxel", "fe")]
     off = kept["off.friction"]
     left.plot(off.x, off.y, "o--", color="black", lw=1.0, ms=4, label="no voltage")
     keys = [name.removesuffix(".gain") for name in kept if name.endswith(".gain")]
-    for key, colour, size in zip(keys, colours, (8, 4, 4), strict=False):
+    for key, colour, size in zip(keys, FIRST, (8, 4, 4), strict=False):
         label = key.replace("Hz", " Hz")
         one, gain = kept[f"{key}.friction"], kept[f"{key}.gain"]
         left.plot(one.x, one.y, "o-", color=colour, lw=1.2, ms=size, label=label)

@@ -25,6 +25,8 @@ COLOURS = {
     "fe": "#009E73",
     "neutral": "#555555",
 }
+#: of the first curves of a panel
+FIRST = [COLOURS[name] for name in ("kaczmarek", "strong_troxel", "fe", "measured")]
 QUICK = "--quick: coarser and shorter than the study"
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import evfem as ev
 
 from .common import Series, Study
-from .plots import COLOURS, Figure, panels
+from .plots import FIRST, Figure, panels
 from .rolling import HALF_PLANE, Rolling, rolled
 
 SHARES = ((0.8, 0.004), (0.5, 0.07), (0.4, 1.4))
@@ -108,17 +108,16 @@ def beside(found: Rolling, speed: float) -> dict[str, float]:
 def draw(series: list[Series]) -> Figure:
     """Forces held, creep, strokes, and pressure below the cylinder."""
     figure, (holding, sinking, sideways, rolling) = panels(5.2, 2, rows=2)
-    colours = [COLOURS[name] for name in ("kaczmarek", "strong_troxel", "fe", "measured")]
     groups: dict[str, list[Series]] = {}
     for one in series:
         groups.setdefault(one.name.split(".")[0], []).append(one)
     for name, ax in (("held", holding), ("stroke", sideways), ("rolling", rolling)):
-        for one, colour in zip(groups[name], colours, strict=False):
+        for one, colour in zip(groups[name], FIRST, strict=False):
             label = one.name.split(".", 1)[1].replace("_mm_s", " mm/s")
             ax.plot(one.x, one.y, color=colour, lw=1.2, label=label)
         ax.legend(fontsize=7)
     (creep,) = groups["creep"]
-    sinking.plot(creep.x, creep.y, color=colours[0], lw=1.2)
+    sinking.plot(creep.x, creep.y, color=FIRST[0], lw=1.2)
     holding.set(xscale="log", xlabel="time since touch (s)", ylabel="force over that at rest")
     sinking.set(xscale="log", xlabel="time under the load (s)", ylabel="indentation (mm)")
     sideways.set(xlabel="bone's x (mm)", ylabel="tangential force (mN/mm)")

@@ -112,13 +112,6 @@ def reference_scene(case: Case, every: int = 1_000_000) -> ev.Scene:
     return ev.Scene(pad(case), surface, motion=motion, solver=solver, output=output)
 
 
-def reference_of(case: Case) -> rendering.Recording:
-    """The run of a case's reference; that the load drifts where its indentation is held is known."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "motion 1 slides with the indentation held")
-        return rendering.record(reference_scene(case))
-
-
 def display_friction(case: Case, felt: rendering.ApparentFriction, full_slip: float) -> tuple[float, float]:
     """Smallest apparent friction of the reference after full slip, and friction of the display.
 
@@ -136,6 +129,20 @@ def display_encoding(friction: float, skin: float = SKIN) -> Encoding:
     return Encoding(ev.Kaczmarek(), table2_layers(skin), AREA, friction)
 
 
+def felt_on(
+    case: Case, every: int = 1_000_000
+) -> tuple[rendering.Recording, rendering.ApparentFriction, float, tuple[float, float], rendering.Signal]:
+    """A case's reference, what is felt, its full slip (mm), `display_friction` and the voltage of (20a)."""
+    with warnings.catch_warnings():  # that the load drifts where its indentation is held is known
+        warnings.filterwarnings("ignore", "motion 1 slides with the indentation held")
+        reference = rendering.record(reference_scene(case, every))
+    felt = rendering.apparent_friction(reference.result)
+    full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
+    frictions = display_friction(case, felt, full_slip)
+    signal = rendering.voltage_for(felt, display_encoding(frictions[1]))
+    return reference, felt, full_slip, frictions, signal
+
+
 def render(case: Case) -> Outcome:
     """Run the reference of a case, and the display with each of its encodings.
 
@@ -143,11 +150,7 @@ def render(case: Case) -> Outcome:
     with Table 2's 0.38 mm of stratum corneum.
     """
     begin = time.process_time()
-    reference = reference_of(case)
-    felt = rendering.apparent_friction(reference.result)
-    full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
-    lowest, friction = display_friction(case, felt, full_slip)
-    signal = rendering.voltage_for(felt, display_encoding(friction))
+    reference, felt, full_slip, (lowest, friction), signal = felt_on(case)
     costs = {"reference_cpu_s": time.process_time() - begin} | _costs(reference)
     rendered = {}
     for kind in case.encodings:

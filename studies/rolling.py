@@ -16,6 +16,8 @@ import numpy as np
 import evfem as ev
 from evfem.common.arrays import Floats
 
+from .stability.scenes import grid
+
 RADIUS, LOAD, MODULUS, SHARE, TAU = 10.0, 0.05, 0.01, 2.0, 0.07
 #: speed in mm/s -> half width, distance of the middle ahead of the lowest point (mm), tangential over normal
 HALF_PLANE = {
@@ -45,13 +47,7 @@ def block(cell: float) -> ev.Mesh:
     x = np.concatenate([-far[::-1], np.linspace(-TRACK, TRACK, round(2.0 * TRACK / cell) + 1), far])
     fine = np.arange(6) * cell
     y = np.concatenate([fine, np.geomspace(fine[-1], HEIGHT, 14)[1:]])
-    across, up = np.meshgrid(x, y)
-    number = np.arange(across.size).reshape(across.shape)
-    corners = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
-    cells = np.stack([corner.ravel() for corner in corners], axis=1)
-    sets = {"pad": number[0], "bone": number[-1]}
-    points = np.column_stack([across.ravel(), up.ravel()])
-    return ev.Mesh(points, cells, "quad", np.zeros(len(cells), dtype=np.int64), {"tissue": 0}, sets)
+    return grid(*np.meshgrid(x, y))
 
 
 def rolled(speed: float, cell: float, step: float) -> Rolling:

@@ -25,7 +25,7 @@ from evfem.common.arrays import Floats
 from evfem.response.parameters import parameter_of
 
 from .common import CASES, Series, Study, markdown, median_interval, paper_display, participants
-from .plots import COLOURS, Figure, panel_letter
+from .plots import COLOURS, Figure, new_figure, panel_letter
 from .printed import Printed
 
 #: last step of each state, and what is asked of it
@@ -191,8 +191,6 @@ def decides(found: dict[str, Floats]) -> list[str]:
 
 def draw(found: dict[str, Floats], hovering: dict[str, Any], pressed: dict[bool, Any]) -> Figure:
     """Derivatives as a table of colours, and both figures with bands."""
-    from evfem.plotting.figures import new_figure
-
     figure = new_figure(1.6 + 0.26 * max(len(found), 12), 9.2)
     grid = figure.add_gridspec(2, 2, width_ratios=[1.5, 1.0])
     axes = [figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])]

@@ -13,7 +13,7 @@ from typing import Any
 import evfem as ev
 
 from .common import Series, Study
-from .plots import COLOURS, Figure, panels
+from .plots import FIRST, Figure, panels
 
 MODULI, THICKNESSES, NU = (0.1, 0.3, 1.0), (0.5, 2.0, 8.0), 0.48
 LOAD, VOLTAGE, FRICTION = 0.05, 1000.0, 0.3
@@ -63,10 +63,9 @@ def main(quick: bool = False) -> Study:
 def draw(series: list[Series], rigid: dict[str, float]) -> Figure:
     """A panel for each measure."""
     figure, axes = panels(4.6, 2, rows=2)
-    colours = [COLOURS[name] for name in ("kaczmarek", "strong_troxel", "fe")]
     for ax, (name, label) in zip(axes, MEASURES.items(), strict=True):
         curves = [one for one in series if one.name.startswith(name)]
-        for one, colour in zip(curves, colours, strict=False):
+        for one, colour in zip(curves, FIRST, strict=False):
             thickness = one.name.split("h_")[1].removesuffix("mm")
             ax.plot(one.x, one.y, "o-", color=colour, lw=1.2, ms=4, label=f"{thickness} mm thick")
         ax.axhline(rigid[name], color="black", ls="--", lw=0.8, label="rigid")

@@ -18,7 +18,7 @@ import evfem as ev
 from evfem.common.arrays import Floats
 
 from .common import Series, Study
-from .plots import COLOURS, Figure, new_figure
+from .plots import COLOURS, FIRST, Figure, new_figure
 
 LOAD, STATIC, FALL, AROUND = 0.04, 0.4, 0.5, 0.5
 HAND = ev.Hand(stiffness=0.02, mass=1e-6)
@@ -138,8 +138,7 @@ def draw(series: list[Series], speeds: tuple[float, ...]) -> Figure:
     figure = new_figure(3.2)
     whole, slip, right = figure.subplots(1, 3, width_ratios=[3, 2, 2])
     kept = {one.name: one for one in series}
-    colours = [COLOURS[name] for name in ("kaczmarek", "strong_troxel", "fe")]
-    for speed, colour in zip(speeds, colours, strict=False):
+    for speed, colour in zip(speeds, FIRST, strict=False):
         one, exact = (kept[f"{kind}.{speed:g}_mm_s"] for kind in ("simulated", "reference"))
         whole.plot(one.x, one.y, color=colour, lw=1.2, label=f"{speed:g} mm/s")
         begin, end = exact.x[0], exact.x[-1]

@@ -26,9 +26,6 @@ def _ratio(result: Result, row: int) -> float:
     return float(result.tangential_force[row] / result.normal_force[row])
 
 
-# -- friction
-
-
 def _reversals(log: Log, mu: float, ridges: bool) -> Verdict:
     """Two reversals, each leg long enough to slip everywhere."""
     legs = (4.0 + 2.0 * mu) * np.array([1.0, -1.5, 1.5])
@@ -89,9 +86,6 @@ def _far(log: Log) -> Verdict:
     off = float(np.abs(result.tangential_force[later] / result.normal_force[later] - 0.3).max())
     spread = float(np.ptp(result.normal_force[later]) / result.normal_force[-1])
     return off < 1e-6 and spread < 1e-6, f"F_t/F_n within {off:.0e}, F_n within {spread:.0e} from 6 to 20 mm"
-
-
-# -- texture
 
 
 def _textured(surface: Any, ridges: bool, dynamics: str, distance: float = 2.0, steps: int = 100) -> Scene:
@@ -182,9 +176,6 @@ _add(
 )
 
 
-# -- near and far
-
-
 def _deep(log: Log, ridges: bool) -> Verdict:
     motion = Press(indentation=3.0, steps=15), Slide(3.0, steps=15)
     result = log.simulate(scene(pad(ridges), Flat(friction=0.3), *motion))
@@ -245,9 +236,6 @@ def _unloading(log: Log) -> Verdict:
     work = float(result.external_work[-1] / result.friction_dissipation[-1]) - 1.0
     good = left < 1e-9 and result.stored_energy[-1] < 1e-12 and abs(work) < 0.05
     return good, f"{left:.0e} mm and {result.stored_energy[-1]:.0e} N left, work {work:+.1%} of friction's"
-
-
-# -- steps ten times too large
 
 
 def _at_once(log: Log, ridges: bool, mu: float, depth: float) -> Verdict:

@@ -19,9 +19,6 @@ VOLTAGE = Group("voltage")
 GROUPS = (PULL_IN, THIN, VOLTAGE)
 
 
-# -- a finger that hovers
-
-
 def _hysteresis(log: Log, law: str, top: float) -> Verdict:
     up, down = ev.VoltageRamp(top, steps=10), ev.VoltageRamp(0.0, steps=10)
     result = log.simulate(scene(pad(), ev.Display(), ev.Hover(0.05), up, down, law=LAWS[law]))
@@ -39,9 +36,6 @@ for _law, _top in (("strong_troxel", 3000.0), ("kaczmarek", 5000.0)):
     PULL_IN.case(
         f"hover {_law}", f"up to {_top:g} V and back: lets go below where it snaps in, undeformed at the end"
     )(partial(_hysteresis, law=_law, top=_top))
-
-
-# -- a plate: a soft layer between rollers, whose travel is far below its thickness
 
 
 @ev.form
@@ -113,9 +107,6 @@ for _law in LAWS:
     )(partial(_plate, law=_law))
 
 
-# -- thin insulators
-
-
 def _thin(log: Log, law: str, thickness: float) -> Verdict:
     """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact width.
     Under Strong-Troxel's law that is more than the shear of the pad can overcome: it sticks.
@@ -142,9 +133,6 @@ for _law in LAWS:
             f"140 V: touching skin carries p(0), the pad {_ENDS[_law]}",
             quick=_thickness == 1e-3 and _law == "kaczmarek",
         )(partial(_thin, law=_law, thickness=_thickness))
-
-
-# -- voltages that jump
 
 
 @VOLTAGE.case("square wave", "0 and 1000 V in turn: every plateau pulls alike, F_t = 0.3 F_n in every step")

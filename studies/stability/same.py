@@ -93,9 +93,6 @@ for _name, (_one, _other) in {
     )
 
 
-# -- other units: lengths, stresses and voltages multiplied together
-
-
 def _body(mesh: Mesh, length: float, stress: float) -> MeshedFinger:
     skin = Electrical(stratum_corneum_thickness=0.38 * length, stratum_corneum_eps_r=1650.0)
     return MeshedFinger(scaled(mesh, length), {"tissue": NeoHookean(E=0.1 * stress, nu=0.4)}, skin)

@@ -103,9 +103,6 @@ for _contrast in (500.0, 3000.0, 1e6):
     )(partial(_series, contrast=_contrast))
 
 
-# -- meshes of the user's own
-
-
 def _against_regular(log: Log, mesh: ev.Mesh, allowed: float) -> Verdict:
     motion = ev.Press(indentation=0.4, steps=3), ev.Slide(1.5, steps=6)
     bodies = [finger(one) for one in (block(16, 8, sag=0.4), mesh)]
