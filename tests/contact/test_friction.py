@@ -16,7 +16,6 @@ from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
 from evfem.surface.friction import KINDS, Slipping
 
-pytestmark = pytest.mark.solver
 LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)
 ADHESIVE = ev.AdhesiveFriction(strength=0.004)
 STRIBECK = ev.RateFriction(speed=5.0, ratio=0.4)

@@ -3,8 +3,8 @@
 import meshio
 import numpy as np
 import pytest
+from evfem.studies.benchmark import benchmark_mesh
 from tools.mesh_parts import REGIONS, of_kind, raw
-from tools.meshes import half_finger
 
 from evfem.errors import InputError, StorageError
 from evfem.mesh import file as meshfile
@@ -41,7 +41,7 @@ def test_every_kind_of_mesh_survives_a_file(kind, ending, tmp_path):
 
 
 def test_version_four_gmsh_file_is_read(tmp_path):
-    mesh = half_finger()
+    mesh = benchmark_mesh(0)
     meshfile.write(mesh, tmp_path / "two.msh")
     file = meshio.read(tmp_path / "two.msh")
     names = {(1, 3): "pad", (1, 4): "bone", (2, 1): "tissue", (2, 2): "skin"}
@@ -143,7 +143,7 @@ def test_unreadable_file_gets_a_sentence_and_a_clean_terminal(name, content, tmp
 
 def test_cells_outside_every_physical_group_are_refused(tmp_path):
     path = tmp_path / "mesh.msh"
-    meshfile.write(half_finger(), path)
+    meshfile.write(benchmark_mesh(0), path)
     path.write_text(
         path.read_text().replace('2 2 "skin"\n', "").replace("$PhysicalNames\n4", "$PhysicalNames\n3")
     )
@@ -154,7 +154,7 @@ def test_cells_outside_every_physical_group_are_refused(tmp_path):
 @pytest.mark.parametrize("name", ["mesh.stl", "mesh.vtk", "mesh.obj", "mesh", "mesh.VTX"])
 def test_format_without_names_is_refused_and_nothing_written(name, tmp_path):
     with pytest.raises(InputError, match="cannot carry the names"):
-        meshfile.write(half_finger(), tmp_path / name)
+        meshfile.write(benchmark_mesh(0), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -168,15 +168,15 @@ def test_failed_write_leaves_the_old_file_alone(tmp_path, monkeypatch):
 
     monkeypatch.setitem(meshfile.WRITERS, ".vtu", full)
     with pytest.raises(StorageError, match="No space left"):
-        meshfile.write(half_finger(), path)
+        meshfile.write(benchmark_mesh(0), path)
     assert path.read_bytes() == b"old"
     assert [file.name for file in tmp_path.iterdir()] == ["mesh.vtu"]
     with pytest.raises(StorageError):
-        meshfile.write(half_finger(), tmp_path / "no folder" / "mesh.vtu")
+        meshfile.write(benchmark_mesh(0), tmp_path / "no folder" / "mesh.vtu")
 
 
 def test_msh_cannot_carry_a_lonely_node(tmp_path):
-    mesh = half_finger()
+    mesh = benchmark_mesh(0)
     sets = {**mesh.node_sets, "mark": np.array([400])}
     with pytest.raises(InputError, match="node 400"):
         meshfile.write(

@@ -3,8 +3,8 @@
 import meshio
 import numpy as np
 import pytest
+from evfem.studies.benchmark import benchmark_mesh
 from tools.mesh_parts import REGIONS, of_kind, raw
-from tools.meshes import half_finger
 
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
@@ -13,7 +13,7 @@ from evfem.mesh.mesh import Mesh, raised
 
 def shifted_copy(gap):
     """Two bodies side by side."""
-    mesh = half_finger()
+    mesh = benchmark_mesh(0)
     n = len(mesh.points)
     points = np.vstack([mesh.points, mesh.points + np.array([gap, 0.0])])
     sets = {name: np.append(nodes, nodes + n) for name, nodes in mesh.node_sets.items()}
@@ -42,13 +42,13 @@ def hanging():
 
 
 def changed_cells(change):
-    mesh = half_finger()
+    mesh = benchmark_mesh(0)
     cells, region = change(mesh.cells.copy(), mesh.region)
     return {"cells": [("quad", cells)], "cell_data": {"region": [region]}}
 
 
 def moved(node, place, mesh=None):
-    mesh = half_finger() if mesh is None else mesh
+    mesh = benchmark_mesh(0) if mesh is None else mesh
     points = mesh.points.copy()
     points[node] = place
     return raw(Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names, mesh.node_sets))
@@ -74,8 +74,8 @@ def crossed(cells, region):
 
 QUAD8 = {"cells": [("quad8", of_kind("quad9").cells[:, :8])]}
 MIXED = {
-    "cells": [("quad", half_finger().cells[:-1]), ("triangle", half_finger().cells[-1:, :3])],
-    "cell_data": {"region": [half_finger().region[:-1], half_finger().region[-1:]]},
+    "cells": [("quad", benchmark_mesh(0).cells[:-1]), ("triangle", benchmark_mesh(0).cells[-1:, :3])],
+    "cell_data": {"region": [benchmark_mesh(0).region[:-1], benchmark_mesh(0).region[-1:]]},
 }
 
 WRONG = {
@@ -93,7 +93,7 @@ WRONG = {
     "bow tie": (changed_cells(crossed), "cells (cell 17"),
     "tangled cell": (moved(61 * 5 + 30, [0.0, -2.0]), "cells (cell"),
     "tangled mid-node": (
-        moved(raised(half_finger()).cells[80, 4], [0.0, -3.0], raised(half_finger())),
+        moved(raised(benchmark_mesh(0)).cells[80, 4], [0.0, -3.0], raised(benchmark_mesh(0))),
         "tangled cells",
     ),
     "cell twice": (
@@ -116,7 +116,7 @@ WRONG = {
         "without an edge",
     ),
     "no regions": ({"cell_data": {}}, "without region numbers"),
-    "fractional regions": ({"cell_data": {"region": [half_finger().region + 0.5]}}, "no integers"),
+    "fractional regions": ({"cell_data": {"region": [benchmark_mesh(0).region + 0.5]}}, "no integers"),
 }
 
 

@@ -11,7 +11,6 @@ from evfem.errors import InputError
 from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
 
-pytestmark = pytest.mark.solver
 #: hardly deforms: 4 mm on 0.02 mm of 50 MPa
 SLAB = finger(block(2, 1, width=4.0, height=0.02), E=50.0, nu=0.0)
 N, K, M = 0.04, 0.02, 1e-6

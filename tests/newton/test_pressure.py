@@ -15,7 +15,6 @@ from evfem.mesh.file import read
 from evfem.simulation.run import simulate
 from evfem.tissue import splitlaw
 
-pytestmark = pytest.mark.solver
 #: element -> Poisson's ratios at which it is no stiffer by locking than its own iterations can bear
 NEARLY = {
     "q1": (0.4999, 0.49999, 0.4999999),

@@ -8,8 +8,6 @@ from tools.domes import dome_scene
 
 import evfem as ev
 
-pytestmark = pytest.mark.solver
-
 PAD = ev.FingerPad(resolution="coarse", ridges=False)
 VISCOUS = ev.Solver(dynamics="viscous")
 

@@ -13,8 +13,6 @@ import evfem as ev
 from evfem.simulation.run import Run
 from evfem.solver.linearbody import LinearBody
 
-pytestmark = pytest.mark.solver
-
 PAD = ev.FingerPad(resolution="coarse", ridges=False)
 PRESS = ev.Press(force=0.05, steps=2)
 

@@ -1,38 +1,20 @@
 """Small bodies and scenes that several tests share, and what their results say."""
 
 import numpy as np
+from evfem.studies.stability.case import out_of_balance as balance
+from evfem.studies.stability.scenes import INSULATOR, SKIN, finger
+from evfem.studies.stability.scenes import benchmark as benchmark_finger
+from evfem.studies.stability.scenes import pad as coarse_pad
 
-from evfem.electrostatics.laws import Kaczmarek, Layer
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.electrostatics.laws import Kaczmarek
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.result import Saved
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Display
-from evfem.tissue.laws import NeoHookean
-from tools.meshes import half_finger
 
-SKIN = Electrical(stratum_corneum_thickness=0.38, stratum_corneum_eps_r=1650.0)
-INSULATOR = Layer(thickness=0.09, eps_r=3.35)
-BENCHMARK_LAWS = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.30)}
-#: level of the benchmark -> cells around, across the tissue, across the skin
-LEVELS = {0: (60, 10, 2), 1: (120, 20, 4), 2: (336, 56, 12)}
-
-
-def finger(mesh, E=0.1, nu=0.4, viscosity=0.0):
-    """A body of one neo-Hookean material."""
-    return MeshedFinger(mesh, {"tissue": NeoHookean(E=E, nu=nu)}, SKIN, viscosity)
-
-
-def coarse_pad():
-    """Table 2's finger without ridges on its coarsest mesh."""
-    return FingerPad(ridges=False, resolution="coarse")
-
-
-def benchmark_finger(level=0):
-    """The finger of the press-and-slide benchmark."""
-    return MeshedFinger(half_finger(*LEVELS[level]), BENCHMARK_LAWS, SKIN)
+__all__ = ("INSULATOR", "SKIN", "balance", "benchmark_finger", "coarse_pad", "finger")
 
 
 def benchmark_scene(kind, level, element=None, steps=15):
@@ -44,14 +26,6 @@ def benchmark_scene(kind, level, element=None, steps=15):
     law, voltage = (Kaczmarek(), 1000.0) if kind == "C" else (None, 0.0)
     solver, output = Solver(element=element), Output(every=1000)
     return Scene(benchmark_finger(level), surface, law, voltage, motion, solver=solver, output=output)
-
-
-def balance(result):
-    """Out-of-balance force of every row (rows, 2) relative to its largest force (at least 1e-6 N/mm)."""
-    x = [result.applied_tangential_force, -result.tangential_force, result.electrostatic_force_x]
-    y = [-result.applied_force, result.normal_force, -result.electrostatic_force]
-    forces = np.array([x, y])
-    return np.abs(forces.sum(axis=1) / np.maximum(np.abs(forces).max(axis=(0, 1)), 1e-6)).T
 
 
 def left_over(result):

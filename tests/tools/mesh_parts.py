@@ -2,9 +2,9 @@
 
 import numpy as np
 from evfem.meshes.make import triangles
+from evfem.studies.benchmark import benchmark_mesh
 
 from evfem.mesh.mesh import raised
-from tools.meshes import half_finger
 
 #: numbers of its regions
 REGIONS = {"tissue": 0, "skin": 1}
@@ -12,14 +12,14 @@ REGIONS = {"tissue": 0, "skin": 1}
 
 def of_kind(kind):
     """The mesh in cells of a kind."""
-    mesh = half_finger()
+    mesh = benchmark_mesh(0)
     mesh = triangles(mesh) if kind.startswith("triangle") else mesh
     return raised(mesh) if kind in ("quad9", "triangle6") else mesh
 
 
 def raw(mesh=None, **changes):
     """The parts of a `.vtu` file as meshio takes them, some of them replaced."""
-    mesh = half_finger() if mesh is None else mesh
+    mesh = benchmark_mesh(0) if mesh is None else mesh
     point_data = {
         name: np.isin(np.arange(len(mesh.points)), nodes).astype(float)
         for name, nodes in mesh.node_sets.items()

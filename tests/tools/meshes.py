@@ -1,8 +1,9 @@
-"""Meshes of the tests: cells between rows of points, blocks, half a finger, what is fine near a
-contact, and pads without a body.
+"""Meshes of the tests: cells between rows of points, blocks, what is fine near a contact, and pads without
+a body.
 """
 
 import numpy as np
+from evfem.studies.stability.scenes import block as block
 
 from evfem.mesh.mesh import Mesh
 from evfem.surface.pad import Pad
@@ -49,43 +50,12 @@ def held(mesh, pad=None, bone=None, region=None, names=None):
     return Mesh(mesh.points, mesh.cells, mesh.kind, region, names or mesh.region_names, sets)
 
 
-def block(columns=8, rows=4, width=4.0, height=2.0, sag=0.0):
-    """A block with its lower side at y = 0 in the middle and `sag` mm higher at both ends."""
-    x, t = np.meshgrid(np.linspace(-width / 2, width / 2, columns + 1), np.linspace(0.0, 1.0, rows + 1))
-    low = sag * (2.0 * x / width) ** 2
-    return held(between(x, low + t * (height - low)))
-
-
 def square_mesh(kind="quad"):
     """[-1, 1] x [0, 2] in cells of one kind, two regions, the lower side `pad`, the upper side `bone`."""
     n = 5 if kind in ("quad9", "triangle6") else 3
     mesh = between(*np.meshgrid(np.linspace(-1, 1, n), np.linspace(0, 2, n)), kind)
     upper = np.arange(len(mesh.cells)) >= len(mesh.cells) // 2
     return held(mesh, region=upper.astype(int), names={"soft": 0, "hard": 1})
-
-
-def half_finger(around=60, tissue=10, skin=2):
-    """Half a finger between two ellipses, the press-and-slide benchmark's: lines from the bone to the skin.
-
-    `tissue` and `skin` are numbers of cells across them.
-    """
-    theta = np.pi * (1.0 + np.arange(around + 1) / around)
-    circle = np.stack([np.cos(theta), np.sin(theta)])
-    circle[1, [0, -1]] = 0.0
-    bone, middle, outer = (
-        np.array(axes)[:, None] * circle for axes in ((3.0, 2.5), (7.96, 6.015), (8.34, 6.395))
-    )
-    lines = [bone + s * (middle - bone) for s in np.arange(tissue) / tissue]
-    lines += [middle + s * (outer - middle) for s in np.arange(skin + 1) / skin]
-    x, y = np.stack(lines[::-1], axis=1)  # from the skin up
-    mesh = between(x, y)
-    in_skin = np.arange(len(mesh.cells)) < skin * around
-    return held(
-        mesh,
-        bone=np.unique(np.concatenate([mesh.node_sets[side] for side in ("top", "left", "right")])),
-        region=in_skin.astype(int),
-        names={"tissue": 0, "skin": 1},
-    )
 
 
 def graded(fine, size, end, growth):
