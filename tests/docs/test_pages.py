@@ -28,9 +28,10 @@ from evfem import cli, studies
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.response.file import SensitivityTable
 from evfem.scene import file as scenefile
-from evfem.scene import keys
+from evfem.scene import keys, schema
 from evfem.scene.motion import Motion
-from evfem.simulation.result import COLUMNS
+from evfem.simulation.history import MEANINGS
+from evfem.simulation.result import COLUMNS, UNITS
 from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
 from evfem.textures.importers import IMPORTERS
@@ -333,3 +334,78 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = subprocess.run(words, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site" / "index.html").is_file()
+
+
+MAKER = runpy.run_path(str(DOCS / "notebooks.py"))
+
+
+CELLS = """# ---
+# jupyter: percent
+# ---
+
+# %% [markdown]
+# # A title
+#
+# Some words.
+
+# %%
+import matplotlib.pyplot as plt
+
+plt.plot([0.0, 1.0])
+plt.show()
+print("drawn")
+
+# %%
+a = 2
+a + 1
+"""
+
+
+def test_a_cell_has_what_it_prints_its_value_and_its_picture_below(tmp_path):
+    (tmp_path / "small.py").write_text(CELLS)
+    text = MAKER["page"](tmp_path / "small.py")
+    assert text.startswith("# A title\n\nSome words.\n\n```python\nimport matplotlib")
+    code, drawn = text.split("```text\ndrawn\n```\n\n")
+    assert code.count("```python") == 1
+    assert drawn.startswith("![what the cell draws](data:image/png;base64,")
+    assert text.endswith("```python\na = 2\na + 1\n```\n\n```text\n3\n```\n")
+
+
+def test_every_notebook_has_its_page():
+    pages = {path.stem for path in (DOCS / "notebooks").glob("*.md")} - {"index"}
+    assert pages == {path.stem for path in MAKER["NOTEBOOKS"].glob("*.py")}
+
+
+TABLES = runpy.run_path(str(DOCS / "tables.py"))
+
+
+def test_the_page_of_keys_is_that_of_the_models():
+    """`python docs/tables.py` writes it anew."""
+    assert (DOCS / "reference" / "keys.md").read_text(encoding="utf-8") == TABLES["page"]()
+
+
+def test_the_columns_are_those_of_the_history():
+    text = (DOCS / "notation.md").read_text(encoding="utf-8")
+    assert TABLES["columns"](text) == text
+    for name in COLUMNS:
+        unit = f" {UNITS[name]} " if UNITS[name] else " "
+        assert f"| `{name}` |{unit}| {MEANINGS[name]} |\n" in text
+
+
+def test_the_options_of_importers_are_their_fields():
+    text = (DOCS / "howto" / "texture.md").read_text(encoding="utf-8")
+    assert TABLES["importers"](text) == text
+    assert "- `--pixel` (image): width of a pixel of an image in mm; a width above zero; needed.\n" in text
+
+
+def test_an_entry_says_type_unit_default_range_and_meaning():
+    width, _ = [key for one in schema.sections() for key in one.keys if key.name == "ridge_width"]
+    assert TABLES["entry"](width) == (
+        "- `ridge_width`: number in mm; default `0.5`; 0.3 to 0.8 mm.\n  The pitch, from crest to crest."
+    )
+
+
+def test_the_reference_has_every_public_name_on_the_page_of_its_module():
+    text = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
+    assert TABLES["public_names"](text) == text
+    assert [name for name in evfem.__all__ if text.count(f"| `ev.{name}` |") != 1] == []
