@@ -1,4 +1,4 @@
-"""Outlines given by points of a curve, walls that are nearly upright, and the mean force of layers that conduct."""
+"""Outlines by points of a curve, walls that are nearly upright, and the mean force of layers that conduct."""
 
 import numpy as np
 import pytest

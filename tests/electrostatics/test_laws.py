@@ -136,7 +136,7 @@ SCREEN = Layers.of(ev.Layer(0.38, 1650.0), ev.Layer(0.001, 3.9))
 STEEPEST = 0.1 / 0.91 * 10.0 / 0.05004 / 6.0  # of the skin's modulus over the nodes' distance
 
 
-GAPS = np.array([0.0, 1e-4, 1e-3, 5e-3, 0.02])
+NEAR = np.array([0.0, 1e-4, 1e-3, 5e-3, 0.02])
 
 
 class Own:
@@ -190,5 +190,5 @@ def test_without_need_the_law_is_the_law_to_the_last_digit():
     for voltage in (0.0, 1.0):
         assert cored.line(voltage, SCREEN).end == 0.0
         for name in ("traction", "traction_derivative", "potential"):
-            both = [getattr(one, name)(GAPS, voltage, SCREEN) for one in (cored, ev.StrongTroxel())]
+            both = [getattr(one, name)(NEAR, voltage, SCREEN) for one in (cored, ev.StrongTroxel())]
             np.testing.assert_array_equal(*both)
