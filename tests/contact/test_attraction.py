@@ -162,24 +162,6 @@ def test_trial_states_that_penetrate_count_as_touching():
     )
 
 
-@pytest.mark.parametrize(
-    ("voltage", "gap", "exact"),
-    [(np.sqrt(2.0) * 1000.0, 0.25, 0.20172e-3), (2000.0, 0.25, 0.40356e-3), (2000.0, 0.5, 0.19761e-3)],
-    ids=["LVLD", "HVLD", "HVHD"],
-)
-@orders
-def test_hover_force_of_half_an_ellipse_on_sixty_edges(order, voltage, gap, exact):
-    # exact numbers: quadrature of (8b) over the true ellipse with semi-axes 8.34 and 6.395 mm
-    theta = np.pi * (1.0 + np.arange(60 * order + 1) / (60 * order))
-    position = np.column_stack([8.34 * np.cos(theta), 6.395 * np.sin(theta)])
-    s = np.arange(60 * order + 1)
-    edges = np.column_stack([s[:-1], s[1:]] if order == 1 else [s[:-2:2], s[2::2], s[1::2]])
-    pad = Pad(s, edges, np.ones(s.size, dtype=bool))
-    attraction = Attraction(Kaczmarek(), LAYERS, pad, Flat(y=-6.395 - gap))
-    force = -attraction.forces(position, voltage, everyone(attraction))[:, 1].sum()
-    assert force == pytest.approx(exact, rel=5e-4)
-
-
 @pytest.mark.parametrize(("order", "total"), [(1, 1e-14), (2, 3e-3)])
 @surfaces
 def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, surface):

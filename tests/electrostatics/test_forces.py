@@ -108,17 +108,6 @@ def test_plates_follow_equations_2_to_7():
     assert plate_force(StrongTroxel(), 100.0, 0.0, 140.0, one) == pytest.approx(5.0 * capacitor, rel=1e-14)
 
 
-def test_thickness_from_thresholds():
-    films = Layer(0.5 * MIL, 4.5), Layer(1.0 * MIL, 4.5)
-    reduced = effective_thickness_from_thresholds((73.0, 110.0), films)
-    assert round(1e3 * reduced, 3) == 2.746  # um, notes
-    assert round(2000.0 * reduced, 2) == 5.49  # mm
-    # (22) as printed, with d_i = d_i2
-    assert reduced == pytest.approx(0.5 * MIL / 4.5 * (2 * 73 - 110) / (110 - 73), rel=1e-13)
-    thickness = stratum_corneum_from_thresholds((73.0, 110.0), films, 2000.0)
-    assert round(1e3 * thickness, 2) == 76.17
-
-
 @pytest.mark.parametrize("friction", [(1.0, 1.0), (0.3, 0.45)])
 def test_thickness_found_gives_equal_tangential_forces(friction):
     films = Layer(0.02, 3.0), Layer(0.03, 4.5)

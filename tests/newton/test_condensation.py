@@ -179,8 +179,6 @@ def test_the_library_is_the_first_runtime_that_is_there(monkeypatch, tmp_path):
     monkeypatch.setattr(metadata, "files", lambda package: None)  # installed without a list of files
     assert mkl_library() is None
 
-
-def test_no_library_without_its_package(monkeypatch):
     def missing(package):
         raise metadata.PackageNotFoundError(package)
 

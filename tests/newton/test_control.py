@@ -7,17 +7,7 @@ import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import OPEN, STICK
-from evfem.newton.control import FollowFriction, Force, GivenVoltage, VoltageProblem
-
-REACTION = np.array([0.2, -3.0])
-
-
-def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
-    """The bone is pressed with 5 N/mm downwards and pushed up with 3: 2 N/mm more are missing, downwards."""
-    force = Force(5.0)
-    assert (force.free, force.known(0.7)) == (True, 0.7)
-    assert force.missing(0.7, REACTION) == pytest.approx(-2.0)
-    assert force.missing(0.7, np.array([0.2, -5.0])) == 0.0
+from evfem.newton.control import FollowFriction, GivenVoltage, VoltageProblem
 
 
 class Friction:
@@ -44,16 +34,6 @@ def follow(wish, squared, largest=2000.0, before=1000.0):
     control.begin(SimpleNamespace(voltage=before))
     step = LinearContactStep(None, None, np.zeros(1), np.zeros(2))
     return control, control.solve(step, friction.drive()), friction.residuals
-
-
-def test_between_its_bounds_the_squared_voltage_is_what_the_wish_needs():
-    """2 + 3 x = 6.5: x = 1.5, half a kV^2 more than there is; one kV^2 does (7,) to the backward solve."""
-    control, found, posed = follow(6.5, 1.0)
-    assert control.free
-    assert found.change == pytest.approx(0.5)
-    assert found.unit.tolist() == [7.0]
-    assert len(posed) == 1
-    assert control.missing(np.array([6.0, 0.0])) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(("wish", "squared"), [(1.0, 0.0), (20.0, 4.0)], ids=["below", "above"])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from tools.builders import coarse_pad, finger, left_over
 from tools.meshes import block
 
@@ -75,57 +74,6 @@ def test_the_books_know_the_energies_of_the_hand():
     np.testing.assert_allclose(result.stored_energy - pressed, 0.5 * K * stretch**2, atol=1e-8 * K)
     damped = np.cumsum(4e-5 * np.diff(stretch) ** 2 / np.diff(result.time))
     np.testing.assert_allclose(result.viscous_dissipation[1:], damped, rtol=1e-9)
-
-
-STRIBECK = ev.RateFriction(speed=0.5, ratio=0.5)
-
-
-def reference(hand, speed):
-    """Times of stick and of slip of a mass on a spring under Stribeck's friction, by an integrator
-    with events.
-    """
-
-    def acceleration(stretch, v):
-        mu = 0.4 * (0.5 + 0.5 * np.exp(-max(v, 0.0) / 0.5))
-        return (hand.stiffness * stretch + hand.damping * (speed - v) - N * mu) / hand.mass
-
-    def stops(t, y):
-        return y[1]
-
-    stops.terminal, stops.direction = True, -1
-    begin = (0.4 * N - hand.damping * speed) / hand.stiffness
-    way = solve_ivp(
-        lambda t, y: [speed - y[1], acceleration(*y)], (0.0, 1.0), [begin, 1e-9],
-        events=stops, rtol=1e-10, atol=1e-13,
-    )  # fmt: skip
-    return (begin - way.y_events[0][0][0]) / speed, way.t_events[0][0]
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:motion . has steps of")
-def test_the_period_of_stick_slip_is_that_of_a_mass_on_a_spring():
-    """The slip is followed in 600 steps, the sticking spring before and after it in few: it is as
-    straight as they are. Backward Euler takes a part of the swing that falls with the step.
-    """
-    hand = ev.Hand(K, mass=M)
-    stick, slip = reference(hand, 1.0)
-    before, fine = 0.799, 1.3 * slip + 0.001
-    rest = 0.98 * (stick + slip) - fine + 0.001
-    result = ev.simulate(
-        slab(hand, slid(before, 3), slid(fine, 600), slid(rest, 3), slid(0.03, 60), friction_law=STRIBECK)
-    )
-    speed = np.diff(result.position) / np.diff(result.time)
-    assert left_over(result) < 1e-8
-    # sticks again at the end of the slip, and the spring is stretched by the drive alone
-    held = slice(580, 606)
-    assert np.abs(speed[held]).max() == pytest.approx(K * 0.02 / (25.0 * 4.0), rel=1e-3)  # of the slab itself
-    first = 0.4 * N / K
-    lacking = 0.4 * N - result.applied_tangential_force[604]
-    second = result.time[604] - result.time[0] + lacking / K
-    assert second - first == pytest.approx(stick + slip, rel=0.01)
-    # and there it slips
-    again = result.time[1:][np.flatnonzero((speed > 1.0) & (result.time[1:] > 0.83))[0]] - result.time[0]
-    assert again == pytest.approx(second, abs=0.02)
 
 
 def test_a_scene_file_says_it_and_what_cannot_be_is_refused():

@@ -87,28 +87,6 @@ def test_a_candidate_stays_one_when_it_has_let_go():
     assert far in linear.candidates
 
 
-def bent(model, state):
-    """The state with a smooth deformation, the bone at rest."""
-    x, y = model.mesh.points.T
-    return replace(state, u=0.03 * np.column_stack([np.sin(x) * (2.0 - y), np.cos(2.0 * x) * (2.0 - y)]))
-
-
-def test_the_compliance_is_the_motion_under_unit_forces_with_the_bone_held():
-    linear, model, state = made()
-    state = bent(model, state)
-    linear.choose_candidates(state, 0.2)
-    linear.factorise(state)
-    body = model.body
-    K = body.pattern.full(body.tangent(state.u)).toarray()
-    kept = body.unknowns[model.pad.nodes[linear.candidates]].ravel()
-    C = np.linalg.inv(K[:-2, :-2])
-    found = linear.tangent.compliance
-    np.testing.assert_allclose(found, C[np.ix_(kept, kept)], atol=1e-10 * np.abs(found).max())
-    assert linear.made_at(state)
-    assert not linear.made_at(replace(state, u=state.u.copy()))
-    assert linear.stiffest == pytest.approx(np.diagonal(K).max(), rel=1e-14)
-
-
 def test_a_singular_tangent_is_a_failed_step():
     linear, _, state = made()
     linear.choose_candidates(state, 0.2)
@@ -199,19 +177,6 @@ def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_i
     np.testing.assert_array_equal(tangent[folded], 0.0)
     held = ~folded & (whole > 0.0)
     np.testing.assert_allclose(tangent[held], slope[held] * normal[held], rtol=1e-12)
-
-
-@pytest.mark.parametrize("how", ["no law", "no voltage", "frozen"])
-def test_an_attraction_that_does_not_change_has_no_part(how):
-    linear, _, state = made() if how == "no law" else made(voltage=500.0)
-    if how == "no voltage":
-        state = replace(state, voltage=0.0)
-    linear.begin(state, how == "frozen")
-    assert not linear.negative_stiffness(state).any()
-    assert not linear.gain_on_closing(state).any()
-    linear.choose_candidates(state, 0.6)
-    linear.factorise(state)
-    np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)
 
 
 #: a voltage whose coupling is not faint

@@ -44,9 +44,6 @@ def without_pressure(monkeypatch):
     monkeypatch.setattr(splitlaw, "INCOMPRESSIBLE", np.inf)
 
 
-# ------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("element", "nu"), [(element, nu) for element in NEARLY for nu in NEARLY[element]])
 @pytest.mark.filterwarnings("ignore:.*q1 cells lock")
 def test_a_press_takes_few_iterations_however_little_the_volume_changes(element, nu):
@@ -56,9 +53,6 @@ def test_a_press_takes_few_iterations_however_little_the_volume_changes(element,
     result = pressed(element, nu)
     assert result.newton_iterations.max() <= 15
     assert (result.substeps == 1).all()
-
-
-# ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("element", ["q1_fbar", "q2p1", "p2"])
@@ -72,9 +66,3 @@ def test_the_equilibria_are_those_of_the_displacements_alone(element, monkeypatc
         np.testing.assert_allclose(getattr(mixed, column), getattr(plain, column), rtol=1e-8, err_msg=column)
     difference = mixed.frames[-1].displacement - plain.frames[-1].displacement
     assert np.abs(difference).max() < 1e-8
-
-
-# -------------------------------------------------------------------------------------------------
-
-
-# -----------------------------------------------------------------------------------------------------

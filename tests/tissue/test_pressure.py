@@ -82,9 +82,6 @@ def test_the_tangent_is_that_of_displacements_and_pressure(element, law):
     np.testing.assert_allclose(K @ du.ravel(), expected.ravel(), atol=1e-7 * np.abs(expected).max())
 
 
-# ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.4949, 0.4951, 0.49999])
 def test_the_rule_is_one_for_all_laws(nu):
     """d2W/dtheta2 / mu = 2 nu / (1 - 2 nu) of the neo-Hookean law passes 100 at nu = 0.49505.
@@ -106,9 +103,6 @@ def test_the_rule_is_one_for_all_laws(nu):
 def test_laws_of_small_strain_and_stretchable_forms_do_not():
     assert not nearly_incompressible(LinearElastic(E=1.0, nu=0.4999), 2)
     assert nearly_incompressible(split(as_form, 2), 2)  # lambda / mu = 200
-
-
-# ------------------------------------------------------------------------------------------------------
 
 
 def widened(element, n, nu, mixed):
