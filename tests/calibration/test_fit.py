@@ -329,8 +329,3 @@ def test_data_that_do_not_fit_the_scene_are_refused(path):
         InputError, match=r"scene: given one that cannot be run at the start: data\.at: .*0\.3"
     ):
         ev.fit(path, beyond, {E: (0.1, 0.2)}, workers=1)
-
-
-def test_a_scene_without_a_file_is_refused(path):
-    with pytest.raises(InputError, match=r"scene: given .*No such file"):
-        ev.fit(path.parent / "none.toml", measured(path), {E: (0.1, 0.2)})

@@ -18,11 +18,6 @@ def test_what_is_linear_is_found_exactly():
     np.testing.assert_allclose(estimator(place), wanted, atol=1e-7)
 
 
-def test_points_are_met():
-    values = DRAW.random((len(POINTS), 2))
-    np.testing.assert_allclose(Estimator(POINTS, values, SCALE)(POINTS[7]), values[7], atol=1e-6)
-
-
 def test_a_point_that_is_left_out_does_not_know_itself():
     values = DRAW.random((len(POINTS), 1))
     changed = values.copy()

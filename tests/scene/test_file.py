@@ -371,21 +371,6 @@ def test_what_an_unknown_key_may_stand_for_is_not_said_to_be_missing(folder):
     assert [mistake.key for mistake in caught.value.mistakes] == ["electrostatics.lwa"]
 
 
-def test_files_that_cannot_be_scenes_get_a_sentence(tmp_path):
-    cases = {
-        "none.toml": (None, "No such file"),
-        "binary.toml": (bytes(range(256)), "UTF-8"),
-        "empty.toml": (b"", "version"),
-    }
-    for name, (content, words) in cases.items():
-        if content is not None:
-            (tmp_path / name).write_bytes(content)
-        with pytest.raises(InputError, match=words):
-            load(tmp_path / name)
-    with pytest.raises(InputError, match="no file"):
-        load(tmp_path)
-
-
 def test_a_key_of_another_motion_is_not_told_that_it_stands_in_motion():
     with pytest.raises(InputError) as caught:
         loads(SHORT + "distance = 1.0\n")

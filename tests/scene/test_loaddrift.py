@@ -41,18 +41,6 @@ def test_the_estimate_is_near_what_runs_show(sizes, friction, load):
     assert estimate / 1.6 < result.load_drift < estimate * 1.6
 
 
-def test_what_rolls_about_its_bone_follows_from_the_geometry():
-    usual = {"friction": 0.7, "load": 0.05, "modulus": 0.0115}
-    drift = load_drift(COARSE, **usual)
-    # a round finger rolls level, a high one sinks; ten times the moduli and the load are the same
-    assert load_drift(ev.FingerPad(width=13.0, height=13.0, nail_width=10.0), **usual) == 0.0
-    assert load_drift(ev.FingerPad(width=13.0, height=14.0, nail_width=10.0), **usual) < 0.0
-    assert load_drift(COARSE, friction=0.7, load=0.5, modulus=0.115) == pytest.approx(drift, rel=1e-12)
-    # the moment grows with the square of the friction force where the pressure's own is small
-    light = [load_drift(COARSE, friction=mu, load=0.05, modulus=0.0115) for mu in (0.35, 0.7)]
-    assert light[1] == pytest.approx(4.0 * light[0], rel=1e-12)
-
-
 def test_the_plan_warns_of_a_held_indentation_after_a_press_to_a_force():
     text = plan(sliding()).warning
     assert text == (

@@ -379,4 +379,3 @@ def test_von_mises_is_the_length_of_the_deviator():
         expected = np.sqrt(1.5 * np.einsum("eij,eij->e", deviator, deviator))
         np.testing.assert_allclose(frame.von_mises, expected, rtol=1e-12)
     assert frame.von_mises.max() > 0.0
-    assert pytest.approx(np.sqrt(1.5 * ((2 / 3) ** 2 + 2 * (1 / 3) ** 2))) == 1.0

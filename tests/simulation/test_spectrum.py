@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import finger
 from tools.fakes import fake_result
-from tools.meshes import block
 
 import evfem as ev
 from evfem.errors import InputError
@@ -83,28 +81,3 @@ def test_rows_that_are_not_evenly_spaced_are_refused(make, options, key):
     with pytest.raises(InputError) as caught:
         ev.spectrum(make(), **({"column": "tangential_force"} | options))
     assert caught.value.key == key
-
-
-@pytest.mark.filterwarnings("ignore:the shear modulus of tissue")
-def test_a_rigid_gap_under_a_sine_attracts_at_its_frequency_and_twice_that():
-    """F ~ U^2: mean, line at f, line at 2 f as B^2 + A^2/2, 2 A B, A^2/2; with modulation as
-    1 + m^2/2, 2 m, m^2/2.
-    """
-    body = finger(block(8, 3, sag=0.4), E=2e3)  # next to rigid
-
-    def lines(signal):
-        motion = [ev.Hover(0.5), ev.Wait(0.04, steps=80)]
-        scene = ev.Scene(body, ev.Display(), ev.StrongTroxel(), signal, motion)
-        found = ev.spectrum(ev.simulate(scene), "electrostatic_force")
-        assert found.frequency[2] == pytest.approx(50.0)
-        other = np.delete(found.amplitude, [0, 2, 4])
-        assert other.max() < 1e-12 * found.amplitude[0]
-        return found.amplitude[[0, 2, 4]] / found.amplitude[0]
-
-    A, B = 3.0, 2.0
-    wanted = np.array([B**2 + A**2 / 2, 2 * A * B, A**2 / 2])
-    np.testing.assert_allclose(lines(ev.Sine(50.0, A, B)), wanted / wanted[0], rtol=1e-10)
-    m = 0.5
-    wanted = np.array([1 + m**2 / 2, 2 * m, m**2 / 2])
-    modulated = ev.Carrier(10_000.0, ev.Sine(50.0, m * 4.0, 4.0), resolved=False)
-    np.testing.assert_allclose(lines(modulated), wanted / wanted[0], rtol=1e-10)

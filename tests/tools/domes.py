@@ -11,16 +11,16 @@ from evfem.mesh.mesh import raised
 from tools.solids import block
 
 
-def dome(divisions=(5, 2, 5), size=(4.0, 2.0, 4.0), radius=6.0, order=1, spread=None):
-    """A block whose underside is a paraboloid of this radius, its lowest point in the origin, on a
-    bone above it; `spread` maps x and z of a block from -1 to 1 to where they shall be.
+def dome(divisions=(5, 2, 5), size=(4.0, 2.0, 4.0), radius=6.0, order=1, spread=None, along=(0, 2)):
+    """A block whose underside is a paraboloid of this radius `along` some axes, its lowest point in the
+    origin, on a bone above it; `spread` maps x and z of a block from -1 to 1 to where they shall be.
     """
     mesh = block(divisions, size)
     middle = np.array([0.5 * size[0], 0.0, 0.5 * size[2]])
     points = mesh.points - middle
     if spread is not None:
         points[:, ::2] = spread(points[:, ::2] / middle[::2]) * middle[::2]
-    low = 0.5 * (points[:, 0] ** 2 + points[:, 2] ** 2) / radius
+    low = 0.5 * (points[:, along] ** 2).sum(axis=1) / radius
     points[:, 1] = low + points[:, 1] / size[1] * (size[1] - low)
     sets = {"pad": mesh.node_sets["bottom"], "bone": mesh.node_sets["top"]}
     mesh = replace(mesh, points=points, node_sets=sets)
@@ -33,13 +33,7 @@ def dome(divisions=(5, 2, 5), size=(4.0, 2.0, 4.0), radius=6.0, order=1, spread=
 
 def cylinder(length, cells, divisions=(8, 2), radius=6.0):
     """A block of 4 x 2 mm whose underside is a parabola along x, the same along z, below a bone."""
-    mesh = block((*divisions, cells), (4.0, 2.0, length))
-    points = mesh.points - np.array([2.0, 0.0, 0.5 * length])
-    low = 0.5 * points[:, 0] ** 2 / radius
-    points[:, 1] = low + points[:, 1] / 2.0 * (2.0 - low)
-    return replace(
-        mesh, points=points, node_sets={"pad": mesh.node_sets["bottom"], "bone": mesh.node_sets["top"]}
-    )
+    return dome((*divisions, cells), (4.0, 2.0, length), radius, along=(0,))
 
 
 @dataclass(frozen=True)
