@@ -13,7 +13,6 @@ from tools.solids import block
 
 import evfem as ev
 from evfem import export, fieldfiles
-from evfem.errors import InputError, StorageError
 from evfem.export import (
     TAGS,
     FieldFiles,
@@ -25,13 +24,9 @@ from evfem.export import (
     skin_of,
     write_frame,
 )
-from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import raised
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene
 from evfem.simulation.model import make_model
-from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS, Frame
-from evfem.surface.surfaces import Flat
+from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS
 
 POINT_DATA = (
     "displacement",
@@ -94,7 +89,7 @@ def test_single_precision_and_compression_keep_what_is_seen(kind, compressed, tm
 
 @pytest.mark.parametrize("single", [False, True])
 def test_the_size_of_a_file_is_known_before(single, tmp_path):
-    mesh = FingerPad(resolution="coarse").mesh(2)
+    mesh = ev.FingerPad(resolution="coarse").mesh(2)
     write_frame(mesh, fake_frame(mesh, 1), tmp_path / "one.vtu", single=single)
     size = (tmp_path / "one.vtu").stat().st_size
     assert abs(frame_size(mesh, single) - size) < 4_000
@@ -103,13 +98,13 @@ def test_the_size_of_a_file_is_known_before(single, tmp_path):
 
 
 def scene_of(presses, slides, **output):
-    motion = [Press(force=0.05, steps=presses), Slide(1.0, steps=slides)]
-    return Scene(FingerPad(), Flat(), motion=motion, output=Output(**output))
+    motion = [ev.Press(force=0.05, steps=presses), ev.Slide(1.0, steps=slides)]
+    return ev.Scene(ev.FingerPad(), ev.Flat(), motion=motion, output=ev.Output(**output))
 
 
 def test_a_run_writes_what_fits_and_the_end_of_each_motion():
     """Medium mesh: 1.53 MB a step in double precision, 0.86 MB in single."""
-    mesh = FingerPad().mesh(2)
+    mesh = ev.FingerPad().mesh(2)
     sizes = {}
     for presses, slides in ((5, 10), (5, 20), (10, 100), (7, 1000)):
         files = FieldFiles.of(scene_of(presses, slides), mesh)
@@ -126,7 +121,7 @@ def test_a_run_writes_what_fits_and_the_end_of_each_motion():
 
 
 def test_what_a_scene_says_of_its_output_is_done():
-    mesh = FingerPad().mesh(2)
+    mesh = ev.FingerPad().mesh(2)
     one = FieldFiles.of(scene_of(10, 100, every=1, precision="double", compression=True), mesh)
     assert (one.every, one.single, one.compressed, one.number) == (1, False, True, 110)
     size = 110 * frame_size(mesh, compressed=True) / 1e6
@@ -158,9 +153,9 @@ def test_the_index_is_complete_after_every_step(tmp_path):
 
 
 def test_wrong_ending_and_missing_folder_get_a_sentence(tmp_path):
-    with pytest.raises(InputError, match=r"ends in \.pvd"):
+    with pytest.raises(ev.InputError, match=r"ends in \.pvd"):
         paraview(fake_result(), tmp_path / "slide.vtk")
-    with pytest.raises(StorageError, match="cannot write"):
+    with pytest.raises(ev.StorageError, match="cannot write"):
         paraview(fake_result(), tmp_path / "nowhere" / "slide.pvd")
     assert not list(tmp_path.iterdir())
 
@@ -174,7 +169,7 @@ def solid_result(order):
     fields = dict.fromkeys(POINT_FIELDS, np.arange(N, dtype=float)) | {"J": np.arange(E, dtype=float)}
     fields["contact_status"] = np.arange(N) % 3
     stress = np.arange(6.0 * E).reshape(E, 6)
-    return mesh, Frame(
+    return mesh, ev.Frame(
         3, 0.0, 0.5, 0.1 * mesh.points, **fields, von_mises=np.arange(E) + 0.5, cauchy_stress=stress
     )
 
@@ -209,7 +204,7 @@ def test_the_skin_has_its_nodes_and_the_cells_behind_its_faces(order, tmp_path):
     middles = read.points[read.cells[0].data[:, :4]].mean(axis=1)
     above = mesh.points[mesh.cells[read.cell_data["J"][0].astype(int)][:, :8]].mean(axis=1)
     np.testing.assert_allclose(above - middles, np.broadcast_to([0.0, 0.5, 0.0], above.shape), atol=1e-12)
-    with pytest.raises(InputError, match="three dimensions"):
+    with pytest.raises(ev.InputError, match="three dimensions"):
         skin_of(square_mesh("quad"))
 
 
@@ -341,5 +336,7 @@ def test_a_data_set_has_every_column_and_field_with_its_unit():
 
 def test_without_xarray_a_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match=r"no xarray; allowed: pip install 'evfem\[xarray\]', or table\(\)"):
+    with pytest.raises(
+        ev.InputError, match=r"no xarray; allowed: pip install 'evfem\[xarray\]', or table\(\)"
+    ):
         fake_result().to_xarray()

@@ -16,13 +16,10 @@ from tools.commands import called
 from tools.fakes import fake_result
 from tools.meshes import square_mesh
 
+import evfem as ev
 from evfem.common import tables
-from evfem.electrostatics.signals import VoltageProfile
-from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.scene.file import load, loads
-from evfem.simulation import result
-from evfem.surface.surfaces import Flat, Profile, Sinusoid
 
 SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
 
@@ -67,8 +64,8 @@ def listing(folder):
 def loaded(folder):
     """Exit status and message that loading the result would give."""
     try:
-        result.load(folder / "run.npz")
-    except InputError as error:
+        ev.result.load(folder / "run.npz")
+    except ev.InputError as error:
         return 2, f"{error}\n"
     return 0, ""
 
@@ -102,7 +99,7 @@ def little_memory(megabytes):
     ],
 )
 def test_scenes_beyond_the_limits_are_one_short_line(text, key):
-    with little_memory(60), pytest.raises(InputError, match=key) as caught:
+    with little_memory(60), pytest.raises(ev.InputError, match=key) as caught:
         loads(text)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 1500
@@ -112,20 +109,20 @@ def test_files_beyond_the_limits_are_not_read(tmp_path):
     scene, table = tmp_path / "scene.toml", tmp_path / "scan.csv"
     with open(scene, "wb") as file:
         file.truncate(5 * 2**20)
-    with little_memory(2), pytest.raises(InputError, match="at most 4 MB"):
+    with little_memory(2), pytest.raises(ev.InputError, match="at most 4 MB"):
         load(scene)
     with open(table, "wb") as file:
         file.truncate(100 * 2**20)
     scene.write_text(SCENE.replace("'flat'", "'profile'\nfile = 'scan.csv'"))
-    with little_memory(2), pytest.raises(InputError, match="at most 64 MB"):
+    with little_memory(2), pytest.raises(ev.InputError, match="at most 64 MB"):
         load(scene)
     mesh = SCENE + "[finger]\nmesh = 'm.vtu'\n[finger.materials.a]\nlaw = 'neo_hookean'\nE = 1.0\nnu = 0.3\n"
     scene.write_text(mesh)
     with open(tmp_path / "m.vtu", "wb") as file:
         file.truncate(200 * 2**20)
-    with little_memory(2), pytest.raises(InputError, match="at most 128 MB"):
+    with little_memory(2), pytest.raises(ev.InputError, match="at most 128 MB"):
         load(scene)
-    with little_memory(2), pytest.raises(InputError, match="more than 128 MB"):
+    with little_memory(2), pytest.raises(ev.InputError, match="more than 128 MB"):
         meshfile.read(tmp_path / "m.vtu")
 
 
@@ -134,35 +131,35 @@ def test_rows_beyond_the_limit_are_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "MOST_ROWS", 1000)
     path = tmp_path / "signal.csv"
     path.write_text("position,voltage\n" + "0,1\n" * 1000)
-    assert len(VoltageProfile.from_csv(path).position) == 1000
+    assert len(ev.VoltageProfile.from_csv(path).position) == 1000
     path.write_text("position,voltage\n" + "0,1\n" * 1001 + "not reached\n")
-    with pytest.raises(InputError, match="at most 1000 rows"):
-        VoltageProfile.from_csv(path)
+    with pytest.raises(ev.InputError, match="at most 1000 rows"):
+        ev.VoltageProfile.from_csv(path)
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Sinusoid(terms=[[0.1, 1.0, 0.0]] * 1001), "1000 rows"),
-        (lambda: Sinusoid(terms=[[1e300, 1.0, 0.0]]), "within 1e3 mm"),
-        (lambda: Flat(friction=1e300), "0 to 100"),
-        (lambda: Flat(friction=10**400), "0 to 100"),
-        (lambda: Flat(friction=[[0.0, 0.1]] * 10_001), "10000 rows"),
-        (lambda: Flat(y=1e300), "within 1e3 mm"),
-        (lambda: Profile([0.0, 1e-12], [0.0, 1.0]), "1e-09 mm apart"),
-        (lambda: Profile([0.0, 1.0], [0.0, 1e300]), "within 1000 mm"),
-        (lambda: Profile(np.arange(1_000_002.0), np.zeros(1_000_002)), "at most 1000000"),
-        (lambda: VoltageProfile([0.0, 1.0], [0.0, 1e300]), "within 1e[+]06 V"),
-        (lambda: VoltageProfile(np.zeros(1_000_002), np.zeros(1_000_002)), "at most 1000000"),
+        (lambda: ev.Sinusoid(terms=[[0.1, 1.0, 0.0]] * 1001), "1000 rows"),
+        (lambda: ev.Sinusoid(terms=[[1e300, 1.0, 0.0]]), "within 1e3 mm"),
+        (lambda: ev.Flat(friction=1e300), "0 to 100"),
+        (lambda: ev.Flat(friction=10**400), "0 to 100"),
+        (lambda: ev.Flat(friction=[[0.0, 0.1]] * 10_001), "10000 rows"),
+        (lambda: ev.Flat(y=1e300), "within 1e3 mm"),
+        (lambda: ev.Profile([0.0, 1e-12], [0.0, 1.0]), "1e-09 mm apart"),
+        (lambda: ev.Profile([0.0, 1.0], [0.0, 1e300]), "within 1000 mm"),
+        (lambda: ev.Profile(np.arange(1_000_002.0), np.zeros(1_000_002)), "at most 1000000"),
+        (lambda: ev.VoltageProfile([0.0, 1.0], [0.0, 1e300]), "within 1e[+]06 V"),
+        (lambda: ev.VoltageProfile(np.zeros(1_000_002), np.zeros(1_000_002)), "at most 1000000"),
     ],
 )
 def test_numbers_beyond_the_limits_are_refused(make, words):
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(ev.InputError, match=words):
         make()
 
 
 def test_heights_next_to_nothing_make_a_level_profile():
-    profile = Profile([0.0, 1.0, 2.0, 3.0], [0.0, 5e-324, 1.0, 1.0])
+    profile = ev.Profile([0.0, 1.0, 2.0, 3.0], [0.0, 5e-324, 1.0, 1.0])
     assert np.isfinite(profile.slope(np.linspace(0.0, 3.0, 31))).all()
     assert profile.height(1.0) == 5e-324
 
@@ -185,7 +182,7 @@ HOSTILE = {
 def test_hostile_meshes_get_a_sentence(name, tmp_path):
     content, words = HOSTILE[name]
     (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
-    with pytest.raises(InputError, match=words) as caught:
+    with pytest.raises(ev.InputError, match=words) as caught:
         meshfile.read(tmp_path / name, {"a": 0})
     assert caught.value.key == "finger.mesh"
     assert "\n" not in str(caught.value)
@@ -201,7 +198,7 @@ def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
     points[2] = 0.0, 10.0
     cells = np.column_stack([np.zeros(n - 2, int), np.ones(n - 2, int), np.arange(2, n)])
     mesh = Mesh(points, cells, "triangle", np.zeros(n - 2, int), {"a": 0}, {})
-    with little_memory(60), pytest.raises(InputError, match="nodes in the same place"):
+    with little_memory(60), pytest.raises(ev.InputError, match="nodes in the same place"):
         check(mesh)
 
 
@@ -217,7 +214,7 @@ def test_an_outline_of_many_short_and_many_long_edges_is_refused():
     cells = np.column_stack([np.zeros(n - 1, int), np.arange(1, n), np.arange(2, n + 1)])
     sets = {"pad": np.array([1, 2]), "bone": np.array([0, n])}
     mesh = Mesh(points, cells, "triangle", np.zeros(n - 1, int), {"a": 0}, sets)
-    with little_memory(1500), pytest.raises(InputError, match="too close for their lengths"):
+    with little_memory(1500), pytest.raises(ev.InputError, match="too close for their lengths"):
         check(mesh)
 
 
@@ -249,7 +246,7 @@ def pickled():
     return npy(held)
 
 
-FORM = npy(np.array(result.RESULT_FORMAT))
+FORM = npy(np.array(ev.result.RESULT_FORMAT))
 ARCHIVES = {
     "huge shape": {"a.npy": header("(1000000000000,)") + bytes(8)},
     "huge product": {"a.npy": header("(4294967296, 4294967296)") + bytes(8)},
@@ -268,15 +265,15 @@ ARCHIVES = {
 def test_archives_made_to_take_memory_or_to_run_code_get_a_sentence(case, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     archive("run.npz", {"format.npy": FORM} | ARCHIVES[case])
-    with little_memory(60), pytest.raises(InputError, match="cut off or of another kind"):
-        result.load("run.npz")
+    with little_memory(60), pytest.raises(ev.InputError, match="cut off or of another kind"):
+        ev.result.load("run.npz")
     assert [path.name for path in tmp_path.iterdir()] == ["run.npz"]
 
 
 def test_compressed_archives_are_refused_before_they_are_inflated(tmp_path):
     archive(tmp_path / "run.npz", {"format.npy": FORM, "a.npy": npy(np.zeros(10**7))}, zipfile.ZIP_DEFLATED)
-    with little_memory(5), pytest.raises(InputError, match="another kind"):
-        result.load(tmp_path / "run.npz")
+    with little_memory(5), pytest.raises(ev.InputError, match="another kind"):
+        ev.result.load(tmp_path / "run.npz")
 
 
 def test_an_archive_keeps_its_order_of_bytes_and_of_axes(tmp_path):
@@ -286,7 +283,7 @@ def test_an_archive_keeps_its_order_of_bytes_and_of_axes(tmp_path):
     arrays["mesh/points"] = np.asfortranarray(arrays["mesh/points"]).astype(">f8")
     with open(tmp_path / "other.npz", "wb") as file:
         np.savez(file, **arrays)
-    read = result.load(tmp_path / "other.npz")
+    read = ev.result.load(tmp_path / "other.npz")
     np.testing.assert_array_equal(read.mesh.points, square_mesh().points)
     assert read.mesh.points.dtype == float
 
@@ -308,7 +305,7 @@ def test_an_archive_keeps_its_order_of_bytes_and_of_axes(tmp_path):
         ("history/voltage", np.zeros((4, 1))),
         ("provenance", np.array("[]")),
         ("frames/gap", np.zeros(3)),
-        ("format", np.array([result.RESULT_FORMAT])),
+        ("format", np.array([ev.result.RESULT_FORMAT])),
     ],
 )
 def test_results_whose_arrays_do_not_fit_get_a_sentence(name, value, tmp_path):
@@ -317,6 +314,6 @@ def test_results_whose_arrays_do_not_fit_get_a_sentence(name, value, tmp_path):
         arrays = {key: file[key] for key in file.files} | {name: value}
     with open(tmp_path / "run.npz", "wb") as file:
         np.savez(file, **{key: array for key, array in arrays.items() if array is not None})
-    with pytest.raises(InputError, match=r"damaged|another format") as caught:
-        result.load(tmp_path / "run.npz")
+    with pytest.raises(ev.InputError, match=r"damaged|another format") as caught:
+        ev.result.load(tmp_path / "run.npz")
     assert "\n" not in str(caught.value)

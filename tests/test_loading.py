@@ -10,10 +10,7 @@ from tools.meshes import square_mesh
 
 import evfem as ev
 from evfem.common.storage import save_arrays
-from evfem.electrostatics.signalfile import Playback, write_signal
-from evfem.errors import InputError
 from evfem.mesh import file as meshfile
-from evfem.simulation.checkpoint import Checkpoint
 
 PRESS = f"{SQUARE_SCENE}\n[[motion]]\nkind = 'press'\nindentation = 0.1\nsteps = 2\n"
 SWEEP = "version = 1\nscene = 'square.toml'\n[grid]\nsurface.friction = [0.1, 0.2]\n"
@@ -43,7 +40,7 @@ def place(tmp_path, monkeypatch):
 def test_each_file_is_known_by_what_is_in_it(place):
     signal = ev.VoltageProfile([0.0, 1.0], [0.0, 300.0])
     signal.to_csv("ramp.csv")
-    write_signal("ramp.wav", signal, Playback(400.0, speed=10.0, rate=8000))
+    ev.write_signal("ramp.wav", signal, ev.Playback(400.0, speed=10.0, rate=8000))
     result = fake_result()
     result.save("no.ending")
     meshfile.write(square_mesh("quad"), "square.msh")
@@ -64,7 +61,7 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "notes.txt").write_text("mine")
     (place / "empty.npz").write_text("")
     (place / "buzz.ahap").write_text("{}")
-    Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
+    ev.Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
     save_arrays("pad.npz", {"format": np.array("evfem-reduced-1")})  # as FastModel.save of 0.2 did
     cases = {
         "notes.txt": "notes.txt, of another kind; allowed: the folder of a run or a sweep, a result",
@@ -79,10 +76,10 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "scan.csv").write_text("x,height\n0,1\n1,2\n")
     (place / "square.toml").write_text(PRESS.replace("friction", "frictoin"))
     for name, words in cases.items():
-        with pytest.raises(InputError) as caught:
+        with pytest.raises(ev.InputError) as caught:
             ev.load(name)
         assert words in str(caught.value)
-    with pytest.raises(InputError, match="path: given 3; allowed: the path of the folder"):
+    with pytest.raises(ev.InputError, match="path: given 3; allowed: the path of the folder"):
         ev.load(3)
 
 
@@ -122,11 +119,11 @@ def test_a_folder_that_is_no_result_gets_a_sentence(place):
         for content in contents:
             path.write_bytes(content)
             sentence = r"path: given .*square-out, damaged: .*allowed: a folder that"
-            with pytest.raises(InputError, match=sentence):
+            with pytest.raises(ev.InputError, match=sentence):
                 ev.load(folder)
         path.write_bytes(kept[path])
     (folder / "summary.json").unlink()
-    with pytest.raises(InputError, match=r"without summary\.json or history\.csv"):
+    with pytest.raises(ev.InputError, match=r"without summary\.json or history\.csv"):
         ev.load(folder)
 
 
@@ -137,7 +134,7 @@ def test_a_scene_is_simulated_and_planned_by_its_path(place):
     assert by_path.provenance["scene"]["name"] == "square"
     assert str(ev.plan(place / "square.toml")).startswith("Scene square: 2 steps, ")
     for wrong in (3, None, {"version": 1}):
-        with pytest.raises(InputError, match="allowed: a Scene, or the path of a scene file"):
+        with pytest.raises(ev.InputError, match="allowed: a Scene, or the path of a scene file"):
             ev.simulate(wrong)
-        with pytest.raises(InputError, match="allowed: a Scene, or the path of a scene file"):
+        with pytest.raises(ev.InputError, match="allowed: a Scene, or the path of a scene file"):
             ev.plan(wrong)

@@ -7,24 +7,12 @@ import pytest
 from tools.builders import benchmark_finger, coarse_pad, left_over
 from tools.scenes import PRESS, head
 
-from evfem.electrostatics.laws import TOUCHSCREEN, Layer, Layers, StrongTroxel
-from evfem.electrostatics.roughness import (
-    ConstantRoughness,
-    ExponentialRoughness,
-    PowerRoughness,
-    roughness_of,
-    separation_derivative,
-)
-from evfem.errors import InputError
-from evfem.planning.plan import plan
+import evfem as ev
+from evfem.electrostatics.roughness import roughness_of, separation_derivative
 from evfem.scene.file import dump, loads
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
-from evfem.simulation.run import simulate
-from evfem.surface.surfaces import Display, Flat
 
-POWER = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.3, open_gap=0.004)
-EXPONENTIAL = ExponentialRoughness(decay=0.0008, pressure=1.0, open_gap=0.006)
+POWER = ev.PowerRoughness(gap=0.001, pressure=0.01, exponent=0.3, open_gap=0.004)
+EXPONENTIAL = ev.ExponentialRoughness(decay=0.0008, pressure=1.0, open_gap=0.006)
 FALLING = pytest.mark.parametrize("law", [POWER, EXPONENTIAL], ids=["power", "exponential"])
 
 
@@ -40,7 +28,7 @@ def test_the_laws_are_those_of_their_sources():
     np.testing.assert_allclose(POWER.separation(p), 0.001 * (p / 0.01) ** -0.3, rtol=1e-14)
     np.testing.assert_allclose(EXPONENTIAL.separation(p), 0.0008 * np.log(1.0 / p), rtol=1e-14)
     assert EXPONENTIAL.separation(2.0) == 0.0
-    assert ConstantRoughness(0.002).separation(0.01) == 0.002
+    assert ev.ConstantRoughness(0.002).separation(0.01) == 0.002
 
 
 @FALLING
@@ -58,7 +46,7 @@ def test_open_nodes_are_bounded_and_the_laws_are_smooth_where_the_tangent_begins
     assert law.separation(0.5 * least) == pytest.approx(0.5 * (law.open_gap + at), rel=1e-12)
 
 
-@pytest.mark.parametrize("law", [POWER, EXPONENTIAL, ConstantRoughness(0.001), Own()])
+@pytest.mark.parametrize("law", [POWER, EXPONENTIAL, ev.ConstantRoughness(0.001), Own()])
 def test_derivatives_are_those_of_the_separation(law):
     p = np.array([1e-5, 1e-3, 0.02, 0.5])
     h = 1e-6 * p
@@ -68,35 +56,35 @@ def test_derivatives_are_those_of_the_separation(law):
 
 def test_what_is_no_gap_is_refused():
     for given in (-0.001, 2.0, "rough", None, True, POWER.__class__):
-        with pytest.raises(InputError, match="roughness_gap"):
+        with pytest.raises(ev.InputError, match="roughness_gap"):
             roughness_of(given)
-    with pytest.raises(InputError, match="open_gap"):
-        ExponentialRoughness(decay=0.001, pressure=1.0, open_gap=0.001)
-    with pytest.raises(InputError, match="only with a law"):
-        Scene(coarse_pad(), Flat(), motion=Press(force=0.01), roughness_gap=0.001)
+    with pytest.raises(ev.InputError, match="open_gap"):
+        ev.ExponentialRoughness(decay=0.001, pressure=1.0, open_gap=0.001)
+    with pytest.raises(ev.InputError, match="only with a law"):
+        ev.Scene(coarse_pad(), ev.Flat(), motion=ev.Press(force=0.01), roughness_gap=0.001)
 
 
-MOTION = [Press(force=0.05, steps=2), Slide(0.4, steps=2)]
+MOTION = [ev.Press(force=0.05, steps=2), ev.Slide(0.4, steps=2)]
 
 
 def touchscreen(rough, coupling="monolithic", core="auto"):
-    surface, output = Display(TOUCHSCREEN), Output(every=4)
-    return Scene(
-        benchmark_finger(), surface, StrongTroxel(), 100.0, MOTION,
-        coupling=coupling, output=output, roughness_gap=rough, solver=Solver(core=core),
+    surface, output = ev.Display(ev.TOUCHSCREEN), ev.Output(every=4)
+    return ev.Scene(
+        benchmark_finger(), surface, ev.StrongTroxel(), 100.0, MOTION,
+        coupling=coupling, output=output, roughness_gap=rough, solver=ev.Solver(core=core),
     )  # fmt: skip
 
 
 def test_a_rough_touchscreen_converges_as_a_smooth_one_and_obeys_the_law_at_every_node():
-    smooth, rough = (simulate(touchscreen(faces, core="off")) for faces in (0.0, POWER))
+    smooth, rough = (ev.simulate(touchscreen(faces, core="off")) for faces in (0.0, POWER))
     assert rough.provenance["solver"]["cuts"] == 0
     assert rough.newton_iterations.sum() < 1.5 * smooth.newton_iterations.sum()
     frame = rough.frames[-1]
     pad = rough.mesh.node_sets["pad"]
     gap, pressure = np.maximum(frame.gap[pad], 0.0), np.maximum(frame.contact_pressure[pad], 0.0)
-    skin = Layers.of(Layer(0.38, 1650.0), TOUCHSCREEN)
+    skin = ev.Layers.of(ev.Layer(0.38, 1650.0), ev.TOUCHSCREEN)
     apart = np.where(frame.contact_status[pad] > 0, 0.0, gap) + POWER.separation(pressure)
-    expected = StrongTroxel().traction(apart, 100.0, skin)
+    expected = ev.StrongTroxel().traction(apart, 100.0, skin)
     found = frame.electrostatic_traction[pad]
     facing = found > 0.0
     assert (frame.contact_status[pad][facing] > 0).sum() > 20
@@ -105,7 +93,7 @@ def test_a_rough_touchscreen_converges_as_a_smooth_one_and_obeys_the_law_at_ever
 
 @FALLING
 def test_both_couplings_find_the_same_equilibrium_and_the_books_close(law):
-    together, alternating = (simulate(touchscreen(law, c)) for c in ("monolithic", "staggered"))
+    together, alternating = (ev.simulate(touchscreen(law, c)) for c in ("monolithic", "staggered"))
     for name in ("applied_force", "electrostatic_force", "normal_force", "indentation"):
         np.testing.assert_allclose(together[name][:2], alternating[name][:2], rtol=1e-6)
         # an edge node whose attraction exceeds its contact force may stay or let go
@@ -115,9 +103,9 @@ def test_both_couplings_find_the_same_equilibrium_and_the_books_close(law):
 
 def test_a_constant_gap_is_a_thicker_layer_of_air():
     """Strong-Troxel's law knows the sum of gap and layers alone: 1 um of air instead."""
-    rough = simulate(touchscreen(0.001))
-    stack = Display(Layer(0.001 * (1.0 + 1.0 / 3.9), 1.0))
-    air = simulate(replace(touchscreen(0.0), surface=stack))
+    rough = ev.simulate(touchscreen(0.001))
+    stack = ev.Display(ev.Layer(0.001 * (1.0 + 1.0 / 3.9), 1.0))
+    air = ev.simulate(replace(touchscreen(0.0), surface=stack))
     for name in ("applied_force", "electrostatic_force", "tangential_force"):
         np.testing.assert_allclose(rough[name], air[name], rtol=1e-7, atol=1e-9)
 
@@ -129,7 +117,7 @@ TABLE = head('law = "kaczmarek"\nvoltage = 100.0\ninsulator = "touchscreen"\nROU
     ("text", "law"),
     [
         ("roughness_gap = 0.002", 0.002),
-        ('[electrostatics.roughness_gap]\nlaw = "constant"\ngap = 0.002', ConstantRoughness(0.002)),
+        ('[electrostatics.roughness_gap]\nlaw = "constant"\ngap = 0.002', ev.ConstantRoughness(0.002)),
         (
             '[electrostatics.roughness_gap]\nlaw = "power"\ngap = 0.001\npressure = 0.01\n'
             "exponent = 0.3\nopen_gap = 0.004",
@@ -146,4 +134,4 @@ def test_a_scene_file_says_it_and_a_dumped_one_too(text, law):
     scene = loads(TABLE.replace("ROUGH", text))
     assert scene.roughness_gap == law
     assert loads(dump(scene)) == scene
-    assert "rough faces" in next(term.reason for term in plan(scene).terms if term.name == "electricity")
+    assert "rough faces" in next(term.reason for term in ev.plan(scene).terms if term.name == "electricity")

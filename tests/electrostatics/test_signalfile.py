@@ -12,20 +12,13 @@ from PIL import Image
 from scipy.io import wavfile
 from tools.scenes import PRESS, head
 
+import evfem as ev
 from evfem import cli
 from evfem.electrostatics import signalfile
-from evfem.electrostatics.laws import Kaczmarek
-from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
-from evfem.electrostatics.signals import VoltageProfile
-from evfem.errors import InputError, StorageError
-from evfem.finger.fingerpad import FingerPad
 from evfem.scene.file import dump, loads
-from evfem.scene.motion import Press
-from evfem.scene.scene import Scene
-from evfem.surface.surfaces import Display
 
-JUMP = VoltageProfile([1.0, 3.5, 6.0, 6.0, 11.0], [0.0, 2000.0, 500.0, 1500.0, -1500.0])
-DEVICE = Playback(full_scale=2000.0, speed=20.0, friction=(0.5, 0.6), rate=8000)
+JUMP = ev.VoltageProfile([1.0, 3.5, 6.0, 6.0, 11.0], [0.0, 2000.0, 500.0, 1500.0, -1500.0])
+DEVICE = ev.Playback(full_scale=2000.0, speed=20.0, friction=(0.5, 0.6), rate=8000)
 STEP = 2000.0 / 32767
 
 
@@ -40,7 +33,7 @@ def comment_of(path):
 
 def test_other_readers_find_the_samples_of_the_wav(tmp_path):
     path = tmp_path / "tone.wav"
-    write_signal(path, JUMP, DEVICE)
+    ev.write_signal(path, JUMP, DEVICE)
     rate, samples = wavfile.read(path)
     with wave.open(str(path)) as reader:
         assert (reader.getnchannels(), reader.getsampwidth(), reader.getframerate()) == (1, 2, 8000)
@@ -60,8 +53,8 @@ def test_other_readers_find_the_samples_of_the_wav(tmp_path):
 
 
 def test_a_wav_comes_back_as_a_voltage_for_a_scene(tmp_path):
-    write_signal(tmp_path / "tone.wav", JUMP, DEVICE)
-    back = read_signal(tmp_path / "tone.wav")
+    ev.write_signal(tmp_path / "tone.wav", JUMP, DEVICE)
+    back = ev.read_signal(tmp_path / "tone.wav")
     np.testing.assert_allclose(back.position, 1.0 + 20.0 / 8000 * np.arange(4001), rtol=1e-15)
     assert np.max(np.abs(back.voltage - JUMP(back.position))) <= 0.5 * STEP * (1 + 1e-12)
     assert np.max(np.abs(back.voltage - JUMP(back.position))) > 0.4 * STEP  # a step is what is said
@@ -69,30 +62,32 @@ def test_a_wav_comes_back_as_a_voltage_for_a_scene(tmp_path):
     between = np.setdiff1d(np.linspace(1.0, 11.0, 30_001), back.position)
     between = between[np.abs(between - 6.0) > 20.0 / 8000]
     assert np.max(np.abs(back(between) - JUMP(between))) < 1.0 + STEP
-    scene = Scene(FingerPad(), Display(), law=Kaczmarek(), voltage=back, motion=[Press(force=0.05)])
+    scene = ev.Scene(
+        ev.FingerPad(), ev.Display(), law=ev.Kaczmarek(), voltage=back, motion=[ev.Press(force=0.05)]
+    )
     assert scene.voltage is back
 
 
 def test_a_carrier_attracts_like_the_effective_voltage(tmp_path):
     path = tmp_path / "carrier.wav"
-    level = VoltageProfile([0.0, 10.0], [700.0, 700.0])
-    write_signal(path, level, Playback(full_scale=1000.0, speed=20.0, rate=48_000, carrier=12_000.0))
+    level = ev.VoltageProfile([0.0, 10.0], [700.0, 700.0])
+    ev.write_signal(path, level, ev.Playback(full_scale=1000.0, speed=20.0, rate=48_000, carrier=12_000.0))
     samples = wavfile.read(path)[1] / 32767 * 1000.0
     # 24000 samples of four a period: the mean attraction goes with the mean square
     assert np.sqrt(np.mean(samples[:-1] ** 2)) == pytest.approx(700.0, rel=1e-4)
     assert comment_of(path)["carrier_Hz"] == 12_000.0
-    with pytest.raises(InputError, match="without a carrier"):
-        read_signal(path)
-    with pytest.raises(InputError, match=r"carrier's peaks; allowed: at most the full scale of 900 V"):
-        write_signal(path, level, Playback(full_scale=900.0, speed=20.0, carrier=12_000.0))
-    with pytest.raises(InputError, match="below half the rate"):
-        Playback(full_scale=900.0, rate=8000, carrier=4000.0)
+    with pytest.raises(ev.InputError, match="without a carrier"):
+        ev.read_signal(path)
+    with pytest.raises(ev.InputError, match=r"carrier's peaks; allowed: at most the full scale of 900 V"):
+        ev.write_signal(path, level, ev.Playback(full_scale=900.0, speed=20.0, carrier=12_000.0))
+    with pytest.raises(ev.InputError, match="below half the rate"):
+        ev.Playback(full_scale=900.0, rate=8000, carrier=4000.0)
 
 
 def test_the_friction_map_is_linear_in_friction(tmp_path):
     path = tmp_path / "map.png"
-    steps = VoltageProfile([0.0, 1.0, 1.0, 2.0, 2.0, 3.0], [0.0, 0.0, -1000.0, -1000.0, 2000.0, 2000.0])
-    write_signal(path, steps, Playback(full_scale=2000.0, friction=(0.5, 0.6), pixel=0.25))
+    steps = ev.VoltageProfile([0.0, 1.0, 1.0, 2.0, 2.0, 3.0], [0.0, 0.0, -1000.0, -1000.0, 2000.0, 2000.0])
+    ev.write_signal(path, steps, ev.Playback(full_scale=2000.0, friction=(0.5, 0.6), pixel=0.25))
     with Image.open(path) as picture:
         picture.load()
         grey = np.asarray(picture)
@@ -114,8 +109,8 @@ def test_the_friction_map_is_linear_in_friction(tmp_path):
 
 
 def test_a_column_has_the_voltage_in_its_middle(tmp_path):
-    ramp = VoltageProfile([5.0, 15.0], [0.0, 100.0])
-    write_signal(tmp_path / "map.png", ramp, Playback(full_scale=100.0, pixel=1.0))
+    ramp = ev.VoltageProfile([5.0, 15.0], [0.0, 100.0])
+    ev.write_signal(tmp_path / "map.png", ramp, ev.Playback(full_scale=100.0, pixel=1.0))
     with Image.open(tmp_path / "map.png") as picture:
         grey = np.asarray(picture)[0]
     assert grey.tolist() == [round(255 * ((i + 0.5) / 10.0) ** 2) for i in range(10)]
@@ -140,8 +135,8 @@ def test_a_column_has_the_voltage_in_its_middle(tmp_path):
     ],
 )
 def test_a_playback_that_cannot_be_is_refused(settings_, says):
-    with pytest.raises(InputError, match=re.escape(says)):
-        Playback(**settings_)
+    with pytest.raises(ev.InputError, match=re.escape(says)):
+        ev.Playback(**settings_)
 
 
 @pytest.mark.parametrize(
@@ -149,37 +144,37 @@ def test_a_playback_that_cannot_be_is_refused(settings_, says):
     [
         (
             "a.wav",
-            Playback(1999.0, speed=20.0),
+            ev.Playback(1999.0, speed=20.0),
             "voltage: given 2000 V; allowed: at most the full scale of 1999",
         ),
-        ("a.png", Playback(1999.0), "at most the full scale"),
-        ("a.hjif", Playback(1999.0, speed=20.0, friction=(0.5, 0.6)), "at most the full scale"),
-        ("a.csv", Playback(1999.0), "at most the full scale"),
-        ("a.wav", Playback(2000.0), "speed: missing; allowed: a speed in mm/s, needed for .wav"),
-        ("a.hjif", Playback(2000.0), "speed: missing"),
-        ("a.hjif", Playback(2000.0, speed=20.0), "friction: missing"),
+        ("a.png", ev.Playback(1999.0), "at most the full scale"),
+        ("a.hjif", ev.Playback(1999.0, speed=20.0, friction=(0.5, 0.6)), "at most the full scale"),
+        ("a.csv", ev.Playback(1999.0), "at most the full scale"),
+        ("a.wav", ev.Playback(2000.0), "speed: missing; allowed: a speed in mm/s, needed for .wav"),
+        ("a.hjif", ev.Playback(2000.0), "speed: missing"),
+        ("a.hjif", ev.Playback(2000.0, speed=20.0), "friction: missing"),
         ("a.wav", None, "full_scale: missing"),
         ("a.mp3", None, "a file called .csv, .wav, .png or .hjif"),
-        ("a.wav", Playback(2000.0, speed=1e-4), "a file of 4.8e+09 samples; allowed: at most 49999999"),
-        ("a.png", Playback(2000.0, pixel=1e-9), "a file of 1e+10 columns; allowed: at most 100000"),
+        ("a.wav", ev.Playback(2000.0, speed=1e-4), "a file of 4.8e+09 samples; allowed: at most 49999999"),
+        ("a.png", ev.Playback(2000.0, pixel=1e-9), "a file of 1e+10 columns; allowed: at most 100000"),
     ],
 )
 def test_what_does_not_fit_is_refused_and_nothing_is_written(tmp_path, name, playback, says):
-    with pytest.raises(InputError, match=re.escape(says)):
-        write_signal(tmp_path / name, JUMP, playback)
+    with pytest.raises(ev.InputError, match=re.escape(says)):
+        ev.write_signal(tmp_path / name, JUMP, playback)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_signal_without_length_and_a_folder_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="a signal with a length"):
-        write_signal(tmp_path / "a.wav", VoltageProfile([1.0, 1.0], [0.0, 5.0]), DEVICE)
+    with pytest.raises(ev.InputError, match="a signal with a length"):
+        ev.write_signal(tmp_path / "a.wav", ev.VoltageProfile([1.0, 1.0], [0.0, 5.0]), DEVICE)
     (tmp_path / "kept.wav").write_bytes(b"before")
-    with pytest.raises(InputError):
-        write_signal(tmp_path / "kept.wav", JUMP, Playback(100.0, speed=20.0))
+    with pytest.raises(ev.InputError):
+        ev.write_signal(tmp_path / "kept.wav", JUMP, ev.Playback(100.0, speed=20.0))
     assert (tmp_path / "kept.wav").read_bytes() == b"before"
     for ending in ("csv", "wav", "png", "hjif"):
-        with pytest.raises(StorageError, match="cannot write"):
-            write_signal(tmp_path / "none" / f"a.{ending}", JUMP, DEVICE)
+        with pytest.raises(ev.StorageError, match="cannot write"):
+            ev.write_signal(tmp_path / "none" / f"a.{ending}", JUMP, DEVICE)
 
 
 def wav_with(comment, samples=b"\1\0\2\0", header=None):
@@ -260,8 +255,8 @@ HOSTILE = {
 def test_a_hostile_wav_is_refused_with_a_sentence(tmp_path, name):
     path = tmp_path / "x.wav"
     path.write_bytes(HOSTILE[name])
-    with pytest.raises(InputError) as refused:
-        read_signal(path)
+    with pytest.raises(ev.InputError) as refused:
+        ev.read_signal(path)
     assert "; allowed: " in str(refused.value)
     assert "\n" not in str(refused.value)
     assert len(str(refused.value)) < 400
@@ -272,38 +267,38 @@ def test_a_wav_of_more_samples_than_a_signal_has_rows_is_refused_before_it_is_co
 ):
     monkeypatch.setattr(signalfile, "MOST_ROWS", 1)
     (tmp_path / "x.wav").write_bytes(changed())
-    with pytest.raises(InputError, match="with 2 samples; allowed: at most 1 of them"):
-        read_signal(tmp_path / "x.wav")
+    with pytest.raises(ev.InputError, match="with 2 samples; allowed: at most 1 of them"):
+        ev.read_signal(tmp_path / "x.wav")
 
 
 def test_only_signals_are_written(tmp_path):
-    with pytest.raises(InputError, match="a VoltageProfile"):
-        write_signal(tmp_path / "x.csv", [0.0, 1.0])
+    with pytest.raises(ev.InputError, match="a VoltageProfile"):
+        ev.write_signal(tmp_path / "x.csv", [0.0, 1.0])
 
 
 def test_what_cannot_be_read_back_is_said(tmp_path):
     for ending in ("wav", "csv"):
-        with pytest.raises(InputError, match="No such file"):
-            read_signal(tmp_path / f"none.{ending}")
-    with pytest.raises(InputError, match="a map does not keep the signal"):
-        read_signal(tmp_path / "map.png")
+        with pytest.raises(ev.InputError, match="No such file"):
+            ev.read_signal(tmp_path / f"none.{ending}")
+    with pytest.raises(ev.InputError, match="a map does not keep the signal"):
+        ev.read_signal(tmp_path / "map.png")
     (tmp_path / "folder.wav").mkdir()
-    with pytest.raises(InputError, match="directory"):
-        read_signal(tmp_path / "folder.wav")
+    with pytest.raises(ev.InputError, match="directory"):
+        ev.read_signal(tmp_path / "folder.wav")
 
 
 def test_the_command_writes_what_it_is_asked_for(tmp_path, capsys):
     source, out = tmp_path / "v.csv", tmp_path / "tone.wav"
-    write_signal(source, JUMP)
+    ev.write_signal(source, JUMP)
     scale = ["--full-scale", "2000", "--speed", "20"]
     assert cli.main(["signal", str(source), "--out", str(out), *scale, "--rate", "8000"]) == 0
     assert capsys.readouterr().out == f"1 to 11 mm, at most 2000 V; in {out}\n"
     direct = tmp_path / "direct.wav"
-    write_signal(direct, JUMP, DEVICE)
+    ev.write_signal(direct, JUMP, DEVICE)
     assert out.read_bytes() == direct.read_bytes()
     assert cli.main(["signal", str(out), "--out", str(tmp_path / "back.csv")]) == 0
-    back = read_signal(tmp_path / "back.csv")
-    assert back.voltage.tolist() == read_signal(out).voltage.tolist()
+    back = ev.read_signal(tmp_path / "back.csv")
+    assert back.voltage.tolist() == ev.read_signal(out).voltage.tolist()
     assert cli.main(["signal", str(source), "--out", str(tmp_path / "a.wav"), "--full-scale", "nan"]) == 2
     assert capsys.readouterr().err == "evfem: full_scale: given nan; allowed: a voltage in V above zero\n"
     assert not (tmp_path / "a.wav").exists()
@@ -314,8 +309,8 @@ WITH_WAV = head(KEYS) + PRESS
 
 
 def test_a_voltage_file_may_be_a_wav(tmp_path):
-    signal = VoltageProfile([1.0, 2.0, 3.0], [0.0, 1000.0, 500.0])
-    write_signal(tmp_path / "voltage.wav", signal, Playback(full_scale=1000.0, speed=20.0, rate=2000))
+    signal = ev.VoltageProfile([1.0, 2.0, 3.0], [0.0, 1000.0, 500.0])
+    ev.write_signal(tmp_path / "voltage.wav", signal, ev.Playback(full_scale=1000.0, speed=20.0, rate=2000))
     scene = loads(WITH_WAV, tmp_path)
     x = np.linspace(0.0, 4.0, 41)
     assert np.abs(scene.voltage(x) - signal(x)).max() <= 0.51 * 1000.0 / 32767
@@ -328,10 +323,10 @@ def test_a_voltage_file_may_be_a_wav(tmp_path):
     [(500.0, 0, "with a carrier of 500.0 Hz"), (None, 3, "voltage.wav, cut off"), (None, 10**6, "cut off")],
 )
 def test_a_wav_that_is_no_voltage_is_refused_under_its_key(tmp_path, carrier, cut, says):
-    playback = Playback(full_scale=2000.0, speed=20.0, rate=2000, carrier=carrier)
-    write_signal(tmp_path / "voltage.wav", VoltageProfile([0.0, 1.0], [0.0, 1000.0]), playback)
+    playback = ev.Playback(full_scale=2000.0, speed=20.0, rate=2000, carrier=carrier)
+    ev.write_signal(tmp_path / "voltage.wav", ev.VoltageProfile([0.0, 1.0], [0.0, 1000.0]), playback)
     data = (tmp_path / "voltage.wav").read_bytes()
     (tmp_path / "voltage.wav").write_bytes(data[: max(len(data) - cut, 0)])
-    with pytest.raises(InputError, match=says) as refused:
+    with pytest.raises(ev.InputError, match=says) as refused:
         loads(WITH_WAV, tmp_path)
     assert refused.value.key == "electrostatics.voltage_file"

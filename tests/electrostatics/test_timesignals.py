@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from evfem.electrostatics.signalfile import Playback, write_signal
-from evfem.electrostatics.signals import VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
-from evfem.errors import InputError
+import evfem as ev
 from evfem.protocols import TimeSignal
 
 TIME = np.linspace(0.0, 1.0, 2000, endpoint=False)
-SLOW = Sine(10.0, amplitude=30.0, bias=50.0, phase=0.4)
+SLOW = ev.Sine(10.0, amplitude=30.0, bias=50.0, phase=0.4)
 
 
 def power_of(signal):
@@ -29,11 +26,11 @@ def power_of(signal):
 def test_amplitude_modulation_attracts_at_the_envelopes_frequency_and_twice_that():
     """p/p0 = 1 + m^2/2 + 2 m cos W t + (m^2/2) cos 2 W t of the carrier's mean."""
     m, height = 0.6, 50.0
-    envelope = Sine(10.0, amplitude=m * height, bias=height)
+    envelope = ev.Sine(10.0, amplitude=m * height, bias=height)
     parts = {0: 1.0 + m**2 / 2.0, 10: 2.0 * m, 20: m**2 / 2.0}
     mean = {n: part * height**2 / 2.0 for n, part in parts.items()}
-    assert power_of(Carrier(400.0, envelope, resolved=False)) == pytest.approx(mean, rel=1e-9)
-    resolved = power_of(Carrier(400.0, envelope))
+    assert power_of(ev.Carrier(400.0, envelope, resolved=False)) == pytest.approx(mean, rel=1e-9)
+    resolved = power_of(ev.Carrier(400.0, envelope))
     assert {n: resolved[n] for n in mean} == pytest.approx(mean, rel=1e-9)
     beside = {800: parts[0], 790: m, 810: m, 780: m**2 / 4.0, 820: m**2 / 4.0}
     beside = {n: part * height**2 / 2.0 for n, part in beside.items()}
@@ -41,8 +38,8 @@ def test_amplitude_modulation_attracts_at_the_envelopes_frequency_and_twice_that
 
 
 def test_a_carrier_of_a_constant_height_is_a_sine_and_its_mean_a_number():
-    np.testing.assert_allclose(Carrier(40.0, 100.0)(TIME), Sine(40.0, 100.0)(TIME), rtol=1e-12)
-    mean = Carrier(40.0, 100.0, resolved=False)
+    np.testing.assert_allclose(ev.Carrier(40.0, 100.0)(TIME), ev.Sine(40.0, 100.0)(TIME), rtol=1e-12)
+    mean = ev.Carrier(40.0, 100.0, resolved=False)
     np.testing.assert_allclose(mean(TIME), np.full(TIME.size, 100.0 / np.sqrt(2.0)), rtol=1e-12)
     assert (mean.highest_frequency, mean(0.3)) == (0.0, pytest.approx(70.71067811865476))
 
@@ -51,12 +48,12 @@ def test_a_carrier_of_a_constant_height_is_a_sine_and_its_mean_a_number():
     ("signal", "largest", "highest"),
     [
         (SLOW, 80.0, 10.0),
-        (Sine(10.0, 30.0, -50.0), 80.0, 10.0),
-        (Carrier(300.0, SLOW), 80.0, 310.0),
-        (Carrier(300.0, SLOW, resolved=False), 80.0 / np.sqrt(2.0), 10.0),
-        (Carrier(300.0, Carrier(20.0, 10.0)), 10.0, 320.0),
-        (Sampled([1.0, -3.0, 1.0], 10.0), 3.0, 10.0 / 3.0),
-        (Sampled([2.0], 10.0), 2.0, 0.0),
+        (ev.Sine(10.0, 30.0, -50.0), 80.0, 10.0),
+        (ev.Carrier(300.0, SLOW), 80.0, 310.0),
+        (ev.Carrier(300.0, SLOW, resolved=False), 80.0 / np.sqrt(2.0), 10.0),
+        (ev.Carrier(300.0, ev.Carrier(20.0, 10.0)), 10.0, 320.0),
+        (ev.Sampled([1.0, -3.0, 1.0], 10.0), 3.0, 10.0 / 3.0),
+        (ev.Sampled([2.0], 10.0), 2.0, 0.0),
     ],
     ids=repr,
 )
@@ -71,10 +68,10 @@ def test_signals_say_how_large_and_how_fast_they_are(signal, largest, highest):
 
 
 def test_samples_are_linear_in_between_and_constant_outside():
-    signal = Sampled([0.0, 10.0, 4.0], rate=100.0, start=1.0)
+    signal = ev.Sampled([0.0, 10.0, 4.0], rate=100.0, start=1.0)
     times = [0.0, 1.0, 1.005, 1.01, 1.015, 1.02, 5.0]
     np.testing.assert_allclose(signal(times), [0.0, 0.0, 5.0, 10.0, 7.0, 4.0, 4.0], rtol=1e-12, atol=1e-10)
-    again = Sampled([0.0, 10.0, 4.0], rate=100.0, start=1.0, repeat=True)
+    again = ev.Sampled([0.0, 10.0, 4.0], rate=100.0, start=1.0, repeat=True)
     np.testing.assert_allclose(again([1.02, 1.025, 1.03, 1.04, 0.99, -1.99]), [4, 2, 0, 10, 4, 10], atol=1e-9)
 
 
@@ -85,15 +82,15 @@ def test_highest_frequency_of_samples_is_where_their_power_ends(shape, highest):
     odd = np.arange(1, 100, 2)
     share = np.cumsum(8.0 / (np.pi * odd) ** 2)
     assert odd[np.searchsorted(share, 0.95)] == 9
-    signal = Sampled(100.0 + (turns if shape == "sine" else np.sign(turns)), 40_000.0)
+    signal = ev.Sampled(100.0 + (turns if shape == "sine" else np.sign(turns)), 40_000.0)
     assert signal.highest_frequency == pytest.approx(highest)
 
 
 def test_samples_come_back_from_a_csv_file(tmp_path):
-    signal = Sampled([1.0, 0.1, -2.0 / 3.0], rate=300.0, start=0.5)
+    signal = ev.Sampled([1.0, 0.1, -2.0 / 3.0], rate=300.0, start=0.5)
     signal.to_csv(tmp_path / "signal.csv")
     assert (tmp_path / "signal.csv").read_text().startswith("time,voltage\n0.5,1.0\n")
-    back = Sampled.from_csv(tmp_path / "signal.csv", repeat=True)
+    back = ev.Sampled.from_csv(tmp_path / "signal.csv", repeat=True)
     assert back.voltage.tolist() == signal.voltage.tolist()
     assert back.rate == pytest.approx(300.0, rel=1e-12)
     assert (back.start, back.repeat) == (0.5, True)
@@ -106,18 +103,18 @@ def test_any_wav_with_one_channel_is_read(tmp_path, dtype):
     samples = np.rint(shape * steps) + 128 if dtype == "uint8" else shape * steps
     samples = shape if dtype == "float32" else samples
     wavfile.write(tmp_path / "own.wav", 8000, samples.astype(dtype))
-    signal = Sampled.from_wav(tmp_path / "own.wav", full_scale=200.0, start=0.25)
+    signal = ev.Sampled.from_wav(tmp_path / "own.wav", full_scale=200.0, start=0.25)
     assert (signal.rate, signal.start) == (8000.0, 0.25)
     np.testing.assert_allclose(signal.voltage, 200.0 * shape, atol=200.0 / steps)
-    with pytest.raises(InputError, match="full_scale: missing"):
-        Sampled.from_wav(tmp_path / "own.wav")
+    with pytest.raises(ev.InputError, match="full_scale: missing"):
+        ev.Sampled.from_wav(tmp_path / "own.wav")
 
 
 def test_a_wav_of_evfem_says_its_full_scale_and_plays_with_its_carrier(tmp_path):
-    slope = VoltageProfile([0.0, 10.0], [0.0, 1000.0])
-    playback = Playback(full_scale=2000.0, speed=20.0, rate=8000, carrier=100.0)
-    write_signal(tmp_path / "tone.wav", slope, playback)
-    signal = Sampled.from_wav(tmp_path / "tone.wav")
+    slope = ev.VoltageProfile([0.0, 10.0], [0.0, 1000.0])
+    playback = ev.Playback(full_scale=2000.0, speed=20.0, rate=8000, carrier=100.0)
+    ev.write_signal(tmp_path / "tone.wav", slope, playback)
+    signal = ev.Sampled.from_wav(tmp_path / "tone.wav")
     time = np.arange(signal.voltage.size) / 8000.0
     wanted = np.sqrt(2.0) * slope(20.0 * time) * np.sin(2.0 * np.pi * 100.0 * time)
     np.testing.assert_allclose(signal(time), wanted, atol=0.51 * 2000.0 / 32767)
@@ -126,25 +123,25 @@ def test_a_wav_of_evfem_says_its_full_scale_and_plays_with_its_carrier(tmp_path)
 @pytest.mark.parametrize(
     ("make", "key"),
     [
-        (lambda: Sine(0.0, 1.0), "frequency"),
-        (lambda: Sine(1.0, -1.0), "amplitude"),
-        (lambda: Sine(1.0, 1.0, bias=np.nan), "bias"),
-        (lambda: Sine(1.0, 1.0, bias=2e6), "bias"),
-        (lambda: Sine(1.0, 1.0, phase="0"), "phase"),
-        (lambda: Carrier(1.0, -1.0), "envelope"),
-        (lambda: Carrier(1.0, VoltageProfile([0.0], [1.0])), "envelope"),
-        (lambda: Carrier(1.0, 1.0, resolved=1), "resolved"),
-        (lambda: Carrier(2e9, 1.0), "frequency"),
-        (lambda: Sampled([], 1.0), "voltage"),
-        (lambda: Sampled([[1.0]], 1.0), "voltage"),
-        (lambda: Sampled([2e6], 1.0), "voltage"),
-        (lambda: Sampled([1.0], 0.0), "rate"),
-        (lambda: Sampled([1.0], 1.0, start=np.inf), "start"),
-        (lambda: Sampled([1.0], 1.0, repeat=0), "repeat"),
+        (lambda: ev.Sine(0.0, 1.0), "frequency"),
+        (lambda: ev.Sine(1.0, -1.0), "amplitude"),
+        (lambda: ev.Sine(1.0, 1.0, bias=np.nan), "bias"),
+        (lambda: ev.Sine(1.0, 1.0, bias=2e6), "bias"),
+        (lambda: ev.Sine(1.0, 1.0, phase="0"), "phase"),
+        (lambda: ev.Carrier(1.0, -1.0), "envelope"),
+        (lambda: ev.Carrier(1.0, ev.VoltageProfile([0.0], [1.0])), "envelope"),
+        (lambda: ev.Carrier(1.0, 1.0, resolved=1), "resolved"),
+        (lambda: ev.Carrier(2e9, 1.0), "frequency"),
+        (lambda: ev.Sampled([], 1.0), "voltage"),
+        (lambda: ev.Sampled([[1.0]], 1.0), "voltage"),
+        (lambda: ev.Sampled([2e6], 1.0), "voltage"),
+        (lambda: ev.Sampled([1.0], 0.0), "rate"),
+        (lambda: ev.Sampled([1.0], 1.0, start=np.inf), "start"),
+        (lambda: ev.Sampled([1.0], 1.0, repeat=0), "repeat"),
     ],
 )
 def test_what_is_no_signal_is_refused(make, key):
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(ev.InputError) as caught:
         make()
     assert caught.value.key == key
 
@@ -161,8 +158,8 @@ def test_what_is_no_signal_is_refused(make, key):
 )
 def test_csv_files_without_even_times_are_refused(tmp_path, text):
     (tmp_path / "signal.csv").write_text(text)
-    with pytest.raises(InputError) as caught:
-        Sampled.from_csv(tmp_path / "signal.csv")
+    with pytest.raises(ev.InputError) as caught:
+        ev.Sampled.from_csv(tmp_path / "signal.csv")
     assert caught.value.key == "file"
 
 
@@ -177,6 +174,6 @@ def test_what_is_no_wav_with_one_channel_is_refused(tmp_path, damage):
         path.write_bytes(struct.pack("<I", 7) * 50)
     elif damage == "missing":
         path.unlink()
-    with pytest.raises(InputError) as caught:
-        Sampled.from_wav(path, 10.0)
+    with pytest.raises(ev.InputError) as caught:
+        ev.Sampled.from_wav(path, 10.0)
     assert caught.value.key == "path"

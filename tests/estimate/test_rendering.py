@@ -7,10 +7,8 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
+import evfem as ev
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
-from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
-from evfem.errors import InputError
 from evfem.estimate.rendering import (
     ApparentFriction,
     apparent_friction,
@@ -20,30 +18,27 @@ from evfem.estimate.rendering import (
     replay,
     voltage_for,
 )
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene, Solver
-from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 PAD = finger(block(16, 3, sag=0.4), viscosity=1e-3)
-LAYERS = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+LAYERS = ev.Layers.of(ev.Layer(0.38, 1650.0), ev.Layer(0.09, 3.35))
 STEP = [[0.0, 0.3], [1.4, 0.3], [1.4, 0.4]]
-MOTION = (Press(force=0.02, steps=2), Slide(1.8, steps=18))
+MOTION = (ev.Press(force=0.02, steps=2), ev.Slide(1.8, steps=18))
 
 
 def encoding(friction, law=None, area=None):
-    return Encoding(law or Kaczmarek(), LAYERS, area or AreaLaw(60.0), friction)
+    return Encoding(law or ev.Kaczmarek(), LAYERS, area or AreaLaw(60.0), friction)
 
 
 @pytest.fixture(scope="module")
 def jump():
-    return record(Scene(PAD, Flat(friction=STEP), motion=MOTION))
+    return record(ev.Scene(PAD, ev.Flat(friction=STEP), motion=MOTION))
 
 
 @pytest.fixture(scope="module")
 def texture():
-    motion = (Press(indentation=0.15, steps=3), Slide(0.6, steps=30, speed=20.0))
-    solver = Solver(dynamics="inertial")
-    return record(Scene(PAD, Sinusoid(friction=0.1), motion=motion, solver=solver))
+    motion = (ev.Press(indentation=0.15, steps=3), ev.Slide(0.6, steps=30, speed=20.0))
+    solver = ev.Solver(dynamics="inertial")
+    return record(ev.Scene(PAD, ev.Sinusoid(friction=0.1), motion=motion, solver=solver))
 
 
 def felt(friction, force=0.05):
@@ -72,7 +67,7 @@ def test_voltages_by_hand():
     assert voltage_for(wish, encoding(0.2)).largest == pytest.approx(
         np.sqrt(s * 0.47 / (eps_0 * 60.0)), rel=1e-8
     )
-    troxel = voltage_for(wish, encoding(0.2, StrongTroxel()))
+    troxel = voltage_for(wish, encoding(0.2, ev.StrongTroxel()))
     assert troxel.largest == pytest.approx(s / np.sqrt(eps_0 * 60.0), rel=1e-8)
     # (19) with m = 0.5 at 0.05 N/mm over 8 mm: k F^-0.5 = 60 / sqrt(0.4) takes the place of k'
     power = voltage_for(wish, encoding(0.2, area=AreaLaw(60.0, 0.5)), depth=8.0)
@@ -98,21 +93,21 @@ def test_an_amplifier_costs_what_it_cuts_off():
     wish = felt([0.2, 0.4, 0.4])
     free = voltage_for(wish, encoding(0.2))
     assert (free.share_limited, free.error_of_amplifier) == (0.0, 0.0)
-    half = voltage_for(wish, encoding(0.2), amplifier=Amplifier(0.5 * free.largest))
+    half = voltage_for(wish, encoding(0.2), amplifier=ev.Amplifier(0.5 * free.largest))
     assert half.largest == pytest.approx(0.5 * free.largest, rel=1e-12)
     # F_e falls to a quarter in two of three rows: 0.75 * 0.2 out of 0.2, 0.4, 0.4
     cost = 0.15 * np.sqrt(2.0) / np.linalg.norm([0.2, 0.4, 0.4])
     assert half.error_of_amplifier == pytest.approx(cost, rel=1e-8)
     assert half.share_limited == pytest.approx(0.75, rel=1e-6)
     # at 20 mm/s a slew of 10 U/s climbs U / 2 per mm: there after 2 mm instead of 1
-    slow = voltage_for(wish, encoding(0.2), amplifier=Amplifier(1e4, slew=10.0 * free.largest), speed=20.0)
+    slow = voltage_for(wish, encoding(0.2), amplifier=ev.Amplifier(1e4, slew=10.0 * free.largest), speed=20.0)
     np.testing.assert_allclose(slow.profile([1.0, 2.0]) / free.largest, [0.5, 1.0], rtol=1e-6)
     assert slow.share_limited == pytest.approx(1.0, rel=1e-6)
     assert slow.error_of_amplifier == pytest.approx(0.15 / np.linalg.norm([0.2, 0.4, 0.4]), rel=1e-6)
 
 
 def test_exact_encoding_reproduces_a_friction_step(jump):
-    found = exact(jump, Display(friction=0.3), Kaczmarek())
+    found = exact(jump, ev.Display(friction=0.3), ev.Kaczmarek())
     fidelity = compare(jump.result, found.result)
     assert fidelity.relative_l2 < 1e-8
     assert fidelity.pearson == pytest.approx(1.0, abs=1e-12)
@@ -124,8 +119,8 @@ def test_exact_encoding_reproduces_a_friction_step(jump):
     assert found.result.voltage[-1] == pytest.approx(found.result.voltage.max(), rel=1e-6)
     # the voltage found, replayed as a table, gives the same again
     slide = np.array(found.result.motion) == "slide"
-    table = VoltageProfile(found.result.position[slide], found.result.voltage[slide])
-    again = replay(jump, Display(friction=0.3), Kaczmarek(), table)
+    table = ev.VoltageProfile(found.result.position[slide], found.result.voltage[slide])
+    again = replay(jump, ev.Display(friction=0.3), ev.Kaczmarek(), table)
     assert compare(found.result, again.result).relative_l2 < 1e-7
 
 
@@ -133,7 +128,7 @@ def test_the_closed_form_is_near_where_its_area_law_is_right(jump):
     felt = apparent_friction(jump.result)
     width = jump.result.contact_width[-1] / 0.02  # mm2/N of the gross contact, as an area law of one load
     signal = voltage_for(felt, encoding(0.3, area=AreaLaw(width)))
-    open_loop = replay(jump, Display(friction=0.3), Kaczmarek(), signal.profile)
+    open_loop = replay(jump, ev.Display(friction=0.3), ev.Kaczmarek(), signal.profile)
     fidelity = compare(jump.result, open_loop.result)
     # the air layer adds to the attraction, so that the force is somewhat too large, nowhere too small
     assert fidelity.error.min() > -1e-6 * 0.02
@@ -143,8 +138,8 @@ def test_the_closed_form_is_near_where_its_area_law_is_right(jump):
 
 
 def test_where_the_wish_is_below_the_displays_own_friction(jump):
-    rough = Display(friction=0.35)
-    found = exact(jump, rough, Kaczmarek())
+    rough = ev.Display(friction=0.35)
+    found = exact(jump, rough, ev.Kaczmarek())
     slide = np.array(found.result.motion) == "slide"
     wish, force = jump.result.applied_tangential_force[slide], found.result.applied_tangential_force[slide]
     own = wish < 0.35 * 0.02 * (1.0 - 1e-6)
@@ -163,8 +158,8 @@ def test_where_the_wish_is_below_the_displays_own_friction(jump):
 
 def test_a_wish_beyond_what_a_sticking_pad_gives_waits_for_full_slip(jump):
     felt = apparent_friction(jump.result)
-    wish = FollowForce(felt.position, 1.2 * felt.tangential_force, 10_000.0)
-    found = replay(jump, Display(friction=0.3), Kaczmarek(), wish)
+    wish = ev.FollowForce(felt.position, 1.2 * felt.tangential_force, 10_000.0)
+    found = replay(jump, ev.Display(friction=0.3), ev.Kaczmarek(), wish)
     slide = np.array(found.result.motion) == "slide"
     voltage, force = found.result.voltage[slide], found.result.applied_tangential_force[slide]
     sticks = found.result.position[slide] < jump.full_slip
@@ -178,9 +173,9 @@ def test_a_wish_beyond_what_a_sticking_pad_gives_waits_for_full_slip(jump):
 
 
 def test_a_limited_voltage_reproduces_as_much_as_it_can(jump):
-    free = exact(jump, Display(friction=0.3), Kaczmarek())
+    free = exact(jump, ev.Display(friction=0.3), ev.Kaczmarek())
     most = 0.5 * free.result.voltage.max()
-    found = exact(jump, Display(friction=0.3), Kaczmarek(), largest_voltage=most)
+    found = exact(jump, ev.Display(friction=0.3), ev.Kaczmarek(), largest_voltage=most)
     assert found.result.voltage.max() == pytest.approx(most, rel=1e-12)
     limited = compare(jump.result, found.result)
     there = free.result.voltage[2:] < 0.999 * most
@@ -192,7 +187,7 @@ def test_exact_encoding_reproduces_a_texture(texture):
     wish = apparent_friction(texture.result)
     lowest = wish.minimum(after=texture.full_slip)
     assert 0.1 < lowest < 0.12 < wish.friction.max()
-    found = exact(texture, Display(friction=lowest), Kaczmarek())
+    found = exact(texture, ev.Display(friction=lowest), ev.Kaczmarek())
     error, voltage = compare(texture.result, found.result).error, found.result.voltage[3:]
     rubs = voltage > 0.0
     assert np.abs(error[rubs]).max() < 1e-6 * np.abs(wish.tangential_force).max()
@@ -201,19 +196,19 @@ def test_exact_encoding_reproduces_a_texture(texture):
     assert found.result.position[3:][~rubs].max(initial=0.0) < texture.full_slip
     assert voltage.max() > 1000.0
     # the reference held its indentation; the display is pressed to the load that this took
-    assert found.scene.motion[0] == Press(force=texture.result.applied_force[2], steps=3)
+    assert found.scene.motion[0] == ev.Press(force=texture.result.applied_force[2], steps=3)
     assert found.scene.motion[1] == texture.scene.motion[1]
 
 
 def test_slides_that_cannot_be_rendered_are_refused(jump):
-    pressed = record(Scene(PAD, Flat(), motion=MOTION[:1]))
-    with pytest.raises(InputError, match="0 rows of slides"):
+    pressed = record(ev.Scene(PAD, ev.Flat(), motion=MOTION[:1]))
+    with pytest.raises(ev.InputError, match="0 rows of slides"):
         apparent_friction(pressed.result)
     assert pressed.full_slip is None
-    back = record(replace(jump.scene, motion=(MOTION[0], Slide(-0.1, steps=2))))
-    with pytest.raises(InputError, match=r"towards \+x"):
+    back = record(replace(jump.scene, motion=(MOTION[0], ev.Slide(-0.1, steps=2))))
+    with pytest.raises(ev.InputError, match=r"towards \+x"):
         apparent_friction(back.result)
-    with pytest.raises(InputError, match="same slide"):
+    with pytest.raises(ev.InputError, match="same slide"):
         compare(jump.result, back.result)
-    with pytest.raises(InputError, match="position up to 2 mm"):
+    with pytest.raises(ev.InputError, match="position up to 2 mm"):
         felt([0.1, 0.2, 0.3]).minimum(after=3.0)

@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.errors import InputError
 from evfem.estimate.correction import corrected, corrections, importance
 from evfem.estimate.database import linear_curve, shipped
 from evfem.estimate.pressed import FRICTIONS, LOADS, PressedPad, remember, shipped_pad
 from evfem.estimate.sliding import slid
-from evfem.estimate.touch import Touch, friction_of, from_texture, touch_scene
+from evfem.estimate.touch import friction_of, from_texture, touch_scene
 from evfem.plotting.fields import height_of
-from evfem.surface.surfaces import Flat, Sinusoid
 from evfem.textures.library import reference
-from evfem.textures.texture import Texture
 
 POSITIONS = np.arange(1, 41) * 0.05
 
@@ -50,7 +47,7 @@ def test_on_a_slope_friction_is_that_of_a_block(ridged, rise):
 
 
 def test_what_is_elastic_loses_nothing_over_a_period_and_what_lags_does():
-    wave = Sinusoid(terms=[[0.02, np.pi, 0.0]])
+    wave = ev.Sinusoid(terms=[[0.02, np.pi, 0.0]])
     still, slow, fast = (slid(springs(), wave, 0.0, POSITIONS, v).mean() for v in (1e-6, 20.0, 100.0))
     assert abs(still) < 1e-3 * np.ptp(slid(springs(), wave, 0.0, POSITIONS, 1e-6))
     assert 3.0 < fast / slow < 7.0
@@ -59,7 +56,7 @@ def test_what_is_elastic_loses_nothing_over_a_period_and_what_lags_does():
 
 def test_springs_that_do_not_know_each_other_share_the_load_by_their_depths():
     """With touching springs alone: sum of p / c = load gives the bone, p the slope's average."""
-    pad, wave = springs(), Sinusoid(terms=[[0.01, 2.0, 0.0]])
+    pad, wave = springs(), ev.Sinusoid(terms=[[0.01, 2.0, 0.0]])
     found = slid(pad, wave, 0.0, POSITIONS[:2], 1e-9)[1]
     x, slope = pad.x + POSITIONS[1], wave.slope(pad.x + POSITIONS[1])
     stiffness = 1.0 / np.diag(pad.compliance)[:40]
@@ -80,7 +77,7 @@ def test_on_a_flat_surface_the_remembered_pad_is_where_it_was(ridged):
     assert -pad.force[n:].sum() == pytest.approx(FRICTIONS[1] * LOADS[2], rel=1e-6)
     low = pad.y + (pad.base + pad.compliance @ pad.force)[:n]
     assert np.ptp(low[pad.force[:n] > 0.0]) < 1e-5  # mm, with what half precision leaves
-    found = slid(pad, Flat(), float(FRICTIONS[1]), POSITIONS, 20.0)
+    found = slid(pad, ev.Flat(), float(FRICTIONS[1]), POSITIONS, 20.0)
     np.testing.assert_allclose(found, FRICTIONS[1], rtol=1e-9)
 
 
@@ -117,12 +114,12 @@ def test_a_correction_that_was_made_is_found_and_undone():
         assert importance(wave[None], wave[None], one, slope)[0, k] == pytest.approx(size, rel=0.05)
 
 
-WAVE = Texture("a b/ö", "drawn", np.arange(0.0, 2.0, 0.05), 0.01 * np.sin(np.pi * np.arange(0.0, 2.0, 0.05)),
-               "CC0-1.0", period=2.0)  # fmt: skip
+X = np.arange(0.0, 2.0, 0.05)
+WAVE = ev.Texture("a b/ö", "drawn", X, 0.01 * np.sin(np.pi * X), "CC0-1.0", period=2.0)
 
 
 def test_the_bone_passes_the_beginning_of_the_texture_with_the_second_slide():
-    scene = touch_scene(WAVE, Touch(load=0.05, friction=0.3))
+    scene = touch_scene(WAVE, ev.Touch(load=0.05, friction=0.3))
     begin = scene.motion[1].distance
     x = begin + np.array([0.0, 0.5, 1.5])
     np.testing.assert_allclose(scene.surface.height(x), [0.0, 0.01, -0.01], atol=1e-12)
@@ -131,16 +128,16 @@ def test_the_bone_passes_the_beginning_of_the_texture_with_the_second_slide():
 
 
 def test_friction_lies_on_a_level_surface():
-    scene = touch_scene(reference("friction-ramps"), Touch())
+    scene = touch_scene(reference("friction-ramps"), ev.Touch())
     x = scene.motion[1].distance + np.array([0.0, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(scene.surface.friction_coefficient(x), [0.3, 0.45, 0.6, 0.45], atol=1e-9)
     assert scene.surface.is_flat
 
 
 def test_a_spectrum_has_no_surface():
-    spectrum = Texture("s", "recorded", [1.0, 2.0], [0.6, 0.8], "CC0-1.0", "friction_spectrum")
-    with pytest.raises(InputError, match="heights or friction over x"):
-        touch_scene(spectrum, Touch())
+    spectrum = ev.Texture("s", "recorded", [1.0, 2.0], [0.6, 0.8], "CC0-1.0", "friction_spectrum")
+    with pytest.raises(ev.InputError, match="heights or friction over x"):
+        touch_scene(spectrum, ev.Touch())
 
 
 class Slid:
@@ -158,7 +155,7 @@ def test_friction_is_that_of_the_second_slide_from_its_beginning():
 
 def test_pictures_of_a_slide_stand_where_its_curve_does():
     """The last frame is at the curve's last x, and the texture below it at its own heights."""
-    touch = Touch(ridged=False, load=0.02, length=0.5)
+    touch = ev.Touch(ridged=False, load=0.02, length=0.5)
     result = ev.simulate(touch_scene(WAVE, touch, every=4))
     shown, curve = from_texture(result), friction_of(result)
     assert shown.frames[-1].position == pytest.approx(curve.x[-1])

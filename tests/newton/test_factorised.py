@@ -7,14 +7,10 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
-from evfem.electrostatics.laws import Kaczmarek
+import evfem as ev
 from evfem.newton.anderson import Anderson
 from evfem.newton.control import FollowFriction, Force, GivenVoltage, Indentation, Target
-from evfem.scene.motion import Hover, Press
-from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
-from evfem.simulation.run import simulate
-from evfem.surface.surfaces import Display
 
 ROUND = finger(block(8, 3, sag=0.4))
 
@@ -22,7 +18,7 @@ ROUND = finger(block(8, 3, sag=0.4))
 @pytest.fixture(scope="module")
 def pressed():
     """A model, its body, its state at 0.2 mm of indentation under 1000 V, and the target it was for."""
-    scene = Scene(ROUND, Display(), Kaczmarek(), 1000.0, [Press(indentation=0.2)])
+    scene = ev.Scene(ROUND, ev.Display(), ev.Kaczmarek(), 1000.0, [ev.Press(indentation=0.2)])
     model = make_model(scene)
     target = Target.held(model.bone(0.0, 0.2), 1000.0)
     state = model.equilibrium.step(model.equilibrium.rest(model.bone(0.0, 0.0), 1000.0), target)
@@ -85,14 +81,14 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     digits, and the step would be cut. Whether the third or fourth is small enough is the machine's.
     """
     results = [
-        simulate(
-            Scene(
+        ev.simulate(
+            ev.Scene(
                 coarse_pad(),
-                Display(),
-                Kaczmarek(),
+                ev.Display(),
+                ev.Kaczmarek(),
                 50.0,
-                [Hover(0.01, steps=1)],
-                solver=Solver(tolerance=tolerance),
+                [ev.Hover(0.01, steps=1)],
+                solver=ev.Solver(tolerance=tolerance),
             )
         )
         for tolerance in (1e-8, 1e-11)

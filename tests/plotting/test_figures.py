@@ -11,15 +11,12 @@ from matplotlib.figure import Figure
 from tools.fakes import fake_result
 from tools.solids import block
 
+import evfem as ev
 from evfem import plotting
-from evfem.calibration.parameters import Parameter
-from evfem.calibration.result import FitResult
-from evfem.errors import InputError
 from evfem.mesh.mesh import raised
 from evfem.plotting import contact_pressure, deformed, forces, history, impedance, signal
 from evfem.plotting.figures import REGIONS
 from evfem.plotting.meshes import DIMMEST, EYE, regions
-from evfem.response.impedance import Impedance
 
 PNG = b"\x89PNG"
 #: a backend that tells which figures `plt.show()` shows, instead of opening windows
@@ -109,8 +106,8 @@ def fitted(with_sd):
     measured, scale = np.array([10.0, 20.0, 30.0, 4.0, 5.0]), np.array([2.0, 2.0, 2.0, 0.5, 0.5])
     names = [f"normal_force at indentation {x}" for x in (0.1, 0.2, 0.3)]
     names += [f"contact_width.last, motion.0.gap {x}" for x in (0.1, 0.2)]
-    return FitResult(
-        parameters={"surface.friction": Parameter(0.1, 1.0)},
+    return ev.FitResult(
+        parameters={"surface.friction": ev.Parameter(0.1, 1.0)},
         values={"surface.friction": 0.3},
         unknowns=np.zeros(1),
         errors=np.ones(1),
@@ -140,7 +137,7 @@ def test_residuals_are_computed_minus_measured_over_their_scale(with_sd, factor,
 
 
 def made(unit="N/mm"):
-    return Impedance(np.array([1.0, 10.0, 100.0]), np.array([1.0, 1.0 + 1.0j, -2.0]), "normal", unit)
+    return ev.Impedance(np.array([1.0, 10.0, 100.0]), np.array([1.0, 1.0 + 1.0j, -2.0]), "normal", unit)
 
 
 def test_magnitude_and_phase():
@@ -155,7 +152,7 @@ def test_magnitude_and_phase():
 
 @pytest.mark.parametrize("found", [{}, {"one": made(), "other": made("N/mm per mm")}])
 def test_what_cannot_be_drawn_together_is_refused(found):
-    with pytest.raises(InputError, match="found: given"):
+    with pytest.raises(ev.InputError, match="found: given"):
         impedance(found)
 
 

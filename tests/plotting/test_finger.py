@@ -9,18 +9,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 from tools.fakes import fake_result
 from tools.meshes import KINDS, square_mesh
 
-from evfem.errors import InputError
-from evfem.finger.fingerpad import FingerPad, MeshedFinger
+import evfem as ev
 from evfem.plotting import FIELDS, contact_pressure, deformed, regions, side_by_side
 from evfem.plotting.fields import patches, scale_of
 from evfem.scene.file import dump
-from evfem.scene.motion import Press
-from evfem.scene.probes import Probe
-from evfem.scene.scene import Output, Scene
 from evfem.simulation.model import placed
-from evfem.simulation.run import simulate
-from evfem.surface.surfaces import Flat, Sinusoid
-from evfem.tissue.laws import NeoHookean
 
 WINDOW = (-0.5, 0.7, -0.1, 0.4)
 
@@ -192,12 +185,12 @@ def test_one_value_throughout_has_a_scale_too():
 
 def with_scene(result, surface):
     """The result of a scene with that surface, as far as its provenance says."""
-    scene = Scene(FingerPad(), surface, motion=Press(force=0.1))
+    scene = ev.Scene(ev.FingerPad(), surface, motion=ev.Press(force=0.1))
     return replace(result, provenance=result.provenance | {"parameters": dump(scene)})
 
 
 def test_the_surface_is_that_of_the_scene_where_it_touches_at_first():
-    surface = Sinusoid(friction=0.1)
+    surface = ev.Sinusoid(friction=0.1)
     result = with_scene(fake_result("quad9"), surface)
     there, _ = placed(surface, result.mesh.points[result.mesh.node_sets["pad"]])
     (line,) = deformed(result, near=WINDOW).get_lines()
@@ -278,7 +271,7 @@ def test_regions_have_their_cells_and_names(kind):
 
 def test_regions_stay_within_their_figure():
     """Labels and legend beside axes in true proportions are not cut off."""
-    ax = regions(FingerPad(resolution="coarse").mesh())
+    ax = regions(ev.FingerPad(resolution="coarse").mesh())
     figure = ax.figure
     figure.savefig(io.BytesIO())
     box = figure.get_tightbbox()
@@ -303,26 +296,28 @@ def test_contact_pressure_is_drawn_along_the_current_x_of_the_pad():
 
 def test_unknown_fields_frames_and_windows_get_a_sentence():
     result = fake_result()
-    with pytest.raises(InputError, match="von_mises"):
+    with pytest.raises(ev.InputError, match="von_mises"):
         deformed(result, "stress")
-    with pytest.raises(InputError, match="2 frames kept"):
+    with pytest.raises(ev.InputError, match="2 frames kept"):
         deformed(result, frame=2)
-    with pytest.raises(InputError, match="2 frames kept"):
+    with pytest.raises(ev.InputError, match="2 frames kept"):
         contact_pressure(result, frame=-3)
     for near in ("touch", (1.0, 0.0, 0.0, 1.0), (0.0, 1.0), (0.0, np.inf, 0.0, 1.0), 3.0):
-        with pytest.raises(InputError, match=r"near: .*contact, or a window"):
+        with pytest.raises(ev.InputError, match=r"near: .*contact, or a window"):
             deformed(result, near=near)
-    with pytest.raises(InputError, match=r"vmin: given 2\.0; allowed: a value below vmax, which is 1"):
+    with pytest.raises(ev.InputError, match=r"vmin: given 2\.0; allowed: a value below vmax, which is 1"):
         deformed(result, vmin=2.0, vmax=1.0)
-    with pytest.raises(InputError, match="results: given nothing"):
+    with pytest.raises(ev.InputError, match="results: given nothing"):
         side_by_side({})
 
 
 def test_probes_are_marked_where_they_are_and_only_in_the_window():
-    law = NeoHookean(E=0.1, nu=0.4)
-    body = MeshedFinger(square_mesh("quad9"), {"soft": law, "hard": law})
-    output = Output(probes={"merkel": [[0.1, 0.3], [0.4, 0.3]], "deep": Probe(x=[0.0], depth=1.5)})
-    result = simulate(Scene(body, Flat(y=0.0), motion=[Press(indentation=0.2, steps=2)], output=output))
+    law = ev.NeoHookean(E=0.1, nu=0.4)
+    body = ev.MeshedFinger(square_mesh("quad9"), {"soft": law, "hard": law})
+    output = ev.Output(probes={"merkel": [[0.1, 0.3], [0.4, 0.3]], "deep": ev.Probe(x=[0.0], depth=1.5)})
+    result = ev.simulate(
+        ev.Scene(body, ev.Flat(y=0.0), motion=[ev.Press(indentation=0.2, steps=2)], output=output)
+    )
     for frame, top, names in ((0, 2.0, ["merkel", "deep"]), (1, 0.9, ["merkel"])):
         ax = deformed(result, frame=frame, near=(-1.0, 1.0, 0.0, top))
         marks = [line.get_xydata()[0] for line in ax.get_lines() if line.get_marker() == "o"]

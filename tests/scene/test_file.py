@@ -7,19 +7,9 @@ import numpy as np
 import pytest
 from tools.meshes import square_mesh
 
-from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
-from evfem.electrostatics.signals import VoltageProfile
-from evfem.errors import InputError
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+import evfem as ev
 from evfem.mesh import file as meshfile
 from evfem.scene.file import dump, load, loads
-from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import Output, Scene, Solver, default_scene
-from evfem.scene.terms import Boundary
-from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.surface.textures import Grating, SelfAffine
-from evfem.tissue.forms import form
-from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
 
 DISPLAY = """
 version = 1
@@ -101,8 +91,8 @@ def folder(tmp_path):
 
 def test_the_first_example_is_the_default_scene():
     scene = loads(DISPLAY)
-    assert scene.digest() == default_scene().digest()
-    assert scene.motion == (Press(force=0.05, steps=10), Slide(distance=5.0, steps=100))
+    assert scene.digest() == ev.default_scene().digest()
+    assert scene.motion == (ev.Press(force=0.05, steps=10), ev.Slide(distance=5.0, steps=100))
 
 
 def test_a_file_gives_its_name_and_folder(folder):
@@ -114,56 +104,63 @@ def test_a_file_gives_its_name_and_folder(folder):
     assert scene.name == "my scan"
     assert scene.voltage(2.5) == 50.0
     assert float(scene.surface.height(np.array(0.0))) == 0.01
-    assert (scene.law, scene.surface.insulator) == (StrongTroxel(), Layer(0.1, 3.0))
-    assert scene.motion == (Hover(gap=1.0),)
+    assert (scene.law, scene.surface.insulator) == (ev.StrongTroxel(), ev.Layer(0.1, 3.0))
+    assert scene.motion == (ev.Hover(gap=1.0),)
 
 
 def test_a_participant_of_table_1_may_stand_in_a_file():
     """Other keys say what is different from it."""
     text = SHORT + "[finger]\nparticipant = 'iii'\nresolution = 'coarse'\nbone_offset = 0.5\n"
-    assert loads(text).finger == replace(FingerPad.participant("iii", "coarse"), bone_offset=0.5)
+    assert loads(text).finger == replace(ev.FingerPad.participant("iii", "coarse"), bone_offset=0.5)
 
 
 def test_a_material_of_table_2_may_be_changed_in_one_of_its_moduli():
     text = SHORT + "[finger.materials]\ndermis.E = 0.06\nnail.nu = 0.2\nhypodermis.viscosity = 0.1\n"
     laws = loads(text).finger.materials
-    assert laws["dermis"] == NeoHookean(E=0.06, nu=0.48)
-    assert laws["nail"] == NeoHookean(E=17.0, nu=0.2)
-    assert laws["hypodermis"] == NeoHookean(E=0.034, nu=0.48, viscosity=0.1)
-    assert laws["epidermis"] == FingerPad().materials["epidermis"]
+    assert laws["dermis"] == ev.NeoHookean(E=0.06, nu=0.48)
+    assert laws["nail"] == ev.NeoHookean(E=17.0, nu=0.2)
+    assert laws["hypodermis"] == ev.NeoHookean(E=0.034, nu=0.48, viscosity=0.1)
+    assert laws["epidermis"] == ev.FingerPad().materials["epidermis"]
 
 
 def scenes(folder):
     """Scenes that use everything a file can hold."""
-    laws = {"nail": LinearElastic(E=20.0, nu=0.3), "dermis": NeoHookean(E=0.1, nu=0.4, viscosity=1e-3)}
-    press = Press(indentation=1.0, steps=3, speed=2.0)
-    profile = Profile([0.0, 0.1, 1.0], [0.0, 0.2, 0.1], friction=[[0.0, 0.1], [0.0, 0.3]], y=-7.0)
-    voltage = VoltageProfile([0.0, 1.0, 1.0], [0.0, 100.0 / 3.0, 7.0])
-    tissue = {"soft": Yeoh(c1=0.1, c2=0.01, c3=0.001, nu=0.4), "hard": Ogden(mu=[0.1], alpha=[2.0], nu=0.4)}
-    own = MeshedFinger(folder / "pad.vtu", tissue, Electrical(0.4), viscosity=0.01)
-    insulated = Sinusoid(friction=0.1, terms=[[0.1, 2.0, 0.3]], insulator=Layer(0.1 / 3, 3.0))
-    yield default_scene()
-    yield Scene(FingerPad(width=16.0, ridges=False, materials=laws), Flat(friction=0.0), motion=[press])
-    yield Scene(FingerPad(electrical=Electrical(0.3)), profile, motion=[press, Slide(-1.0, speed=3.0)])
-    yield Scene(own, insulated, Kaczmarek(gap_eps_r=2.0), voltage, [Hover(0.5)], direction="normal")
-    yield Scene(
-        FingerPad(viscosity=0.1),
-        Display(friction=0.1 + 0.2),
-        StrongTroxel(),
-        motion=[VoltageRamp(0.1, steps=1)],
+    laws = {"nail": ev.LinearElastic(E=20.0, nu=0.3), "dermis": ev.NeoHookean(E=0.1, nu=0.4, viscosity=1e-3)}
+    press = ev.Press(indentation=1.0, steps=3, speed=2.0)
+    profile = ev.Profile([0.0, 0.1, 1.0], [0.0, 0.2, 0.1], friction=[[0.0, 0.1], [0.0, 0.3]], y=-7.0)
+    voltage = ev.VoltageProfile([0.0, 1.0, 1.0], [0.0, 100.0 / 3.0, 7.0])
+    tissue = {
+        "soft": ev.Yeoh(c1=0.1, c2=0.01, c3=0.001, nu=0.4),
+        "hard": ev.Ogden(mu=[0.1], alpha=[2.0], nu=0.4),
+    }
+    own = ev.MeshedFinger(folder / "pad.vtu", tissue, ev.Electrical(0.4), viscosity=0.01)
+    insulated = ev.Sinusoid(friction=0.1, terms=[[0.1, 2.0, 0.3]], insulator=ev.Layer(0.1 / 3, 3.0))
+    yield ev.default_scene()
+    yield ev.Scene(
+        ev.FingerPad(width=16.0, ridges=False, materials=laws), ev.Flat(friction=0.0), motion=[press]
+    )
+    yield ev.Scene(
+        ev.FingerPad(electrical=ev.Electrical(0.3)), profile, motion=[press, ev.Slide(-1.0, speed=3.0)]
+    )
+    yield ev.Scene(own, insulated, ev.Kaczmarek(gap_eps_r=2.0), voltage, [ev.Hover(0.5)], direction="normal")
+    yield ev.Scene(
+        ev.FingerPad(viscosity=0.1),
+        ev.Display(friction=0.1 + 0.2),
+        ev.StrongTroxel(),
+        motion=[ev.VoltageRamp(0.1, steps=1)],
         air_layer=False,
         coupling="staggered_once",
-        solver=Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
-        output=Output(3),
+        solver=ev.Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
+        output=ev.Output(3),
     )
-    grooves = Grating(1.0, 0.05, groove_width=0.4, phase=0.1, insulator=Layer(0.1, 3.0))
-    closing = VoltageRamp(gap=0.05, hold="force")
-    yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press, closing])
-    rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
-    yield Scene(FingerPad(), rough, motion=[press])
-    ended = Display(electrodes=[[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]])
-    yield Scene(FingerPad(), ended, StrongTroxel(), 10.0, [press], field="full", grounded=False)
-    yield Scene(FingerPad(), Display(), StrongTroxel(), 10.0, [press], field="auto")
+    grooves = ev.Grating(1.0, 0.05, groove_width=0.4, phase=0.1, insulator=ev.Layer(0.1, 3.0))
+    closing = ev.VoltageRamp(gap=0.05, hold="force")
+    yield ev.Scene(ev.FingerPad(), grooves, ev.Kaczmarek(), 100.0, [press, closing])
+    rough = ev.SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
+    yield ev.Scene(ev.FingerPad(), rough, motion=[press])
+    ended = ev.Display(electrodes=[[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]])
+    yield ev.Scene(ev.FingerPad(), ended, ev.StrongTroxel(), 10.0, [press], field="full", grounded=False)
+    yield ev.Scene(ev.FingerPad(), ev.Display(), ev.StrongTroxel(), 10.0, [press], field="auto")
 
 
 @pytest.mark.parametrize("number", range(9))
@@ -181,7 +178,7 @@ def test_the_depth_stands_with_the_finger(folder):
         assert scene.depth == 10.0
         assert replace(scene, depth=None).digest() == loads(text, folder).digest()
         assert loads(dump(scene)).digest() == scene.digest()
-    with pytest.raises(InputError, match=r"finger.depth: given -1; allowed: a depth in mm, larger than 0"):
+    with pytest.raises(ev.InputError, match=r"finger.depth: given -1; allowed: a depth in mm, larger than 0"):
         loads(SHORT + DEEP.replace("10", "-1"))
 
 
@@ -190,19 +187,19 @@ def test_insulators_have_names(name, layer):
     own = "insulator_thickness = 0.09\ninsulator_eps_r = 3.35\n"
     assert own in DISPLAY
     scene = loads(DISPLAY.replace(own, f'insulator = "{name}"\n'))
-    assert scene.surface.insulator == Layer(*layer)
+    assert scene.surface.insulator == ev.Layer(*layer)
     assert loads(dump(scene)).digest() == scene.digest()
     with pytest.raises(
-        InputError, match=f"electrostatics.insulator_eps_r: given 3 beside insulator = {name}"
+        ev.InputError, match=f"electrostatics.insulator_eps_r: given 3 beside insulator = {name}"
     ):
         loads(DISPLAY.replace(own, f'insulator = "{name}"\ninsulator_eps_r = 3.0\n'))
     with pytest.raises(
-        InputError, match=r'electrostatics.insulator: given "glass"; allowed: film \| touchscreen'
+        ev.InputError, match=r'electrostatics.insulator: given "glass"; allowed: film \| touchscreen'
     ):
         loads(DISPLAY.replace(own, 'insulator = "glass"\n'))
 
 
-@form
+@ev.form
 def spring(u, v, w):
     return u * v
 
@@ -220,20 +217,20 @@ class Own:
 
 
 def test_what_a_file_cannot_hold_is_refused(folder):
-    scene = default_scene()
+    scene = ev.default_scene()
     mesh = square_mesh()
-    law = NeoHookean(E=1.0, nu=0.3)
+    law = ev.NeoHookean(E=1.0, nu=0.3)
     laws = {"soft": law, "hard": law}
     cannot = {
-        "forms": scene.with_term(spring, on=Boundary("nail")),
-        "electrostatics.law": Scene(scene.finger, scene.surface, Own(), 1.0, scene.motion),
-        "finger.mesh": Scene(MeshedFinger(mesh, laws), Flat(), motion=scene.motion),
-        "finger.materials.hard": Scene(
-            MeshedFinger(folder / "pad.vtu", laws | {"hard": Own()}), Flat(), motion=scene.motion
+        "forms": scene.with_term(spring, on=ev.Boundary("nail")),
+        "electrostatics.law": ev.Scene(scene.finger, scene.surface, Own(), 1.0, scene.motion),
+        "finger.mesh": ev.Scene(ev.MeshedFinger(mesh, laws), ev.Flat(), motion=scene.motion),
+        "finger.materials.hard": ev.Scene(
+            ev.MeshedFinger(folder / "pad.vtu", laws | {"hard": Own()}), ev.Flat(), motion=scene.motion
         ),
     }
     for key, wrong in cannot.items():
-        with pytest.raises(InputError) as caught:
+        with pytest.raises(ev.InputError) as caught:
             dump(wrong)
         assert caught.value.key == key
 
@@ -330,7 +327,7 @@ WRONG = [
 @pytest.mark.parametrize(("text", "old", "new", "key", "words"), WRONG)
 def test_each_mistake_gets_one_sentence_with_its_key(text, old, new, key, words, folder):
     assert old in text
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(ev.InputError) as caught:
         loads(text.replace(old, old + new if new.startswith("\n") else new, 1), folder)
     sentence = str(caught.value)
     assert words in sentence
@@ -349,7 +346,7 @@ def test_mistakes_in_different_places_are_reported_at_once(folder):
     text = text.replace("width = 16.68", "width = 500\nwidht = 3\nparticipant = 'xx'").replace(
         "height = 12.79", "height = '12'", 1
     )
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(ev.InputError) as caught:
         loads(text, folder)
     keys = [mistake.key for mistake in caught.value.mistakes]
     assert keys == [
@@ -366,13 +363,13 @@ def test_mistakes_in_different_places_are_reported_at_once(folder):
 
 
 def test_what_an_unknown_key_may_stand_for_is_not_said_to_be_missing(folder):
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(ev.InputError) as caught:
         loads(DISPLAY.replace("law =", "lwa ="), folder)
     assert [mistake.key for mistake in caught.value.mistakes] == ["electrostatics.lwa"]
 
 
 def test_a_key_of_another_motion_is_not_told_that_it_stands_in_motion():
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(ev.InputError) as caught:
         loads(SHORT + "distance = 1.0\n")
     assert caught.value.key == "motion[0].distance"
     assert "stands in" not in str(caught.value)

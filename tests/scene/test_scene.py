@@ -7,31 +7,23 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
+import evfem as ev
 from evfem.common.digest import digest
-from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
-from evfem.electrostatics.signals import VoltageProfile
-from evfem.errors import InputError
-from evfem.finger.fingerpad import FingerPad
-from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import Output, Scene, Solver, default_scene
-from evfem.scene.terms import Boundary, Region
-from evfem.surface.surfaces import Display, Flat
-from evfem.tissue.forms import form
 
-FINGER = FingerPad()
-PRESS = Press(force=0.05)
-PROFILE = VoltageProfile([0.0, 1.0], [0.0, 100.0])
+FINGER = ev.FingerPad()
+PRESS = ev.Press(force=0.05)
+PROFILE = ev.VoltageProfile([0.0, 1.0], [0.0, 100.0])
 
 
 def plain(**changes):
     """A scene without voltage."""
-    return Scene(FINGER, **({"surface": Flat(), "motion": [PRESS]} | changes))
+    return ev.Scene(FINGER, **({"surface": ev.Flat(), "motion": [PRESS]} | changes))
 
 
 def charged(**changes):
     """A scene with a law and a voltage."""
-    parts = {"surface": Display(), "law": Kaczmarek(), "voltage": 1000.0, "motion": [PRESS]}
-    return Scene(FINGER, **(parts | changes))
+    parts = {"surface": ev.Display(), "law": ev.Kaczmarek(), "voltage": 1000.0, "motion": [PRESS]}
+    return ev.Scene(FINGER, **(parts | changes))
 
 
 class Bent:
@@ -41,13 +33,13 @@ class Bent:
         return 1e-12 * voltage**2 / (gap + layers.reduced)
 
 
-@form
+@ev.form
 def spring(u, v, w):
     return 2.0e-2 * u * v
 
 
 def test_scenes_and_their_parts_are_frozen():
-    for part in (plain(), PRESS, Slide(1.0), Solver(), Output(), Hover(1.0), VoltageRamp(1.0)):
+    for part in (plain(), PRESS, ev.Slide(1.0), ev.Solver(), ev.Output(), ev.Hover(1.0), ev.VoltageRamp(1.0)):
         with pytest.raises(FrozenInstanceError):
             part.steps = 3
 
@@ -56,32 +48,32 @@ def test_motion_may_be_one_motion_or_any_iterable():
     assert plain(motion=PRESS).motion == plain(motion=iter([PRESS])).motion == (PRESS,)
 
 
-INERTIAL = Solver(dynamics="inertial")
-PENALTY = Solver(contact="penalty", penalty_normal=10.0)
+INERTIAL = ev.Solver(dynamics="inertial")
+PENALTY = ev.Solver(contact="penalty", penalty_normal=10.0)
 WRONG_SCENES = [
-    (lambda: Scene(None, Flat(), motion=[PRESS]), "finger"),
-    (lambda: plain(surface=Kaczmarek()), "surface"),
+    (lambda: ev.Scene(None, ev.Flat(), motion=[PRESS]), "finger"),
+    (lambda: plain(surface=ev.Kaczmarek()), "surface"),
     (lambda: plain(motion=[3]), "motion[0]"),
     (lambda: plain(motion=[PRESS, "slide"]), "motion[1]"),
     (lambda: plain(voltage=100.0), "electrostatics.law"),
     (lambda: plain(voltage=PROFILE), "electrostatics.law"),
-    (lambda: plain(law=Kaczmarek()), "surface.insulator"),
-    (lambda: plain(motion=[PRESS, VoltageRamp(10.0)]), "motion[1]"),
-    (lambda: plain(motion=[Press(force=0.0)]), "motion[0].force"),
-    (lambda: charged(law=Kaczmarek), "electrostatics.law"),
+    (lambda: plain(law=ev.Kaczmarek()), "surface.insulator"),
+    (lambda: plain(motion=[PRESS, ev.VoltageRamp(10.0)]), "motion[1]"),
+    (lambda: plain(motion=[ev.Press(force=0.0)]), "motion[0].force"),
+    (lambda: charged(law=ev.Kaczmarek), "electrostatics.law"),
     (lambda: charged(law="kaczmarek"), "electrostatics.law"),
     (lambda: charged(voltage=float("nan")), "electrostatics.voltage"),
-    (lambda: charged(voltage=PROFILE, motion=[PRESS, VoltageRamp(10.0)]), "motion[1]"),
+    (lambda: charged(voltage=PROFILE, motion=[PRESS, ev.VoltageRamp(10.0)]), "motion[1]"),
     (lambda: charged(direction="up"), "electrostatics.direction"),
     (lambda: charged(coupling="weak"), "electrostatics.coupling"),
     (lambda: charged(air_layer=1), "electrostatics.air_layer"),
-    (lambda: plain(motion=[Slide(1.0, hold="force")]), "motion[0].hold"),
-    (lambda: charged(motion=[VoltageRamp(1.0, hold="force")]), "motion[0].hold"),
-    (lambda: plain(motion=[PRESS, Hover(1.0), Slide(1.0, hold="force")]), "motion[2].hold"),
-    (lambda: plain(solver=INERTIAL, motion=[PRESS, Slide(1.0)]), "motion[1].speed"),
-    (lambda: plain(solver=Solver(dynamics="viscous")), "finger.viscosity"),
+    (lambda: plain(motion=[ev.Slide(1.0, hold="force")]), "motion[0].hold"),
+    (lambda: charged(motion=[ev.VoltageRamp(1.0, hold="force")]), "motion[0].hold"),
+    (lambda: plain(motion=[PRESS, ev.Hover(1.0), ev.Slide(1.0, hold="force")]), "motion[2].hold"),
+    (lambda: plain(solver=INERTIAL, motion=[PRESS, ev.Slide(1.0)]), "motion[1].speed"),
+    (lambda: plain(solver=ev.Solver(dynamics="viscous")), "finger.viscosity"),
     (lambda: plain(solver=PENALTY), "solver.penalty_tangential"),
-    (lambda: Solver(penalty_normal=10.0), "penalty_normal"),
+    (lambda: ev.Solver(penalty_normal=10.0), "penalty_normal"),
     (lambda: plain(solver={"element": "q1"}), "solver"),
     (lambda: plain(output=3), "output"),
     (lambda: plain(name="a/b"), "name"),
@@ -91,37 +83,37 @@ WRONG_SCENES = [
 
 @pytest.mark.parametrize(("make", "key"), WRONG_SCENES)
 def test_scenes_refuse_what_does_not_fit_together(make, key):
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(ev.InputError) as caught:
         make()
     assert caught.value.key == key
 
 
 def test_elements_follow_the_cells_of_the_mesh():
-    assert Solver().element_on(4) == "q2p1"
-    assert Solver().element_on(3) == Solver(element="p2").element_on(3) == "p2"
-    assert [Solver(element=e).element_on(4) for e in ("q1", "q1_fbar", "q2", "q2p1")] == [
+    assert ev.Solver().element_on(4) == "q2p1"
+    assert ev.Solver().element_on(3) == ev.Solver(element="p2").element_on(3) == "p2"
+    assert [ev.Solver(element=e).element_on(4) for e in ("q1", "q1_fbar", "q2", "q2p1")] == [
         "q1",
         "q1_fbar",
         "q2",
         "q2p1",
     ]
     for element, corners in (("p2", 4), ("q1", 3), ("q2p1", 3)):
-        with pytest.raises(InputError, match=r"solver\.element"):
-            Solver(element=element).element_on(corners)
+        with pytest.raises(ev.InputError, match=r"solver\.element"):
+            ev.Solver(element=element).element_on(corners)
 
 
 def test_a_term_is_added_to_a_copy():
     scene = plain()
-    more = scene.with_term(spring, on=Boundary("nail")).with_term(spring, on=Region("dermis"))
+    more = scene.with_term(spring, on=ev.Boundary("nail")).with_term(spring, on=ev.Region("dermis"))
     assert scene.forms == ()
     assert [(term.form.name, term.on) for term in more.forms] == [
-        ("spring", Boundary("nail")),
-        ("spring", Region("dermis")),
+        ("spring", ev.Boundary("nail")),
+        ("spring", ev.Region("dermis")),
     ]
     assert spring(2.0, 3.0, None) == pytest.approx(0.12)
-    with pytest.raises(InputError, match=r"@evfem\.form"):
-        scene.with_term(lambda u, v, w: u, on=Boundary("nail"))
-    with pytest.raises(InputError, match="Boundary"):
+    with pytest.raises(ev.InputError, match=r"@evfem\.form"):
+        scene.with_term(lambda u, v, w: u, on=ev.Boundary("nail"))
+    with pytest.raises(ev.InputError, match="Boundary"):
         scene.with_term(spring, on="nail")
 
 
@@ -129,21 +121,21 @@ def test_the_fingerprint_follows_the_content_and_not_the_name():
     assert plain().digest() == plain(name="other").digest() == plain(motion=(PRESS,)).digest()
     scenes = [
         plain(),
-        plain(motion=[Press(force=0.06)]),
-        plain(motion=[Press(force=0.05, steps=11)]),
+        plain(motion=[ev.Press(force=0.06)]),
+        plain(motion=[ev.Press(force=0.05, steps=11)]),
         plain(motion=[PRESS, PRESS]),
-        plain(surface=Flat(friction=0.2)),
-        plain(surface=Flat(friction=[[0.0, 0.3], [1.0, 0.2]])),
-        plain(solver=Solver(tolerance=1e-9)),
-        plain(output=Output(every=2)),
-        plain().with_term(spring, on=Boundary("nail")),
-        plain().with_term(spring, on=Boundary("bone")),
+        plain(surface=ev.Flat(friction=0.2)),
+        plain(surface=ev.Flat(friction=[[0.0, 0.3], [1.0, 0.2]])),
+        plain(solver=ev.Solver(tolerance=1e-9)),
+        plain(output=ev.Output(every=2)),
+        plain().with_term(spring, on=ev.Boundary("nail")),
+        plain().with_term(spring, on=ev.Boundary("bone")),
         charged(),
-        charged(law=StrongTroxel()),
+        charged(law=ev.StrongTroxel()),
         charged(law=Bent()),
         charged(voltage=PROFILE),
-        charged(voltage=VoltageProfile([0.0, 1.0], [0.0, 101.0])),
-        Scene(FingerPad(width=16.0), Flat(), motion=[PRESS]),
+        charged(voltage=ev.VoltageProfile([0.0, 1.0], [0.0, 101.0])),
+        ev.Scene(ev.FingerPad(width=16.0), ev.Flat(), motion=[PRESS]),
     ]
     assert len({scene.digest() for scene in scenes}) == len(scenes)
 
@@ -176,7 +168,7 @@ def test_the_fingerprint_is_the_same_in_another_process():
         )
         for s in "12"
     ]
-    assert {done.stdout.strip() for done in seeds} == {default_scene().digest()}
+    assert {done.stdout.strip() for done in seeds} == {ev.default_scene().digest()}
 
 
 def test_the_fingerprint_of_a_path_is_that_of_the_file(tmp_path):

@@ -7,19 +7,12 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
+import evfem as ev
 from evfem.contact.stability import SLOPES, StabilityRatio
-from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
-from evfem.errors import NotConverged
 from evfem.newton.control import Target
 from evfem.newton.state import Folded, LiftedOff, StepFailed
-from evfem.newton.strategy import Strategy
-from evfem.planning.plan import plan
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene, Solver
 from evfem.simulation.doubtful import advice
-from evfem.simulation.run import Run, simulate
-from evfem.surface.friction import RateFriction
-from evfem.surface.surfaces import Flat
+from evfem.simulation.run import Run
 
 
 def said(
@@ -27,9 +20,9 @@ def said(
 ):
     """What is said of a step from a pressed finger whose loss is at `share`."""
     body = finger(block(4, 2), viscosity=1e-3)
-    motion = [Press(indentation=0.1, steps=1), Slide(0.1, steps=1, speed=1.0)]
-    surface = Flat(friction=0.3, insulator=Layer(0.05, 3.0))
-    going = Run(Scene(body, surface, motion=motion, solver=Solver(**solver), **(electric or {})), None)
+    motion = [ev.Press(indentation=0.1, steps=1), ev.Slide(0.1, steps=1, speed=1.0)]
+    surface = ev.Flat(friction=0.3, insulator=ev.Layer(0.05, 3.0))
+    going = Run(ev.Scene(body, surface, motion=motion, solver=ev.Solver(**solver), **(electric or {})), None)
     going.advance(next(going.requests()))
     failed = failure("nodes keep changing", [1.0])
     failed.findings, failed.released, failed.unstable = "out of balance: 1 N/mm", released, unstable
@@ -47,7 +40,7 @@ def test_the_sentence_names_the_force_its_amount_and_the_place():
     assert "dynamics = viscous" in way_out
     assert "relaxation" not in way_out
     assert said(released=True)[0].endswith("released there it does not come to rest")
-    off = Strategy(relaxation=False)
+    off = ev.Strategy(relaxation=False)
     assert "relaxation of the strategy switched on" in said(strategy=off)[-1]
 
 
@@ -56,22 +49,22 @@ class NoPotential:
 
     @staticmethod
     def traction(gap, voltage, layers):
-        return Kaczmarek().traction(gap, voltage, layers)
+        return ev.Kaczmarek().traction(gap, voltage, layers)
 
 
 @pytest.mark.parametrize(
     ("released", "law", "options", "advised"),
     [
-        (True, Kaczmarek(), {}, True),
-        (False, Kaczmarek(), {}, False),
-        (True, Kaczmarek(), {"direction": "normal"}, False),
+        (True, ev.Kaczmarek(), {}, True),
+        (False, ev.Kaczmarek(), {}, False),
+        (True, ev.Kaczmarek(), {"direction": "normal"}, False),
         (True, NoPotential(), {}, False),
-        (True, StrongTroxel(), {"field": "full"}, False),
+        (True, ev.StrongTroxel(), {"field": "full"}, False),
     ],
 )
 def test_an_attraction_with_an_energy_is_advised_where_it_may_be_had(released, law, options, advised):
-    surface = Flat(insulator=Layer(0.05, 3.0))
-    scene = Scene(coarse_pad(), surface, law, 100.0, Press(indentation=0.5, steps=1), **options)
+    surface = ev.Flat(insulator=ev.Layer(0.05, 3.0))
+    scene = ev.Scene(coarse_pad(), surface, law, 100.0, ev.Press(indentation=0.5, steps=1), **options)
     failed = StepFailed("nodes keep changing", [1.0])
     failed.released = released
     assert ("direction = normal" in advice(scene, None, failed)) == advised
@@ -100,22 +93,24 @@ def test_a_fold_is_told_as_it_is():
     found = said(failure=Folded)
     assert found[0] == "nodes keep changing"
     assert found[-1] == "try smaller steps, less friction or a finer mesh"
-    electric = {"law": Kaczmarek(), "voltage": 100.0}
+    electric = {"law": ev.Kaczmarek(), "voltage": 100.0}
     assert "less voltage, a thicker insulator" in said(failure=Folded, electric=electric)[-1]
 
 
 def test_where_friction_falls_with_the_speed_only_mass_helps():
     """Stribeck's law falls from mu to half of it; one that rises does not, and with mass it is followed."""
-    motion = [Press(indentation=0.1, steps=1), Slide(0.1, steps=1, speed=1.0)]
+    motion = [ev.Press(indentation=0.1, steps=1), ev.Slide(0.1, steps=1, speed=1.0)]
 
     def told(law, **solver):
         body = finger(block(4, 2), viscosity=1e-3)
-        scene = Scene(body, Flat(friction=0.3), motion=motion, friction_law=law, solver=Solver(**solver))
+        scene = ev.Scene(
+            body, ev.Flat(friction=0.3), motion=motion, friction_law=law, solver=ev.Solver(**solver)
+        )
         told = advice(scene, None, StepFailed("nodes keep changing", [1.0]))
-        known = next(term.reason for term in plan(scene).terms if term.name == "friction")
+        known = next(term.reason for term in ev.plan(scene).terms if term.name == "friction")
         return "try dynamics = inertial" in told, "dynamics = inertial follows it" in known
 
-    falling, rising = RateFriction(speed=5.0, ratio=0.5), RateFriction(speed=5.0, exponent=0.5)
+    falling, rising = ev.RateFriction(speed=5.0, ratio=0.5), ev.RateFriction(speed=5.0, exponent=0.5)
     assert told(falling, dynamics="viscous") == (True, True)
     assert told(falling) == (True, True)
     assert told(falling, dynamics="inertial") == told(rising, dynamics="viscous") == (False, False)
@@ -128,9 +123,11 @@ def test_a_finger_that_was_pulled_off_is_told_as_it_is_and_from_where():
 
 
 def test_a_plain_failure_keeps_its_reason():
-    hopeless = Solver(strategy=Strategy(iterations=2, smallest_part=1.0))
+    hopeless = ev.Solver(strategy=ev.Strategy(iterations=2, smallest_part=1.0))
     with pytest.raises(
-        NotConverged, match=r"no equilibrium in 2 iterations; out of balance.*try smaller steps"
+        ev.NotConverged, match=r"no equilibrium in 2 iterations; out of balance.*try smaller steps"
     ) as caught:
-        simulate(Scene(coarse_pad(), Flat(), motion=Press(indentation=0.5, steps=1), solver=hopeless))
+        ev.simulate(
+            ev.Scene(coarse_pad(), ev.Flat(), motion=ev.Press(indentation=0.5, steps=1), solver=hopeless)
+        )
     assert "".join(traceback.format_exception(caught.value)).count("Traceback") == 1

@@ -12,28 +12,22 @@ from tools.builders import INSULATOR, SKIN
 from tools.grids import fine_points
 from tools.meshes import block
 
-from evfem.electrostatics.laws import Kaczmarek
-from evfem.finger.fingerpad import MeshedFinger
-from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import Scene, Solver
+import evfem as ev
 from evfem.simulation.model import make_model
-from evfem.simulation.run import simulate
-from evfem.surface.surfaces import Sinusoid
-from evfem.tissue.laws import NeoHookean
 
-LAW = NeoHookean(E=0.1, nu=0.4, density=1e-6)
+LAW = ev.NeoHookean(E=0.1, nu=0.4, density=1e-6)
 MU, LAMBDA = 0.1 / 2.8, 0.1 * 0.4 / (1.4 * 0.2)
 TAU, V, G0 = 2e-3, 2000.0, 0.03
-WAVES = Sinusoid(friction=0.3, terms=[[0.04, 5.0, 0.3]], insulator=INSULATOR)
+WAVES = ev.Sinusoid(friction=0.3, terms=[[0.04, 5.0, 0.3]], insulator=INSULATOR)
 #: hills that touch one by one, tissue with viscosity and mass, a voltage that changes in contact
 MOTION = (
-    Hover(0.025),
-    Press(indentation=0.08, steps=4),
-    VoltageRamp(0.5 * V, steps=2),
-    Slide(0.4, steps=10, speed=20.0),
-    Press(indentation=0.03, steps=2),
+    ev.Hover(0.025),
+    ev.Press(indentation=0.08, steps=4),
+    ev.VoltageRamp(0.5 * V, steps=2),
+    ev.Slide(0.4, steps=10, speed=20.0),
+    ev.Press(indentation=0.03, steps=2),
 )
-FINGER = MeshedFinger(block(20, 2, sag=0.05), {"tissue": LAW}, SKIN, TAU)
+FINGER = ev.MeshedFinger(block(20, 2, sag=0.05), {"tissue": LAW}, SKIN, TAU)
 
 
 @cache
@@ -41,15 +35,15 @@ def run():
     """The result, the model, and the state before the first and after every step; no step in parts."""
     lowest = np.min(_outline()[:, 1] - WAVES.height(_outline()[:, 0]))
     surface = WAVES.shifted(lowest - G0)
-    solver = Solver(element="q2", dynamics="inertial")
-    scene = Scene(FINGER, surface, Kaczmarek(), V, MOTION, direction="normal", solver=solver)
+    solver = ev.Solver(element="q2", dynamics="inertial")
+    scene = ev.Scene(FINGER, surface, ev.Kaczmarek(), V, MOTION, direction="normal", solver=solver)
     states = []
 
     class Observer:
         def step(self, row, frame, checkpoint):
             states.append(SimpleNamespace(**{k: np.copy(a) for k, a in checkpoint().items()}))
 
-    result = simulate(scene, observers=[Observer()])
+    result = ev.simulate(scene, observers=[Observer()])
     assert (result.substeps == 1).all()
     return result, make_model(scene), [_start(make_model(scene)), *states]
 

@@ -10,11 +10,7 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.electrostatics.laws import Kaczmarek
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene, Solver
-from evfem.simulation.run import simulate
-from evfem.surface.surfaces import Display
+import evfem as ev
 
 HERE = Path(__file__).parent
 NAMES = (
@@ -39,10 +35,10 @@ print(json.dumps(test_backends.numbers(sys.argv[2])))
 
 def numbers(element):
     """Columns of a press and a slide under a voltage, and which solver found them."""
-    motion = [Press(indentation=0.2, steps=3), Press(force=0.03, steps=2), Slide(0.4, steps=4)]
-    body, solver = finger(block(8, 3, sag=0.4)), Solver(element=element, tolerance=1e-11)
-    scene = Scene(body, Display(), Kaczmarek(), 2000.0, motion, solver=solver)
-    result = simulate(scene)
+    motion = [ev.Press(indentation=0.2, steps=3), ev.Press(force=0.03, steps=2), ev.Slide(0.4, steps=4)]
+    body, solver = finger(block(8, 3, sag=0.4)), ev.Solver(element=element, tolerance=1e-11)
+    scene = ev.Scene(body, ev.Display(), ev.Kaczmarek(), 2000.0, motion, solver=solver)
+    result = ev.simulate(scene)
     found = {name: getattr(result, name).tolist() for name in NAMES}
     return found | {"solver": result.provenance["solver"]}
 

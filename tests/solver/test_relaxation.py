@@ -13,21 +13,12 @@ from scipy.optimize import brentq
 from tools.builders import SKIN, finger, left_over
 from tools.meshes import between, block, held
 
+import evfem as ev
 from evfem.common.constants import RELEASED
-from evfem.electrostatics.laws import Kaczmarek, Layer
-from evfem.electrostatics.timesignals import Sampled
-from evfem.errors import NotConverged
-from evfem.finger.fingerpad import MeshedFinger
 from evfem.newton.control import Target
-from evfem.newton.hand import Hand
 from evfem.newton.state import StepFailed
-from evfem.scene.motion import Press, Slide, VoltageRamp, Wait
-from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.model import make_model
-from evfem.simulation.run import simulate
 from evfem.solver.relaxation import Relaxation
-from evfem.surface.surfaces import Display, Sinusoid
-from evfem.tissue.laws import LinearElastic
 
 HEIGHT, LENGTH, DEPTH = 0.007, 1.0, 0.2
 WAVE = 2.0 * np.pi / LENGTH
@@ -44,19 +35,21 @@ def wedge():
     """A column 0.4 mm wide and 2 mm high, tapered to a tip at the lower end."""
     x, t = np.meshgrid(np.linspace(-0.2, 0.2, 3), np.linspace(0.0, 1.0, 5))
     low = 1.5 * np.abs(x)
-    return MeshedFinger(held(between(x, low + t * (2.0 - low))), {"tissue": LinearElastic(0.1, 0.0)}, SKIN)
+    return ev.MeshedFinger(
+        held(between(x, low + t * (2.0 - low))), {"tissue": ev.LinearElastic(0.1, 0.0)}, SKIN
+    )
 
 
 def scene(*others, friction=0.0, **options):
     """The wedge pressed into a trough of the wave, and what follows."""
-    surface = Sinusoid(friction=friction, terms=[[HEIGHT, WAVE, TROUGH]], insulator=Layer(0.09, 3.35))
-    motion = [Press(indentation=DEPTH, steps=4), *others]
-    return Scene(wedge(), surface, motion=motion, output=Output(every=1000), **options)
+    surface = ev.Sinusoid(friction=friction, terms=[[HEIGHT, WAVE, TROUGH]], insulator=ev.Layer(0.09, 3.35))
+    motion = [ev.Press(indentation=DEPTH, steps=4), *others]
+    return ev.Scene(wedge(), surface, motion=motion, output=ev.Output(every=1000), **options)
 
 
 def on_a_crest(press):
     """The wedge pressed on the middle of a crest."""
-    return Scene(wedge(), Sinusoid(friction=0.0, terms=[[HEIGHT, WAVE, -TROUGH]]), motion=[press])
+    return ev.Scene(wedge(), ev.Sinusoid(friction=0.0, terms=[[HEIGHT, WAVE, -TROUGH]]), motion=[press])
 
 
 def springs():
@@ -117,14 +110,14 @@ def point():
 def over(point, **options):
     """A slide up to just before the loss, and one step across."""
     lost = point.bone(point.snap())
-    return scene(Slide(lost - AHEAD, steps=10), Slide(2.0 * AHEAD, steps=1), **options)
+    return scene(ev.Slide(lost - AHEAD, steps=10), ev.Slide(2.0 * AHEAD, steps=1), **options)
 
 
 def test_a_released_tip_comes_to_rest_in_the_next_trough(point):
     """Before and after the snap the tip pushes with the force of the point on springs, and what is
     set free is the difference of its energies where the bone has gone furthest.
     """
-    result = simulate(over(point))
+    result = ev.simulate(over(point))
     assert result.relaxations.tolist() == [0] * 14 + [1]
     lost = point.bone(point.snap())
     bones = np.array([lost - AHEAD, lost + AHEAD])
@@ -146,7 +139,7 @@ def test_a_tip_on_a_crest_comes_to_rest_beside_it(point):
     """Pressed on the middle of a crest, the tip has an equilibrium there, which it leaves once the force
     turns with the crest faster than the springs hold it: in each row it is beside the crest already.
     """
-    result = simulate(on_a_crest(Press(indentation=DEPTH, steps=4)))
+    result = ev.simulate(on_a_crest(ev.Press(indentation=DEPTH, steps=4)))
     for row, depth in enumerate(result.indentation):
         x, lifted = point.beside(depth)
         assert abs(result.tangential_force[row]) == pytest.approx(point.kx * x, rel=1e-5)
@@ -158,7 +151,7 @@ def test_a_tip_on_a_crest_comes_to_rest_beside_it(point):
 
 def test_stability_is_that_of_the_body_with_its_present_drag():
     """On the middle of the crest the tip is held by some drag, and not without."""
-    model = make_model(on_a_crest(Press(indentation=DEPTH)))
+    model = make_model(on_a_crest(ev.Press(indentation=DEPTH)))
     solver, rest = model.equilibrium, model.equilibrium.rest(model.bone(0.0, 0.0), 0.0)
     target = Target.held(model.bone(0.0, 0.3 * DEPTH), 0.0)
     for rate, unstable in ((1.0, False), (0.0, True), (1.0, False)):
@@ -174,9 +167,9 @@ def test_a_prescribed_load_is_kept(point):
     """The tip under a constant force N leaves the trough where the wave is steepest, N h' = kx (X - x)."""
     load = point.ky * DEPTH
     gone = 0.25 * LENGTH + load * HEIGHT * WAVE / point.kx
-    motion = [Press(force=load, steps=4), Slide(gone - AHEAD, steps=10, hold="force")]
-    motion.append(Slide(3.0 * AHEAD, steps=1, hold="force"))
-    result = simulate(replace(scene(), motion=motion))
+    motion = [ev.Press(force=load, steps=4), ev.Slide(gone - AHEAD, steps=10, hold="force")]
+    motion.append(ev.Slide(3.0 * AHEAD, steps=1, hold="force"))
+    result = ev.simulate(replace(scene(), motion=motion))
     assert result.relaxations.sum() == 1
     np.testing.assert_allclose(result.applied_force[4:], load, rtol=1e-7)
     assert left_over(result) < 1e-6
@@ -184,21 +177,23 @@ def test_a_prescribed_load_is_kept(point):
 
 def test_a_finger_pulled_harder_than_the_attraction_holds_lifts_off():
     """A block whose ends the attraction pulls down keeps that pull while the voltage falls."""
-    motion = [Press(indentation=1e-4, steps=1), VoltageRamp(voltage=0.0, steps=1, hold="force")]
-    held_by_voltage = Scene(finger(block(8, 2, sag=0.01), E=0.02), Display(), Kaczmarek(), 1500.0, motion)
-    with pytest.raises(NotConverged, match=r"near here: the finger is pulled with 0\.0002") as lost:
-        simulate(held_by_voltage)
+    motion = [ev.Press(indentation=1e-4, steps=1), ev.VoltageRamp(voltage=0.0, steps=1, hold="force")]
+    held_by_voltage = ev.Scene(
+        finger(block(8, 2, sag=0.01), E=0.02), ev.Display(), ev.Kaczmarek(), 1500.0, motion
+    )
+    with pytest.raises(ev.NotConverged, match=r"near here: the finger is pulled with 0\.0002") as lost:
+        ev.simulate(held_by_voltage)
     assert lost.value.step == 2
     assert "it was lost at position 0 mm" in str(lost.value)
 
 
 def test_a_viscous_finger_without_mass_is_pulled_off_at_once():
     """In the air nothing limits how fast it leaves, so no time step is short enough."""
-    motion = [Press(indentation=1e-4, steps=1), Wait(duration=0.1, steps=10, hold="force")]
-    pad, falling = finger(block(8, 2, sag=0.01), E=0.02, viscosity=1e-3), Sampled([1500.0, 0.0], rate=10.0)
-    viscous = Solver(dynamics="viscous")
-    with pytest.raises(NotConverged, match=r"lifts off, where the attraction .* try more voltage") as lost:
-        simulate(Scene(pad, Display(), Kaczmarek(), falling, motion, solver=viscous))
+    motion = [ev.Press(indentation=1e-4, steps=1), ev.Wait(duration=0.1, steps=10, hold="force")]
+    pad, falling = finger(block(8, 2, sag=0.01), E=0.02, viscosity=1e-3), ev.Sampled([1500.0, 0.0], rate=10.0)
+    viscous = ev.Solver(dynamics="viscous")
+    with pytest.raises(ev.NotConverged, match=r"lifts off, where the attraction .* try more voltage") as lost:
+        ev.simulate(ev.Scene(pad, ev.Display(), ev.Kaczmarek(), falling, motion, solver=viscous))
     assert lost.value.step > 1
 
 
@@ -243,7 +238,7 @@ def test_a_body_that_rests_with_the_least_drag_but_never_without_is_given_up():
 
 def test_friction_on_the_way_is_counted(point):
     """Each column from its definition, and the books closed; what slips dissipates."""
-    result = simulate(scene(Slide(2.5, steps=25), friction=0.05))
+    result = ev.simulate(scene(ev.Slide(2.5, steps=25), friction=0.05))
     assert result.relaxations.any()
     assert left_over(result) < 1e-6
     for name in ("friction_dissipation", "snap_dissipation"):
@@ -262,9 +257,9 @@ def test_tissue_without_time_snaps_below_a_heavy_hand_that_stays_where_it_is(poi
     sets free; the bone goes on.
     """
     lost, speed = point.bone(point.snap()), 10.0
-    hand = Hand(stiffness=50.0, damping=0.02, mass=1e-5)
-    slides = [Slide(lost - AHEAD, steps=10, speed=speed), Slide(2.0 * AHEAD, steps=1, speed=speed)]
-    result = simulate(scene(*slides, hand=hand))
+    hand = ev.Hand(stiffness=50.0, damping=0.02, mass=1e-5)
+    slides = [ev.Slide(lost - AHEAD, steps=10, speed=speed), ev.Slide(2.0 * AHEAD, steps=1, speed=speed)]
+    result = ev.simulate(scene(*slides, hand=hand))
     assert result.relaxations.tolist() == [0] * 14 + [1]
     bones = result.position[[13, 14]]
     tips = np.array([point.before(bones[0]), point.beyond(bones[1])])

@@ -6,26 +6,21 @@ from evfem.studies.stability.scenes import INSULATOR, SKIN, finger
 from evfem.studies.stability.scenes import benchmark as benchmark_finger
 from evfem.studies.stability.scenes import pad as coarse_pad
 
-from evfem.electrostatics.laws import Kaczmarek
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
-from evfem.simulation.checkpoint import Checkpoint
+import evfem as ev
 from evfem.simulation.result import Saved
-from evfem.simulation.run import simulate
-from evfem.surface.surfaces import Display
 
 __all__ = ("INSULATOR", "SKIN", "balance", "benchmark_finger", "coarse_pad", "finger")
 
 
 def benchmark_scene(kind, level, element=None, steps=15):
     """Scene A, B or C of the benchmark: press to 1.5 mm; friction 0.3 and a slide of 3 mm; 1000 V."""
-    motion = [Press(indentation=1.5, steps=steps)]
+    motion = [ev.Press(indentation=1.5, steps=steps)]
     if kind == "B":
-        motion.append(Slide(distance=3.0, steps=2 * steps))
-    surface = Display(friction=0.3 if kind == "B" else 0.0, y=-6.395, insulator=INSULATOR)
-    law, voltage = (Kaczmarek(), 1000.0) if kind == "C" else (None, 0.0)
-    solver, output = Solver(element=element), Output(every=1000)
-    return Scene(benchmark_finger(level), surface, law, voltage, motion, solver=solver, output=output)
+        motion.append(ev.Slide(distance=3.0, steps=2 * steps))
+    surface = ev.Display(friction=0.3 if kind == "B" else 0.0, y=-6.395, insulator=INSULATOR)
+    law, voltage = (ev.Kaczmarek(), 1000.0) if kind == "C" else (None, 0.0)
+    solver, output = ev.Solver(element=element), ev.Output(every=1000)
+    return ev.Scene(benchmark_finger(level), surface, law, voltage, motion, solver=solver, output=output)
 
 
 def left_over(result):
@@ -47,13 +42,13 @@ def resumed(scene, after, folder=None):
         def step(self, row, frame, checkpoint):
             kept.append(checkpoint())
 
-    whole = simulate(scene, observers=[Keeper()])
+    whole = ev.simulate(scene, observers=[Keeper()])
     saved = Saved(kept[after - 1], whole.rows[:after])
     if folder is not None:
-        file = Checkpoint(folder / "checkpoint.npz")
+        file = ev.Checkpoint(folder / "checkpoint.npz")
         file.write(scene.digest(), saved.arrays, saved.rows)
         saved = file.read(scene.digest())
-    return whole, simulate(scene, resume=saved)
+    return whole, ev.simulate(scene, resume=saved)
 
 
 def pad_state(result, k=-1):

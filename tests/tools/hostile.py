@@ -10,13 +10,10 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 
+import evfem as ev
 from evfem.common.storage import save_arrays
-from evfem.electrostatics.signalfile import Playback, write_signal
-from evfem.electrostatics.signals import VoltageProfile
-from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.scene.file import load
-from evfem.simulation.run import simulate
 from tools.commands import called
 from tools.kills import head
 from tools.meshes import block
@@ -90,12 +87,12 @@ def _whole():
         (folder / "text.vtu").write_text(text)
         (folder / "scan.csv").write_text(SCAN)
         (folder / "signal.csv").write_text(SIGNAL)
-        profile = VoltageProfile([0.0, 0.5, 1.0], [0.0, 100.0, 50.0])
-        write_signal(folder / "signal.wav", profile, Playback(full_scale=100.0, speed=20.0, rate=400))
+        profile = ev.VoltageProfile([0.0, 0.5, 1.0], [0.0, 100.0, 50.0])
+        ev.write_signal(folder / "signal.wav", profile, ev.Playback(full_scale=100.0, speed=20.0, rate=400))
         for kind, text in SCENES.items():
             (folder / f"{kind}.toml").write_text(text)
         assert called(folder, "run", "checkpoint.toml", "--no-plots", "--no-fields")[0] == 0
-        simulate(load(folder / "checkpoint.toml")).save(folder / "run.npz")
+        ev.simulate(load(folder / "checkpoint.toml")).save(folder / "run.npz")
         return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
@@ -209,7 +206,7 @@ def _archive(path, rng):
         arrays = {name.replace("/", "_"): array for name, array in arrays.items()}
     try:
         save_arrays(path, arrays)
-    except InputError:  # objects: as numpy would write them
+    except ev.InputError:  # objects: as numpy would write them
         with path.open("wb") as file:
             rng.choice((np.savez, np.savez_compressed))(file, **arrays)
 
