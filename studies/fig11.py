@@ -286,14 +286,16 @@ def _over_paper(pad: str, found: Answer, loads: tuple[float, ...]) -> dict[str, 
     return {"over_paper_mean": mean, "over_paper_min": over.min(), "over_paper_max": over.max()}
 
 
+def _fit_numbers(key: str, found: Answer, loads: tuple[float, ...]) -> dict[str, float]:
+    share = _at(loads, 1.0 - found.contact / found.total)
+    return {f"{key}.alpha": found.fit.k, f"{key}.beta": -found.fit.m, f"{key}.air_share_at_0.05": share}
+
+
 def _numbers(answers: Mapping[str, Answer], loads: tuple[float, ...]) -> dict[str, float]:
     numbers: dict[str, float] = {}
     for pad, found in answers.items():
         fitted = found.fit.k * np.asarray(loads) ** found.fit.m
-        numbers |= {
-            f"{pad}.alpha": found.fit.k,
-            f"{pad}.beta": -found.fit.m,
-            f"{pad}.air_share_at_0.05": _at(loads, 1.0 - found.contact / found.total),
+        numbers |= _fit_numbers(pad, found, loads) | {
             f"{pad}.alpha_standard_error": found.fit.k_error,
             f"{pad}.beta_standard_error": found.fit.m_error,
             f"{pad}.largest_deviation_from_fit_percent": 100.0 * np.abs(found.ratio / fitted - 1.0).max(),
@@ -326,13 +328,8 @@ def _varied_numbers(
 ) -> dict[str, float]:
     numbers: dict[str, float] = {}
     for (name, pad), found in varied.items():
-        numbers |= {
-            f"sensitivity.{name}.{pad}.alpha": found.fit.k,
-            f"sensitivity.{name}.{pad}.beta": -found.fit.m,
-            f"sensitivity.{name}.{pad}.air_share_at_0.05": _at(loads, 1.0 - found.contact / found.total),
-        }
-        over = _over_paper(pad, found, loads)
-        numbers |= {f"sensitivity.{name}.{pad}.{key}": value for key, value in over.items()}
+        key, over = f"sensitivity.{name}.{pad}", _over_paper(pad, found, loads)
+        numbers |= _fit_numbers(key, found, loads) | {f"{key}.{what}": value for what, value in over.items()}
     for name in (name for name in ("mesh_coarse", "mesh_fine") if (name, "with_ridges") in varied):
         for pad, base in answers.items():
             other = varied[name, pad]

@@ -13,22 +13,11 @@ import numpy as np
 
 from evfem import data
 
+from . import rendered
 from .common import Series, Study, side_by_side
 from .plots import COLOURS, Axes, Figure, new_figure
 from .printed import Printed
-from .rendered import (
-    AFTER,
-    ASSUMPTIONS,
-    BEFORE,
-    QUICK_STEP,
-    QUICK_TEXTURE,
-    STEP,
-    TEXTURE,
-    Case,
-    Outcome,
-    display_encoding,
-    render,
-)
+from .rendered import Case, Outcome, display_encoding, render
 
 STEP_PLACE, WAVE_PLACE = "section 3.3.1", "section 3.3.2"
 OPEN = "load, speed, viscosity, steps and ridges of the paper's runs are not printed"
@@ -63,7 +52,7 @@ INSIGHTS = {
 }
 #: prefix of the keys -> what is simulated; the first pad is the paper's
 PADS = {"": True, "without_ridges.": False}
-SCENES = {"transition": STEP, "sinusoid": TEXTURE}
+SCENES = {"transition": rendered.STEP, "sinusoid": rendered.TEXTURE}
 
 
 def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
@@ -108,10 +97,10 @@ def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
 def _closed_numbers() -> dict[str, float]:
     """What (20a) says without a simulation: step with Table 2's skin, and the texture's own friction."""
     skin = float(data.load("table2").value("d_sc"))
-    step, texture = display_encoding(BEFORE, skin), display_encoding(PAPER["sinusoid.mu_min"].value)
+    step, texture = display_encoding(rendered.BEFORE, skin), display_encoding(PAPER["sinusoid.mu_min"].value)
     return {
-        "closed_form.voltage_V.dsc_0.38mm": float(step.voltage_for_friction(AFTER)),
-        "closed_form.voltage_V.texture": float(texture.voltage_for_friction(TEXTURE.friction)),
+        "closed_form.voltage_V.dsc_0.38mm": float(step.voltage_for_friction(rendered.AFTER)),
+        "closed_form.voltage_V.texture": float(texture.voltage_for_friction(rendered.TEXTURE.friction)),
     }
 
 
@@ -145,7 +134,7 @@ def _rise(outcome: Outcome, kind: str) -> float:
 
 def _cases(quick: bool) -> dict[str, Case]:
     """Key -> case, those that take longest first."""
-    scenes = {"transition": QUICK_STEP, "sinusoid": QUICK_TEXTURE} if quick else SCENES
+    scenes = {"transition": rendered.QUICK_STEP, "sinusoid": rendered.QUICK_TEXTURE} if quick else SCENES
     cases = {}
     for name in ("sinusoid", "transition"):
         for prefix, ridges in PADS.items():
@@ -165,7 +154,7 @@ def main(quick: bool = False) -> Study:
         numbers |= _main_numbers(key.removesuffix(name), name, outcome)
     costs, picture = {key: one.costs for key, one in outcomes.items()}, lambda: draw(outcomes, numbers)
     return Study(
-        "fig12", numbers, PAPER, ASSUMPTIONS | INSIGHTS, _series(outcomes), picture, {"costs": costs}
+        "fig12", numbers, PAPER, rendered.ASSUMPTIONS | INSIGHTS, _series(outcomes), picture, {"costs": costs}
     )
 
 
