@@ -320,3 +320,18 @@ def test_a_voltage_that_follows_a_force_is_not_differentiated_and_said_so():
     assert np.isfinite(found["normal_force", TISSUE + "E"][:3]).all()
     assert np.isnan(found["normal_force", TISSUE + "E"][3:]).all()
     assert "unknown of the step" in found.reasons[TISSUE + "E"]
+
+
+def test_where_a_force_is_held_shapes_change_normal_force_and_attraction_alike():
+    """What rounds are the nail's forces, which are large: with as small changes of the whole shape as the
+    attraction needs, the difference would be 6e-9.
+    """
+    press, solver = ev.Press(force=0.03, steps=1), ev.Solver(tolerance=1e-11)
+    pad = ev.FingerPad(resolution="coarse")
+    scene = ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 500.0, press, solver=solver)
+    keys = ("finger.ridge_width", "finger.width")
+    found = ev.sensitivities(scene, keys, ("normal_force", "electrostatic_force"))
+    for key in keys:
+        normal, pull = (found[name, key][0] for name in ("normal_force", "electrostatic_force"))
+        assert abs(pull) > 1e-6
+        assert normal == pytest.approx(pull, abs=3e-10)
