@@ -80,7 +80,11 @@ class DenseSolver:
 
 
 def inverse(matrix: Any, symmetric: bool) -> Floats:
-    """Inverse (n, n); a positive definite one by Cholesky, in half of the time and the matrix's precision."""
+    """Inverse (n, n); a large positive definite one by Cholesky, in half of the time and the matrix's
+    precision.
+    """
+    if len(matrix) < LARGE_SYSTEM:
+        return np.linalg.inv(matrix.astype(float))
     from scipy.linalg import lapack
 
     if symmetric:

@@ -92,9 +92,12 @@ def loaded_blas() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def blas_limits(threads: int | None = 1) -> threadpool_limits:
-    """Limits every BLAS loaded by now, scipy's too, to so many threads; MKL has its own limit."""
-    import scipy.linalg  # noqa: F401
+def blas_limits(threads: int = 1, scipy: bool = True) -> threadpool_limits:
+    """Limits every BLAS loaded by now to so many threads, `scipy`'s too, which large dense systems use; MKL
+    has its own limit.
+    """
+    if scipy:
+        import scipy.linalg  # noqa: F401
 
     return threadpool_limits(limits=threads)
 

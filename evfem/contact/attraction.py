@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charged, Charging
@@ -212,6 +211,8 @@ class Attraction:
 
     def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
         """Derivative of `forces` by node positions, sparse (dim P, dim P), ordered (node, component)."""
+        import scipy.sparse as sparse
+
         size, dim = position.shape
         frame, horizontal = surface_state(self.surface, position), np.arange(0, dim, 2)
         on = 1.0 if self.air_layer else touching.astype(float)

@@ -23,6 +23,8 @@ SMALLEST, LARGEST = 1.0, 200.0
 SAME_PLACE = 1e-7
 #: Pairs of nodes or edges near each other: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
+#: a direction along which few nodes of a regular mesh are level
+ACROSS = np.sqrt([2.0, 3.0, 5.0])
 
 
 def check(mesh: Mesh, source: str = "mesh") -> Mesh:
@@ -110,9 +112,6 @@ def _shapes(mesh: Mesh, refuse: Refuse) -> None:
 
 def _connection(mesh: Mesh, refuse: Refuse) -> None:
     """Refuse cells that overlap, neighbours with different mid-nodes, and separate parts."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     (sides, of_cell), apart = mesh.sides, "cells that do not overlap"
     side, sharing = ("edge", "their common edge") if mesh.dim == 2 else ("face", "a common edge or face")
     cells_of_side = np.bincount(of_cell.ravel())
@@ -131,12 +130,20 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
         if any(len(np.unique(nodes)) != len(parts) for parts, nodes in middles):
             fault = f"neighbouring cells with different mid-nodes on {sharing}"
             refuse(fault, "one mid-node per edge" + (" and face" if mesh.dim == 3 else ""))
-    cell, ones = np.repeat(np.arange(len(of_cell)), of_cell.shape[1]), np.ones(of_cell.size, dtype=np.int8)
-    places = cell.astype(np.int32), of_cell.ravel().astype(np.int32)  # all that older scipy takes
-    table = coo_array((ones, places), shape=(len(of_cell), len(sides))).tocsr()
-    parts, _ = connected_components(table @ table.T, directed=False)
+    parts = len(np.unique(_parts(of_cell, len(sides))))
     if parts > 1:
         refuse(f"{parts} separate parts", f"one body, its cells joined by common {side}s")
+
+
+def _parts(of_cell: Ints, sides: int) -> Ints:
+    """The lowest number of a cell (E,) among those joined to each by sides, from the `sides` (E, m) it has."""
+    found, before = np.arange(len(of_cell)), None
+    while before is None or (found != before).any():
+        before, lowest = found, np.full(sides, len(of_cell))
+        np.minimum.at(lowest, of_cell, before[:, None])
+        found = lowest[of_cell].min(axis=1)
+        found = found[found]  # twice as far each time
+    return found
 
 
 def _turns(corners: Ints) -> Floats:
@@ -188,13 +195,18 @@ def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
 
 
 def _pairs_within(points: Floats, reach: float) -> Ints | None:
-    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None of more than `MOST_PAIRS`."""
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(points)
-    if tree.count_neighbors(tree, reach) > 2 * MOST_PAIRS:
+    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None where more than `MOST_PAIRS` are so near
+    along `ACROSS` alone.
+    """
+    along = points @ ACROSS[: points.shape[1]] / np.linalg.norm(ACROSS[: points.shape[1]])
+    order, count = np.argsort(along), np.arange(len(points))
+    near = np.searchsorted(along[order], along[order] + 1.0001 * reach) - count - 1
+    if near.sum() > MOST_PAIRS:
         return None
-    pairs: Ints = tree.query_pairs(reach, output_type="ndarray")
+    first = np.repeat(count, near)
+    second = first + 1 + np.arange(first.size) - np.repeat(np.cumsum(near) - near, near)
+    pairs = np.sort(np.column_stack([order[first], order[second]]), axis=1)
+    pairs = pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
     return pairs[np.lexsort(pairs.T[::-1])]
 
 
