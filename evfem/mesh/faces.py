@@ -21,6 +21,8 @@ from evfem.mesh.mesh import Mesh, interface_of
 PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)], dtype=float)
 #: the same of an edge, and of a hexahedron, by dimensions
 NODES = {1: np.array([[-1.0], [1.0], [0.0]]), 2: PLACES, 3: HEXAHEDRON.astype(float)}
+#: and of a triangle, corners and middles of the edges, in 0..1
+TRIANGLE = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)])
 #: starts of the search for the nearest place of a face, so many each way; the nearest that are tried; most
 #: iterations, and the change of a place that ends them
 STARTS, TRIED, ITERATIONS, CLOSE = 5, 8, 30, 1e-9

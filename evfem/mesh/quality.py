@@ -12,7 +12,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh import solids
-from evfem.mesh.faces import NODES, shape_functions
+from evfem.mesh.faces import NODES, TRIANGLE, shape_functions
 from evfem.mesh.hexahedron import EDGES
 from evfem.mesh.mesh import CELLS, KINDS, Mesh, once
 from evfem.mesh.solids import Refuse, listed, some, turned
@@ -228,10 +228,6 @@ def _names(mesh: Mesh, refuse: Refuse) -> None:
             refuse(fault, "sets of nodes `pad` and `bone`, or [finger.boundaries] with their names")
 
 
-#: corners and mid-nodes of a triangle in 0..1
-TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
-
-
 def scaled_jacobian(mesh: Mesh) -> Floats:
     """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square, a cube or an
     equilateral triangle.
@@ -262,7 +258,7 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
     return smallest
 
 
-def _triangle_slopes(place: tuple[float, float], order: int) -> Floats:
+def _triangle_slopes(place: Floats, order: int) -> Floats:
     """Derivatives (2, nodes) of a triangle's shape functions at a place."""
     d = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
     if order == 1:
