@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 from evfem.mesh.hexahedron import PLACES as HEXAHEDRON
 from evfem.mesh.mesh import Mesh, interface_of
 
@@ -85,6 +85,7 @@ def _nearest(points: Floats, samples: Floats) -> Ints:
     """Numbers of the samples (S, d) that are nearest to each of the points (P, d)."""
     most = min(TRIED, len(samples))
     if points.shape[1] == 3:
+        linalg()  # before scipy.spatial brings its BLAS
         from scipy.spatial import cKDTree
 
         return np.asarray(cKDTree(samples).query(points, most)[1])

@@ -136,7 +136,7 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _parts(of_cell: Ints, sides: int) -> Ints:
-    """The lowest number of a cell (E,) among those joined to each by sides, from the `sides` (E, m) it has."""
+    """The lowest number of a cell (E,) among those joined to each, from the sides (E, m) that cells have."""
     found, before = np.arange(len(of_cell)), None
     while before is None or (found != before).any():
         before, lowest = found, np.full(sides, len(of_cell))

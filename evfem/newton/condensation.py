@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
 
@@ -218,6 +218,7 @@ class SuperLU:
     """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc."""
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
+        linalg()  # whose BLAS SuperLU uses
         self.pattern, self.kept = pattern, kept
         self._interior = np.setdiff1d(np.arange(pattern.size), kept)
         self._ordering: Ints | None = None

@@ -30,9 +30,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, blas_limits
 from evfem.common.checks import choice
-from evfem.common.pools import blas_limits
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, numbers
 from evfem.contact.condensed import COMPONENTS

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from copy import copy
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -15,15 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common import notices
-from evfem.common.arrays import Floats
-from evfem.common.constants import LARGE_SYSTEM, SMALLEST_FORCE
+from evfem.common.arrays import Floats, blas_limits
+from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
-from evfem.common.pools import blas_limits
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import NotConverged, Unresolved
-from evfem.mesh.mesh import Mesh
 from evfem.newton.control import (
     FollowFriction,
     Force,
@@ -124,7 +122,7 @@ def simulate(
     scene = scene_at(scene)
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
     # scene's threads are those of the factorisation
-    with blas_limits(scipy=False), notices.shown(progress):
+    with blas_limits(), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
 
 
@@ -139,7 +137,8 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         run = Run(scene, resume)
         notices.tell_observers(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
-        with _dense_limits(run.model.mesh, scene.solver.threads):
+        # the dense compliance of a skin in three dimensions has thousands of rows, which pay for threads
+        with blas_limits(scene.solver.threads) if run.model.mesh.dim == 3 else nullcontext():
             for request in run.requests():
                 frame = run.advance(request)
                 reasons = notices.tell_observers(observers, "step", run.rows[-1], frame, run.checkpoint)
@@ -155,15 +154,6 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         result.provenance["stopped"] = "; ".join(reasons)
     notices.tell_observers(observers, "finished", result)
     return result
-
-
-def _dense_limits(mesh: Mesh, threads: int) -> AbstractContextManager[object]:
-    """Limits scipy's BLAS where dense systems are large; those of a skin in three dimensions have thousands
-    of rows, which pay for `threads`.
-    """
-    if 2 * mesh.dim * len(mesh.node_sets["pad"]) < LARGE_SYSTEM:
-        return nullcontext()
-    return blas_limits(threads if mesh.dim == 3 else 1)
 
 
 class Run:
