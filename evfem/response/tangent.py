@@ -113,8 +113,8 @@ class Tangent:
             return found
         resting, touched = self.equations.interface.resting(state), self.equations.old.touching
         seen = (resting, state.voltage, touched, force[:, 0])
-        pulled = attraction.stiffness(*seen).tocoo()
-        found.append((moves.ravel()[pulled.row], moves.ravel()[pulled.col], -pulled.data))
+        pulled = attraction.stiffness(*seen)
+        found.append((moves.ravel()[pulled.row], moves.ravel()[pulled.column], -pulled.value))
         found.append((moves[:, 1], presses[:, 0], attraction.gain_on_pressing(*seen)))
         return found
 
