@@ -75,4 +75,4 @@ class WithAdhesion(Attraction):
 
     def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Entries:
         found = [part.stiffness(position, at, touching, pressing) for part, at in self._parts(voltage)]
-        return Entries.of(position.size, [one.block for one in found])
+        return Entries.of(position.size, [one[1:] for one in found])

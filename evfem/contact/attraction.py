@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,8 +47,7 @@ def attraction(u: Any, v: Any, w: Any) -> Any:
     return w.law.traction(gap, w.voltage, w.layers) * width * v[1]
 
 
-@dataclass(frozen=True, eq=False)
-class Entries:
+class Entries(NamedTuple):
     """Entries (K,) of a matrix (size, size) at these rows and columns; those of one place add up."""
 
     size: int
@@ -61,11 +60,6 @@ class Entries:
         """From several rows, columns and values at once, broadcast."""
         whole = [np.broadcast_arrays(*block) for block in blocks]
         return cls(size, *(np.concatenate([each[i].ravel() for each in whole]) for i in range(3)))
-
-    @property
-    def block(self) -> tuple[Ints, Ints, Floats]:
-        """Rows, columns and values."""
-        return self.row, self.column, self.value
 
     def toarray(self) -> Floats:
         """The dense matrix."""

@@ -130,20 +130,14 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
         if any(len(np.unique(nodes)) != len(parts) for parts, nodes in middles):
             fault = f"neighbouring cells with different mid-nodes on {sharing}"
             refuse(fault, "one mid-node per edge" + (" and face" if mesh.dim == 3 else ""))
-    parts = len(np.unique(_parts(of_cell, len(sides))))
-    if parts > 1:
-        refuse(f"{parts} separate parts", f"one body, its cells joined by common {side}s")
-
-
-def _parts(of_cell: Ints, sides: int) -> Ints:
-    """The lowest number of a cell (E,) among those joined to each, from the sides (E, m) that cells have."""
-    found, before = np.arange(len(of_cell)), None
-    while before is None or (found != before).any():
-        before, lowest = found, np.full(sides, len(of_cell))
-        np.minimum.at(lowest, of_cell, before[:, None])
-        found = lowest[of_cell].min(axis=1)
-        found = found[found]  # twice as far each time
-    return found
+    lowest, before = np.arange(len(of_cell)), None  # number of a cell joined to each
+    while before is None or (lowest != before).any():
+        before, of_side = lowest, np.full(len(sides), len(of_cell))
+        np.minimum.at(of_side, of_cell, before[:, None])
+        lowest = of_side[of_cell].min(axis=1)
+        lowest = lowest[lowest]  # twice as far each time
+    if lowest.any():
+        refuse(f"{len(np.unique(lowest))} separate parts", f"one body, its cells joined by common {side}s")
 
 
 def _turns(corners: Ints) -> Floats:

@@ -226,13 +226,12 @@ class SuperLU:
 
     def factorise(self, upper: Floats) -> None:
         """Factorise new values of the pattern; raises `Singular` if that fails."""
-        import scipy.sparse as sparse
         from scipy.sparse.linalg import splu
 
         options = {"SymmetricMode": True, "Equil": False}
+        shift, upper = shift_of_kept(self.pattern, self.kept, upper), upper.copy()
+        upper[self.pattern.diagonal[self.kept]] += shift
         A = self.pattern.full(upper)
-        shift = shift_of_kept(self.pattern, self.kept, upper)
-        A = A + sparse.csr_matrix((shift, (self.kept, self.kept)), shape=A.shape)
         try:
             if self._ordering is None:
                 inner = A[self._interior][:, self._interior].tocsc()
