@@ -81,9 +81,7 @@ class DenseSolver:
 
 
 def inverse(matrix: Any, symmetric: bool) -> Floats:
-    """Inverse (n, n); a large positive definite one by Cholesky, in half of the time and the matrix's
-    precision.
-    """
+    """Inverse (n, n); a large positive definite one by Cholesky, in half the time and its own precision."""
     if len(matrix) < LARGE_SYSTEM:
         return np.linalg.inv(matrix.astype(float))
     lapack = linalg().lapack

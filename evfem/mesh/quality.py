@@ -12,7 +12,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh import solids
-from evfem.mesh.faces import NODES, TRIANGLE, shape_functions
+from evfem.mesh.faces import node_places, shape_functions
 from evfem.mesh.hexahedron import EDGES
 from evfem.mesh.mesh import CELLS, KINDS, Mesh, once
 from evfem.mesh.solids import Refuse, listed, some, turned
@@ -236,10 +236,7 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
     [1.0]
     """
     x, nodes = mesh.points[mesh.cells], mesh.cells.shape[1]
-    if mesh.corners == 3:
-        slopes = np.array([_triangle_slopes(place, mesh.order) for place in TRIANGLE[:nodes]])
-    else:
-        slopes = np.swapaxes(shape_functions(nodes, NODES[mesh.dim][:nodes])[1], 1, 2)
+    slopes = np.swapaxes(shape_functions(nodes, node_places(nodes, mesh.dim))[1], 1, 2)
     smallest = np.full(len(x), np.inf)
     for slope in slopes:
         t = slope @ x
@@ -250,13 +247,3 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
             lengths = np.maximum(lengths, third * length.max(axis=1)) * np.sqrt(0.75)
         smallest = np.minimum(smallest, np.linalg.det(t) / np.maximum(lengths, 1e-300))
     return smallest
-
-
-def _triangle_slopes(place: Floats, order: int) -> Floats:
-    """Derivatives (2, nodes) of a triangle's shape functions at a place."""
-    d = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
-    if order == 1:
-        return d
-    area = np.array([1.0 - place[0] - place[1], *place])
-    following = np.roll(np.arange(3), -1)
-    return np.hstack([d * (4.0 * area - 1.0), 4.0 * (d * area[following] + area * d[:, following])])

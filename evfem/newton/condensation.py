@@ -44,9 +44,7 @@ class Singular(ArithmeticError):
 
 @cache
 def pardiso_library() -> Any:
-    """MKL, None without pypardiso, which brings it and loads scipy.sparse: only where the package mkl does
-    not say its place is pypardiso asked, which searches the whole prefix.
-    """
+    """MKL, or None without pypardiso; that loads scipy.sparse, and is asked only if `mkl` is no package."""
     if find_spec("pypardiso") is None:
         return None
     if PLACE not in os.environ and (place := mkl_library()) is not None:

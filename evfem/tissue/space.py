@@ -33,7 +33,6 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.quadrature import gauss
 from evfem.errors import InputError
 from evfem.mesh import faces
-from evfem.mesh.faces import NODES, TRIANGLE
 from evfem.mesh.mesh import CELLS, Mesh
 from evfem.tensor import det, inv
 from evfem.tissue.kernels.blocks import Cells, blocked, loops
@@ -92,24 +91,11 @@ def quadrature(element: str, facet: bool = False) -> tuple[Floats, Floats]:
     return places, weights.prod(axis=1)
 
 
-def node_places(kind: str) -> Floats:
-    """Places (n, dim) of a cell's nodes in the reference cell, whose coordinates go from 0 to 1."""
-    dim, corners, nodes, _ = CELLS[kind]
-    return TRIANGLE[:nodes] if corners == 3 else 0.5 * (NODES[dim][:nodes] + 1.0)
-
-
 def shape_functions(kind: str, places: Floats) -> tuple[Floats, Floats]:
     """Values (Q, n) and derivatives (Q, n, dim) of the shape functions of a cell's nodes at places (Q, dim)
     in the reference cell, whose coordinates go from 0 to 1.
     """
-    nodes = CELLS[kind].nodes
-    if CELLS[kind].corners == 3:
-        import skfem
-
-        both = [skfem.ElementTriP2().lbasis(places.T, i) for i in range(nodes)]
-        value, slope = (np.moveaxis(np.array(part), -1, 0) for part in zip(*both, strict=True))
-        return value, slope
-    value, slope = faces.shape_functions(nodes, 2.0 * places - 1.0)
+    value, slope = faces.shape_functions(CELLS[kind].nodes, 2.0 * places - 1.0)
     return value, 2.0 * slope
 
 
