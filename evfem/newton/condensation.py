@@ -52,12 +52,11 @@ def pardiso_library() -> Any:
     if PLACE in os.environ:
         library = ctypes.CDLL(os.environ[PLACE])
     else:
-        from pypardiso.pardiso_wrapper import PyPardisoSolver
-
         try:
-            library = PyPardisoSolver().libmkl
+            from pypardiso.pardiso_wrapper import PyPardisoSolver
         except ImportError:
             return None
+        library = PyPardisoSolver().libmkl
     library.pardiso.argtypes, library.pardiso.restype = [ctypes.c_void_p] * 16, None
     return library
 
