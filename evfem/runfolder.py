@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,14 +26,16 @@ from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
-from evfem.response.impedance import Impedance
-from evfem.response.sensitivities import Sensitivities
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import ANOTHER, Checkpoint
 from evfem.simulation.checkpoint import PROBES as AT_PROBES
 from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import columns_of, csv_header, csv_line, read_rows
 from evfem.simulation.result import Frame, Result, Row, Saved, provenance
+
+if TYPE_CHECKING:
+    from evfem.response.impedance import Impedance
+    from evfem.response.sensitivities import Sensitivities
 
 #: what a picture of derivatives shows if it can, the first first
 FORCES = ("tangential_force", "normal_force", "electrostatic_force")

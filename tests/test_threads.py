@@ -75,3 +75,18 @@ def test_a_process_of_a_pool_has_one_thread_whatever_it_loads(tmp_path):
         "with pools.open_pool(2, None) as pool: print([found for _, found in pool(blas_threads, {0: 0})])"
     )
     assert fresh(code, tmp_path) == "[[1, 1]]"
+
+
+def test_scipy_comes_under_the_limits_that_hold_when_it_is_loaded(tmp_path):
+    code = (
+        "from evfem.common.arrays import blas_limits, linalg\n"
+        "from tools.workers import blas_threads\n"
+        "with blas_limits(2):\n"
+        "    with blas_limits(1):\n"
+        "        linalg()\n"
+        "        inner = blas_threads(None)\n"
+        "    print(inner, blas_threads(None))\n"
+        "import os\n"
+        "print({*blas_threads(None)} == {os.cpu_count()})"
+    )
+    assert fresh(code, tmp_path).splitlines() == ["[1, 1] [2, 2]", "True"]

@@ -1,4 +1,4 @@
-"""Types of the arrays that go from room to room, and dense systems of linear equations.
+"""Types of the arrays that go from room to room, dense systems of linear equations, and their threads.
 
 Large systems are factorised in single precision, which takes half of the time and memory, and refined: the
 solution is that of double precision. Source: N. J. Higham, Accuracy and Stability of Numerical Algorithms,
@@ -7,11 +7,14 @@ solution is that of double precision. Source: N. J. Higham, Accuracy and Stabili
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from evfem.common.constants import BLOCK, LARGE_SYSTEM, OLD_FACTORS, REFINED, REFINEMENTS
 
@@ -46,8 +49,7 @@ class DenseSolver:
         return np.linalg.solve(matrix, right) if found is None else found
 
     def _factorise(self, matrix: Floats) -> bool:
-        from scipy.linalg import lapack
-
+        lapack = linalg().lapack
         self._unknowns = self._factors = None  # their memory is free before that of new ones is taken
         own = np.abs(np.diagonal(matrix))
         scale = 1.0 / np.sqrt(np.maximum(own, 1e-30 * (own.max() or 1.0)))  # within single precision
@@ -60,8 +62,7 @@ class DenseSolver:
 
     def _refined(self, matrix: Floats, right: Floats, slowest: float) -> Floats | None:
         """The solution by the factors at hand, None where the residual falls by less than `slowest`."""
-        from scipy.linalg import lapack
-
+        lapack = linalg().lapack
         assert self._factors is not None
         scale, factors, pivots = self._factors
         scale = scale[:, None]
@@ -80,9 +81,10 @@ class DenseSolver:
 
 
 def inverse(matrix: Any, symmetric: bool) -> Floats:
-    """Inverse (n, n); a positive definite one by Cholesky, in half of the time and the matrix's precision."""
-    from scipy.linalg import lapack
-
+    """Inverse (n, n); a large positive definite one by Cholesky, in half the time and its own precision."""
+    if len(matrix) < LARGE_SYSTEM:
+        return np.linalg.inv(matrix.astype(float))
+    lapack = linalg().lapack
     if symmetric:
         factorise, invert = lapack.get_lapack_funcs(("potrf", "potri"), (matrix,))
         factor, failed = factorise(np.array(matrix, order="F"), lower=True, overwrite_a=True)
@@ -100,3 +102,37 @@ def inverse(matrix: Any, symmetric: bool) -> Floats:
         raise np.linalg.LinAlgError("singular compliance")
     # solving with the unit matrix, as numpy does, takes 1.6 times as long
     return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])
+
+
+#: the limits of the BLAS that hold, each with its number of threads
+_LIMITS: list[tuple[ExitStack, int]] = []
+
+
+@contextmanager
+def blas_limits(threads: int = 1) -> Iterator[None]:
+    """Limits numpy's BLAS, and scipy's as soon as `linalg` loads it, to so many threads; MKL has its own."""
+    with ExitStack() as stack:
+        stack.enter_context(threadpool_limits(threads))
+        _LIMITS.append((stack, threads))
+        try:
+            yield
+        finally:
+            _LIMITS.remove((stack, threads))
+
+
+@cache
+def linalg() -> Any:
+    """scipy.linalg, a tenth of a second; a limit is that of what is loaded, so those that hold begin anew."""
+    for stack, _ in reversed(_LIMITS):
+        stack.close()
+    import scipy.linalg
+
+    for stack, threads in _LIMITS:
+        stack.enter_context(threadpool_limits(threads))
+    return scipy.linalg
+
+
+def loaded_blas() -> ThreadpoolController:
+    """Every BLAS, scipy's too; to find them takes milliseconds, its `limit` microseconds."""
+    linalg()
+    return ThreadpoolController()

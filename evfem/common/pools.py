@@ -19,8 +19,7 @@ from multiprocessing import Pipe, current_process, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from threadpoolctl import ThreadpoolController, threadpool_limits
-
+from evfem.common.arrays import blas_limits, linalg
 from evfem.common.checks import count
 from evfem.errors import InputError, quoted
 
@@ -87,18 +86,6 @@ class Worker:
         return self._process.exitcode
 
 
-def loaded_blas() -> ThreadpoolController:
-    """Every BLAS loaded by now; to find them takes milliseconds, its `limit` microseconds."""
-    return ThreadpoolController()
-
-
-def blas_limits(threads: int | None = 1) -> threadpool_limits:
-    """Limits every BLAS loaded by now, scipy's too, to so many threads; MKL has its own limit."""
-    import scipy.linalg  # noqa: F401
-
-    return threadpool_limits(limits=threads)
-
-
 def _begin(function: Callable[..., None], line: Connection, *arguments: Any) -> None:
     def end_with_parent() -> None:
         parent = parent_process()
@@ -107,9 +94,10 @@ def _begin(function: Callable[..., None], line: Connection, *arguments: Any) -> 
         os._exit(1)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    blas_limits()
     threading.Thread(target=end_with_parent, daemon=True).start()
-    function(line, *arguments)
+    with blas_limits():
+        linalg()
+        function(line, *arguments)
 
 
 def _serve(line: Connection) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import Attraction
+from evfem.contact.attraction import Attraction, Entries
 from evfem.surface.adhesion import ON
 
 
@@ -73,5 +73,6 @@ class WithAdhesion(Attraction):
         )
         return np.asarray(sum(each))
 
-    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
-        return sum(part.stiffness(position, at, touching, pressing) for part, at in self._parts(voltage))
+    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Entries:
+        found = [part.stiffness(position, at, touching, pressing) for part, at in self._parts(voltage)]
+        return Entries.of(position.size, [one[1:] for one in found])

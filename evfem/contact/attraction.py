@@ -18,13 +18,13 @@ pressed by d lam_n more is pulled by :math:`p'(s)\,s'(p)\,d\lambda_n` more (`gai
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sparse
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, Ints
 from evfem.contact.charging import Charged, Charging
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
@@ -45,6 +45,26 @@ def attraction(u: Any, v: Any, w: Any) -> Any:
     x, y = w.x[0] + u[0], w.x[1] + u[1]
     gap = positive_part(y - w.surface.y - w.surface.height(x))
     return w.law.traction(gap, w.voltage, w.layers) * width * v[1]
+
+
+class Entries(NamedTuple):
+    """Entries (K,) of a matrix (size, size) at these rows and columns; those of one place add up."""
+
+    size: int
+    row: Ints
+    column: Ints
+    value: Floats
+
+    @classmethod
+    def of(cls, size: int, blocks: Iterable[tuple[Any, Any, Any]]) -> Entries:
+        """From several rows, columns and values at once, broadcast."""
+        whole = [np.broadcast_arrays(*block) for block in blocks]
+        return cls(size, *(np.concatenate([each[i].ravel() for each in whole]) for i in range(3)))
+
+    def toarray(self) -> Floats:
+        """The dense matrix."""
+        flat: Any = np.bincount(self.size * self.row + self.column, self.value, self.size**2)
+        return flat.reshape(self.size, self.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,8 +230,8 @@ class Attraction:
         seen = lambda g: law.traction(g, self._voltages(g, voltage, position), self.layers)  # noqa: E731
         return derivative(seen, apart, GAP_STEP)
 
-    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
-        """Derivative of `forces` by node positions, sparse (dim P, dim P), ordered (node, component)."""
+    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Entries:
+        """Derivative of `forces` by node positions (dim P, dim P), ordered (node, component)."""
         size, dim = position.shape
         frame, horizontal = surface_state(self.surface, position), np.arange(0, dim, 2)
         on = 1.0 if self.air_layer else touching.astype(float)
@@ -243,6 +263,4 @@ class Attraction:
             potential = on * self.law.potential(apart, voltages, self.layers)
             row, column, turned = self.pad.tributary_curvature(position, potential)
             blocks.append((row, column, -turned))
-        whole = [np.broadcast_arrays(*block) for block in blocks]
-        rows, columns, values = (np.concatenate([each[i].ravel() for each in whole]) for i in range(3))
-        return sparse.csr_matrix((values, (rows, columns)), shape=(dim * size, dim * size))
+        return Entries.of(dim * size, blocks)

@@ -27,7 +27,7 @@ import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
-from evfem.contact.attraction import TOUCHING, Attraction
+from evfem.contact.attraction import TOUCHING, Attraction, Entries
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
@@ -260,8 +260,8 @@ class FieldAttraction(Attraction):
         field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope[:, 0])
         return field, np.asarray(lines.T @ forces)
 
-    def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
-        """Derivative of `forces` by positions, sparse (2 P, 2 P); touching nodes move along the surface."""
+    def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Entries:
+        """Derivative of `forces` by positions (2 P, 2 P); touching nodes move along the surface."""
         lines, frame = self.visible(position), surface_state(self.surface, position)
         nodes = in_line(self._plane, self.edges)
         closed = frame.gap <= TOUCHING
@@ -269,7 +269,7 @@ class FieldAttraction(Attraction):
         directions = np.zeros((2, self._size, 2))
         directions[0, :, 0] = 1.0
         directions[0, closed, 1], directions[1, ~closed, 1] = frame.slope[closed, 0], 1.0
-        triplets = []
+        blocks = []
         for axis, first in product(range(2), range(min(APART, nodes.size))):
             moved = nodes[first::APART]
             place = position.copy()
@@ -277,12 +277,10 @@ class FieldAttraction(Attraction):
             rate = voltage**2 / MOVED * (self._above(place, lines, pressing)[1] - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
-            triplets += [(rate[:, k], 2 * nodes + k, column) for k in range(2)]
-        value, row, column = (np.concatenate(part) for part in zip(*triplets, strict=True))
-        size = 2 * self._size
+            blocks += [(2 * nodes + k, column, rate[:, k]) for k in range(2)]
         outer = self.flanks.stiffness(position, voltage, np.ones(self._size, dtype=bool), pressing)
-        scale = sparse.diags_array(np.repeat(self.voltage_fraction(position[:, 0]) ** 2, 2))
-        return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(scale @ outer)
+        share = self.voltage_fraction(position[:, 0])[outer.row // 2] ** 2
+        return Entries.of(outer.size, [*blocks, (outer.row, outer.column, share * outer.value)])
 
     def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
         """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""

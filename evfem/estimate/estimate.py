@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, blas_limits
 from evfem.common.checks import choice
-from evfem.common.pools import blas_limits
 from evfem.errors import InputError
 from evfem.estimate.correction import corrected
 from evfem.estimate.database import reference_curves, shipped

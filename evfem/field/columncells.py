@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 
 #: places and weights of quadrature on (0, 1)
 AT, WEIGHTS = np.array([0.5 - np.sqrt(1.0 / 12.0), 0.5 + np.sqrt(1.0 / 12.0)]), np.array([0.5, 0.5])
@@ -204,14 +204,12 @@ class Cells:
 
 def _solved(band: Any, load: Any) -> Any:
     """Solution of a lower band, positive definite, or complex and symmetric."""
-    from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
-
     if not np.iscomplexobj(band):
-        factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-        return cho_solve_banded((factor, True), load, check_finite=False)
+        factor = linalg().cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+        return linalg().cho_solve_banded((factor, True), load, check_finite=False)
     width, size = band.shape
     whole = np.zeros((2 * width - 1, size), dtype=complex)
     whole[width - 1 :] = band
     for k in range(1, width):
         whole[width - 1 - k, k:] = band[k, : size - k]
-    return solve_banded((width - 1, width - 1), whole, load, check_finite=False)
+    return linalg().solve_banded((width - 1, width - 1), whole, load, check_finite=False)

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sparse
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 from evfem.electrostatics.laws import eps_0
 from evfem.field.fieldmesh import FieldMesh
 from evfem.tensor import dot, identity
@@ -170,6 +170,7 @@ class Space:
 
 def solve_spd(matrix: Any, b: Floats) -> Floats:
     """Solution of a symmetric positive definite system."""
+    linalg()  # whose BLAS SuperLU uses
     from scipy.sparse.linalg import splu
 
     factors = splu(

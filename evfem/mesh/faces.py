@@ -13,14 +13,15 @@ from itertools import product
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 from evfem.mesh.hexahedron import PLACES as HEXAHEDRON
 from evfem.mesh.mesh import Mesh, interface_of
 
 #: corners, middles of the edges and centre of a face, in the order of its nodes
 PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)], dtype=float)
-#: the same of an edge, and of a hexahedron, by dimensions
+#: the same of an edge, and of a hexahedron, by dimensions; and of a triangle
 NODES = {1: np.array([[-1.0], [1.0], [0.0]]), 2: PLACES, 3: HEXAHEDRON.astype(float)}
+TRIANGLE = np.array([(-1, -1), (1, -1), (-1, 1), (0, -1), (0, 0), (-1, 0)], dtype=float)
 #: starts of the search for the nearest place of a face, so many each way; the nearest that are tried; most
 #: iterations, and the change of a place that ends them
 STARTS, TRIED, ITERATIONS, CLOSE = 5, 8, 30, 1e-9
@@ -32,14 +33,20 @@ FAR = 10.0
 Shape = Callable[[Floats], tuple[Floats, Floats]]
 
 
+def node_places(nodes: int, dim: int) -> Floats:
+    """Places (m, d) of the nodes of an edge (2, 3), a triangle (3, 6), a quad (4, 9) or a cube (8, 27)."""
+    return (TRIANGLE if dim == 2 and nodes in (3, 6) else NODES[dim])[:nodes]
+
+
 def shape_functions(nodes: int, places: Floats) -> tuple[Floats, Floats]:
-    """Values (..., m) and derivatives (..., m, d) at places (..., d) of the m shape functions of an edge (2
-    or 3), a quad (4 or 9) or a hexahedron (8 or 27).
+    """Values (..., m) and derivatives (..., m, d) at places (..., d) of the shape functions of such nodes.
 
     >>> value, slope = shape_functions(9, PLACES)
     >>> bool(np.allclose(value, np.eye(9))), bool(np.allclose(slope.sum(axis=1), 0.0))
     (True, True)
     """
+    if places.shape[-1] == 2 and nodes in (3, 6):
+        return _of_a_triangle(nodes, places)
     t, at = places[..., None], NODES[places.shape[-1]][:nodes].T
     if nodes == 2 ** len(at):
         value, slope = 0.5 * (1.0 + t * at), 0.5 * at + 0.0 * t
@@ -50,6 +57,17 @@ def shape_functions(nodes: int, places: Floats) -> tuple[Floats, Floats]:
     along = np.eye(len(at), dtype=bool)[..., None]
     factors = np.where(along, slope[..., None, :, :], value[..., None, :, :])
     return value.prod(axis=-2), np.swapaxes(factors.prod(axis=-2), -1, -2)
+
+
+def _of_a_triangle(nodes: int, places: Floats) -> tuple[Floats, Floats]:
+    """The same by area coordinates."""
+    area = 0.5 * np.concatenate([-places.sum(axis=-1, keepdims=True), 1.0 + places], axis=-1)
+    slope = np.broadcast_to([[-0.5, -0.5], [0.5, 0.0], [0.0, 0.5]], (*area.shape, 2))
+    if nodes == 3:
+        return area, slope
+    after, along, a = np.roll(area, -1, axis=-1), np.roll(slope, -1, axis=-2), area[..., None]
+    slopes = [(4.0 * a - 1.0) * slope, 4.0 * (after[..., None] * slope + a * along)]
+    return np.concatenate([area * (2.0 * area - 1.0), 4.0 * area * after], -1), np.concatenate(slopes, -2)
 
 
 def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
@@ -83,6 +101,7 @@ def _nearest(points: Floats, samples: Floats) -> Ints:
     """Numbers of the samples (S, d) that are nearest to each of the points (P, d)."""
     most = min(TRIED, len(samples))
     if points.shape[1] == 3:
+        linalg()  # before scipy.spatial brings its BLAS
         from scipy.spatial import cKDTree
 
         return np.asarray(cKDTree(samples).query(points, most)[1])

@@ -12,7 +12,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh import solids
-from evfem.mesh.faces import NODES, shape_functions
+from evfem.mesh.faces import node_places, shape_functions
 from evfem.mesh.hexahedron import EDGES
 from evfem.mesh.mesh import CELLS, KINDS, Mesh, once
 from evfem.mesh.solids import Refuse, listed, some, turned
@@ -23,6 +23,8 @@ SMALLEST, LARGEST = 1.0, 200.0
 SAME_PLACE = 1e-7
 #: Pairs of nodes or edges near each other: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
+#: a direction along which few nodes of a regular mesh are level
+ACROSS = np.sqrt([2.0, 3.0, 5.0])
 
 
 def check(mesh: Mesh, source: str = "mesh") -> Mesh:
@@ -110,9 +112,6 @@ def _shapes(mesh: Mesh, refuse: Refuse) -> None:
 
 def _connection(mesh: Mesh, refuse: Refuse) -> None:
     """Refuse cells that overlap, neighbours with different mid-nodes, and separate parts."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     (sides, of_cell), apart = mesh.sides, "cells that do not overlap"
     side, sharing = ("edge", "their common edge") if mesh.dim == 2 else ("face", "a common edge or face")
     cells_of_side = np.bincount(of_cell.ravel())
@@ -131,12 +130,14 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
         if any(len(np.unique(nodes)) != len(parts) for parts, nodes in middles):
             fault = f"neighbouring cells with different mid-nodes on {sharing}"
             refuse(fault, "one mid-node per edge" + (" and face" if mesh.dim == 3 else ""))
-    cell, ones = np.repeat(np.arange(len(of_cell)), of_cell.shape[1]), np.ones(of_cell.size, dtype=np.int8)
-    places = cell.astype(np.int32), of_cell.ravel().astype(np.int32)  # all that older scipy takes
-    table = coo_array((ones, places), shape=(len(of_cell), len(sides))).tocsr()
-    parts, _ = connected_components(table @ table.T, directed=False)
-    if parts > 1:
-        refuse(f"{parts} separate parts", f"one body, its cells joined by common {side}s")
+    lowest, before = np.arange(len(of_cell)), None  # number of a cell joined to each
+    while before is None or (lowest != before).any():
+        before, of_side = lowest, np.full(len(sides), len(of_cell))
+        np.minimum.at(of_side, of_cell, before[:, None])
+        lowest = of_side[of_cell].min(axis=1)
+        lowest = lowest[lowest]  # twice as far each time
+    if lowest.any():
+        refuse(f"{len(np.unique(lowest))} separate parts", f"one body, its cells joined by common {side}s")
 
 
 def _turns(corners: Ints) -> Floats:
@@ -188,13 +189,18 @@ def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
 
 
 def _pairs_within(points: Floats, reach: float) -> Ints | None:
-    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None of more than `MOST_PAIRS`."""
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(points)
-    if tree.count_neighbors(tree, reach) > 2 * MOST_PAIRS:
+    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None where more than `MOST_PAIRS` are so near
+    along `ACROSS` alone.
+    """
+    along = points @ ACROSS[: points.shape[1]] / np.linalg.norm(ACROSS[: points.shape[1]])
+    order, count = np.argsort(along), np.arange(len(points))
+    near = np.searchsorted(along[order], along[order] + 1.0001 * reach) - count - 1
+    if near.sum() > MOST_PAIRS:
         return None
-    pairs: Ints = tree.query_pairs(reach, output_type="ndarray")
+    first = np.repeat(count, near)
+    second = first + 1 + np.arange(first.size) - np.repeat(np.cumsum(near) - near, near)
+    pairs = np.sort(np.column_stack([order[first], order[second]]), axis=1)
+    pairs = pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
     return pairs[np.lexsort(pairs.T[::-1])]
 
 
@@ -216,10 +222,6 @@ def _names(mesh: Mesh, refuse: Refuse) -> None:
             refuse(fault, "sets of nodes `pad` and `bone`, or [finger.boundaries] with their names")
 
 
-#: corners and mid-nodes of a triangle in 0..1
-TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
-
-
 def scaled_jacobian(mesh: Mesh) -> Floats:
     """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square, a cube or an
     equilateral triangle.
@@ -234,10 +236,7 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
     [1.0]
     """
     x, nodes = mesh.points[mesh.cells], mesh.cells.shape[1]
-    if mesh.corners == 3:
-        slopes = np.array([_triangle_slopes(place, mesh.order) for place in TRIANGLE[:nodes]])
-    else:
-        slopes = np.swapaxes(shape_functions(nodes, NODES[mesh.dim][:nodes])[1], 1, 2)
+    slopes = np.swapaxes(shape_functions(nodes, node_places(nodes, mesh.dim))[1], 1, 2)
     smallest = np.full(len(x), np.inf)
     for slope in slopes:
         t = slope @ x
@@ -248,13 +247,3 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
             lengths = np.maximum(lengths, third * length.max(axis=1)) * np.sqrt(0.75)
         smallest = np.minimum(smallest, np.linalg.det(t) / np.maximum(lengths, 1e-300))
     return smallest
-
-
-def _triangle_slopes(place: tuple[float, float], order: int) -> Floats:
-    """Derivatives (2, nodes) of a triangle's shape functions at a place."""
-    d = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
-    if order == 1:
-        return d
-    area = np.array([1.0 - place[0] - place[1], *place])
-    following = np.roll(np.arange(3), -1)
-    return np.hstack([d * (4.0 * area - 1.0), 4.0 * (d * area[following] + area * d[:, following])])

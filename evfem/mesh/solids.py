@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 from evfem.mesh.hexahedron import MIRRORED, face_nodes
 from evfem.mesh.mesh import Mesh
 
@@ -59,6 +59,7 @@ def listed(nodes: Ints) -> str:
 
 def surface(mesh: Mesh, refuse: Refuse) -> None:
     """Refuse a surface that touches itself: nodes on a face of a cell that has them not."""
+    linalg()  # before scipy.spatial brings its BLAS
     from scipy.spatial import cKDTree
 
     faces = mesh.outer_sides

@@ -22,17 +22,17 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sparse
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
 
-#: environment variable that tells pypardiso where the library is
+#: environment variable that says where the library is, here and to pypardiso
 PLACE = "PYPARDISO_MKL_RT"
 #: place of PARDISO's count of perturbed pivots among its parameters
 PERTURBED = 13
@@ -44,12 +44,21 @@ class Singular(ArithmeticError):
 
 @cache
 def pardiso_library() -> Any:
-    """pypardiso's handle of the library; told where it is, as it would search the whole prefix for it."""
+    """MKL, or None without pypardiso; that loads scipy.sparse, and is asked only if `mkl` is no package."""
+    if find_spec("pypardiso") is None:
+        return None
     if PLACE not in os.environ and (place := mkl_library()) is not None:
         os.environ[PLACE] = place
-    from pypardiso.pardiso_wrapper import PyPardisoSolver
-
-    return PyPardisoSolver(mtype=2)
+    if PLACE in os.environ:
+        library = ctypes.CDLL(os.environ[PLACE])
+    else:
+        try:
+            from pypardiso.pardiso_wrapper import PyPardisoSolver
+        except ImportError:
+            return None
+        library = PyPardisoSolver().libmkl
+    library.pardiso.argtypes, library.pardiso.restype = [ctypes.c_void_p] * 16, None
+    return library
 
 
 def mkl_library() -> str | None:
@@ -68,7 +77,7 @@ def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> Floats:
 
 
 class Pardiso:
-    """Condensation by MKL PARDISO (pypardiso's handle): one symbolic analysis, many factorisations. Factors
+    """Condensation by MKL PARDISO: one symbolic analysis, many factorisations. Factors
     of `single` precision give way to double ones where they fail or are not accurate.
     """
 
@@ -76,8 +85,8 @@ class Pardiso:
         self.pattern, self.kept = pattern, kept
         self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
         library = pardiso_library()
-        library.libmkl.MKL_Set_Num_Threads(threads)
-        self._call_pardiso = library._mkl_pardiso
+        library.MKL_Set_Num_Threads(threads)
+        self._call_pardiso = library.pardiso
         self._mark = np.zeros(pattern.size, dtype=np.int32)
         # PARDISO numbers the Schur complement in ascending order of the unknowns
         self._order = np.argsort(kept)
@@ -115,15 +124,11 @@ class Pardiso:
         def number(value: int) -> Any:
             return ctypes.byref(ctypes.c_int32(value))
 
-        def integers(array: Any) -> Any:
-            return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
-
         pattern, phase = self.pattern, ctypes.byref(self._phase)
-        matrix = (integers(pattern.indptr), integers(pattern.indices))
-        control = (integers(self._mark), number(1), integers(self._iparm), number(0))
-        handle = self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
+        matrix = (pattern.indptr.ctypes.data, pattern.indices.ctypes.data)
+        control = (self._mark.ctypes.data, number(1), self._iparm.ctypes.data, number(0))
         kind = (number(1), number(1), number(self.mtype), phase, number(pattern.size))
-        return handle, kind, (*matrix, *control)
+        return self._handle.ctypes.data, kind, (*matrix, *control)
 
     def factorise(self, upper: Floats) -> None:
         """Factorise new values; raises `Singular` if even the indefinite factorisation fails."""
@@ -152,6 +157,8 @@ class Pardiso:
         """Whether factors of single precision give how equal forces move the interior, which is softest."""
         if self.real is np.float64:
             return True
+        import scipy.sparse as sparse
+
         pattern, inner = self.pattern, np.ones(self.pattern.size)
         inner[self.kept] = 0.0
         A = sparse.csr_matrix((self._values, pattern.indices, pattern.indptr), 2 * (pattern.size,))
@@ -208,6 +215,7 @@ class SuperLU:
     """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc."""
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
+        linalg()  # whose BLAS SuperLU uses
         self.pattern, self.kept = pattern, kept
         self._interior = np.setdiff1d(np.arange(pattern.size), kept)
         self._ordering: Ints | None = None
@@ -218,9 +226,9 @@ class SuperLU:
         from scipy.sparse.linalg import splu
 
         options = {"SymmetricMode": True, "Equil": False}
+        shift, upper = shift_of_kept(self.pattern, self.kept, upper), upper.copy()
+        upper[self.pattern.diagonal[self.kept]] += shift
         A = self.pattern.full(upper)
-        shift = shift_of_kept(self.pattern, self.kept, upper)
-        A = A + sparse.csr_matrix((shift, (self.kept, self.kept)), shape=A.shape)
         try:
             if self._ordering is None:
                 inner = A[self._interior][:, self._interior].tocsc()
@@ -269,20 +277,12 @@ def other_solver() -> Iterator[str]:
     """Within, SuperLU is taken in PARDISO's place; its name, "" where it is the only one."""
     token = _OTHER.set(True)
     try:
-        yield "SuperLU" if _has_pardiso() else ""
+        yield "SuperLU" if pardiso_library() else ""
     finally:
         _OTHER.reset(token)
 
 
-def _has_pardiso() -> bool:
-    try:
-        pardiso_library()
-    except ImportError:
-        return False
-    return True
-
-
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
     """PARDISO where evfem[fast] is installed, else SuperLU, whose factors are never of `single` precision."""
-    kind = Pardiso if _has_pardiso() and not _OTHER.get() else SuperLU
+    kind = Pardiso if pardiso_library() and not _OTHER.get() else SuperLU
     return kind(pattern, kept, threads, single)

@@ -22,7 +22,7 @@ import numpy as np
 
 from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.attraction import Attraction
+from evfem.contact.attraction import Attraction, Entries
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
 from evfem.newton.condensation import Singular, make_condensation
@@ -285,13 +285,13 @@ class Linearisation:
         else:
             whole = attraction.stiffness(position, state.voltage, self.touching, pressing)
         unknowns = (dim * c[:, None] + np.arange(dim)).ravel()
-        rows = whole[unknowns]
-        inner = np.asarray(rows[:, unknowns].toarray())
+        number = np.full(whole.size, -1)
+        number[unknowns] = np.arange(unknowns.size)
+        row, column, axis = number[whole.row], number[whole.column], whole.column % dim
         # nodes beyond the candidates move along with their neighbours, so that sliding changes nothing
-        index = np.arange(unknowns.size)
-        for a in (0, 2)[: dim - 1]:
-            beyond = np.asarray(rows[:, a::dim].sum(axis=1)).ravel() - inner[:, a::dim].sum(axis=1)
-            inner[index, dim * (index // dim) + a] += beyond
+        along = np.where((column < 0) & (axis != 1), row - row % dim + axis, column)
+        seen = (row >= 0) & (along >= 0)
+        inner = Entries(unknowns.size, row[seen], along[seen], whole.value[seen]).toarray()
         normal = surface_state(self.interface.surface, position[c]).axes[:, 0, COMPONENTS[:dim]]
         own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
         # that belongs to the contact problem: not twice

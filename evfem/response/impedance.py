@@ -30,9 +30,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, blas_limits
 from evfem.common.checks import choice
-from evfem.common.pools import blas_limits
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, numbers
 from evfem.contact.condensed import COMPONENTS
@@ -310,10 +309,10 @@ class Contact:
             return self._matrix(np.zeros(0), u[:0], u[:0])
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         if attraction.has_fringes:
-            found = attraction.fringe_stiffness(place, state.voltage, pressing).tocoo()
+            found = attraction.fringe_stiffness(place, state.voltage, pressing)
         else:
-            found = attraction.stiffness(place, state.voltage, state.touching, pressing).tocoo()
-        return self._matrix(found.data, u[found.row], u[found.col])
+            found = attraction.stiffness(place, state.voltage, state.touching, pressing)
+        return self._matrix(found.value, u[found.row], u[found.column])
 
     def _matrix(self, values: Floats, rows: Ints, columns: Ints) -> Any:
         """Values at these places of a matrix on the reduced unknowns."""

@@ -47,8 +47,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common import notices
-from evfem.common.arrays import Floats
-from evfem.common.pools import blas_limits
+from evfem.common.arrays import Floats, blas_limits
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.contact.signorini import OPEN

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, linalg
 from evfem.contact.condensed import COMPONENTS
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.newton.condensation import Condensation
@@ -44,9 +44,7 @@ class Tangent:
 
     @cached_property
     def _dense(self) -> Any:
-        import scipy.linalg
-
-        return scipy.linalg.lu_factor(self._condensed(), check_finite=False)
+        return linalg().lu_factor(self._condensed(), check_finite=False)
 
     @property
     def _closed(self) -> Ints:
@@ -80,8 +78,6 @@ class Tangent:
 
     def solve(self, right: Floats) -> Floats:
         """w (m,) with K w = `right` (m,)."""
-        import scipy.linalg
-
         size, dim = self.equations.model.body.size, self.state.bone.size
         forces = right[:size].copy()
         forces[-dim:] = 0.0
@@ -91,7 +87,7 @@ class Tangent:
             row = self.kept.size - dim + axis
             lacking = right[size - dim + axis]
             dense[row] = lacking - condensed[row] if self.equations.pulled(axis) else lacking
-        found = scipy.linalg.lu_solve(self._dense, dense, check_finite=False)
+        found = linalg().lu_solve(self._dense, dense, check_finite=False)
         pressing = right[size:].copy()  # of open nodes, as they are
         pressing[self._closed] = found[self.kept.size :]
         return np.concatenate([self.factor.backward(saved, found[: self.kept.size]), pressing])
@@ -117,8 +113,8 @@ class Tangent:
             return found
         resting, touched = self.equations.interface.resting(state), self.equations.old.touching
         seen = (resting, state.voltage, touched, force[:, 0])
-        pulled = attraction.stiffness(*seen).tocoo()
-        found.append((moves.ravel()[pulled.row], moves.ravel()[pulled.col], -pulled.data))
+        pulled = attraction.stiffness(*seen)
+        found.append((moves.ravel()[pulled.row], moves.ravel()[pulled.column], -pulled.value))
         found.append((moves[:, 1], presses[:, 0], attraction.gain_on_pressing(*seen)))
         return found
 

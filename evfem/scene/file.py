@@ -17,7 +17,6 @@ from evfem.common.checks import MOST_STEPS
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
-from evfem.finger.fingertip import FINGERS
 from evfem.finger.layers import TABLE_2
 from evfem.newton.hand import Hand
 from evfem.scene.format import (
@@ -28,9 +27,8 @@ from evfem.scene.format import (
     Electrostatics,
     Measured,
     SceneTable,
-    names,
 )
-from evfem.scene.keys import VERSION, at, check_size, kind_of, read, read_kind, shown
+from evfem.scene.keys import VERSION, at, check_size, kind_of, names, read, read_kind, shown
 from evfem.scene.motion import MOTIONS, Motion
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.serialiser import dump
@@ -207,6 +205,8 @@ def _meshed(table: Mapping[str, Any], folder: Path) -> MeshedFinger:
 
 
 def _parametric(table: Mapping[str, Any], folder: Path) -> Any:
+    from evfem.finger.fingertip import FINGERS
+
     cls = FINGERS[kind_of({"kind": "pad", **table}, "finger", FINGERS)]
     mistakes, sizes, found = Mistakes(), dict[str, Any](), None
     with mistakes.of_a_part(), at("finger"):

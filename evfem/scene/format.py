@@ -328,18 +328,13 @@ class Electrostatics:
 SURFACES: Mapping[str, Any] = {**textures.SURFACES, "profile": ProfileTable, "relief": ReliefTable}
 
 
-def names(*classes: Any) -> list[str]:
-    """The keys of tables."""
-    return [key.name for cls in classes for key in keys_of(cls)]
-
-
-#: tables that a key may have been meant for
-HOMES: Mapping[str, list[str]] = {
-    "[finger]": names(Measured, BesideFinger, FingerPad),
-    "[finger.electrical]": names(Electrical),
-    "[electrostatics]": names(Electrostatics),
-    "[surface]": names(BesideSurface, Flat),
-    "[solver]": names(Solver),
-    "[output]": names(Output),
-    "[[motion]]": names(*MOTIONS.values()),
+#: tables that a key may have been meant for -> what has their keys
+HOMES: Mapping[str, tuple[Any, ...]] = {
+    "[finger]": (Measured, BesideFinger, FingerPad),
+    "[finger.electrical]": (Electrical,),
+    "[electrostatics]": (Electrostatics,),
+    "[surface]": (BesideSurface, Flat),
+    "[solver]": (Solver,),
+    "[output]": (Output,),
+    "[[motion]]": tuple(MOTIONS.values()),
 }

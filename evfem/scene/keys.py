@@ -23,6 +23,11 @@ VERSION = 1
 LARGEST_TABLE = 64 * 2**20
 
 
+def names(*classes: Any) -> list[str]:
+    """The keys of tables."""
+    return [key.name for cls in classes for key in keys_of(cls)]
+
+
 def read(
     cls: Any,
     table: Any,
@@ -31,7 +36,7 @@ def read(
     *,
     tag: str = "",
     beside: Sequence[str] = (),
-    homes: Mapping[str, Collection[str]] | None = None,
+    homes: Mapping[str, Collection[Any]] | None = None,
     **given: Any,
 ) -> Any:
     """What a table describes, or all mistakes in it: first unknown keys, then others but the lack of what an
@@ -95,11 +100,11 @@ def _value(key: Key, given: Any, place: str, folder: Path) -> Any:
 
 
 def _unknown_key(
-    key: str, name: str, known: Sequence[str], homes: Mapping[str, Collection[str]]
+    key: str, name: str, known: Sequence[str], homes: Mapping[str, Collection[Any]]
 ) -> InputError:
     """The error for a key that its table does not have, and which table has it."""
     mistake = unknown(key, name, known)
-    home = next((table for table, keys in homes.items() if name in keys), "")
+    home = next((table for table, classes in homes.items() if name in names(*classes)), "")
     here = re.sub(r"\[\d+\]", "", key.rpartition(".")[0])  # whose other kinds may have it
     if home.strip("[]") in ("", here) or near(name, known):
         return mistake

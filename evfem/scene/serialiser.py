@@ -106,12 +106,12 @@ def _of_kind(value: Any, kinds: Mapping[str, Any], place: str, tag: str = "kind"
 
 
 def _finger(finger: Any) -> dict[str, Any]:
-    from evfem.finger.fingertip import FINGERS
-
     if isinstance(finger, MeshedFinger):
         if not isinstance(finger.source, (str, Path)):
             raise InputError("finger.mesh", "a mesh object", "a mesh in a file, for a file")
         return _keys(finger, "finger")
+    from evfem.finger.fingertip import FINGERS
+
     table = _of_kind(finger, FINGERS, "finger")
     usual = type(finger)().materials
     own = {name: table["materials"][name] for name, law in finger.materials.items() if law != usual[name]}

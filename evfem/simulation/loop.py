@@ -18,8 +18,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from evfem.common import notices
+from evfem.common.arrays import blas_limits, loaded_blas
 from evfem.common.checks import Checked, Within, number, set_frozen
-from evfem.common.pools import blas_limits, loaded_blas
 from evfem.errors import ABSENT, InputError, NotConverged, StopRun
 from evfem.newton.control import Target
 from evfem.planning.core import Closing

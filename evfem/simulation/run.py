@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from copy import copy
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -14,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common import notices
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, blas_limits
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
-from evfem.common.pools import blas_limits
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
@@ -138,7 +138,7 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         notices.tell_observers(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
         # the dense compliance of a skin in three dimensions has thousands of rows, which pay for threads
-        with blas_limits(scene.solver.threads if run.model.mesh.dim == 3 else None):
+        with blas_limits(scene.solver.threads) if run.model.mesh.dim == 3 else nullcontext():
             for request in run.requests():
                 frame = run.advance(request)
                 reasons = notices.tell_observers(observers, "step", run.rows[-1], frame, run.checkpoint)

@@ -24,8 +24,8 @@ from evfem.common.checks import instance, real, set_frozen
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene import schema as scenes
 from evfem.scene.file import read_text, tables_of
-from evfem.scene.format import SceneTable, names
-from evfem.scene.keys import VERSION, read, shown
+from evfem.scene.format import SceneTable
+from evfem.scene.keys import VERSION, names, read, shown
 from evfem.scene.scene import Scene
 from evfem.scene.schema import DRAFT, Schema, Section, section
 from evfem.scene.serialiser import dump

@@ -31,8 +31,6 @@ class Pattern:
 
     def __init__(self, nodes: Ints, dim: int) -> None:
         """`nodes` (E, n): the cells' nodes by their numbers in the reduced system, from 0 on."""
-        import scipy.sparse as sparse
-
         nodes = nodes.astype(np.int32)
         count = int(nodes.max()) + 1
         self.dim, self.size = dim, dim * count
@@ -40,11 +38,11 @@ class Pattern:
         left, right = nodes[:, self._first], nodes[:, self._second]
         low, high = np.minimum(left, right).ravel(), np.maximum(left, right).ravel()
         alone = np.arange(count, dtype=np.int32)  # a node that no cell has keeps a diagonal
-        ends = np.append(low, alone), np.append(high, alone)
-        pairs = sparse.csr_matrix((np.ones(ends[0].size, dtype=np.int32), ends), (count, count))
-        self._pairs: Ints = pairs.indptr
-        pairs.data = self._fill(pairs.indices)
-        t = np.asarray(pairs[low, high]).reshape(left.shape)
+        ends = np.append(low, alone).astype(np.int64), np.append(high, alone)
+        pairs, of = np.unique(count * ends[0] + ends[1], return_inverse=True)
+        first, second = np.divmod(pairs, count)
+        self._pairs: Ints = np.searchsorted(first, np.arange(count + 1)).astype(np.int32)
+        t = self._fill(second.astype(np.int32))[of[: low.size]].reshape(left.shape)
         self.places: Ints = np.empty((*left.shape, dim, dim), dtype=np.int32)
         self._find_places(left, right, t)
 

@@ -24,14 +24,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import Any
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.quadrature import gauss
 from evfem.errors import InputError
-from evfem.mesh.hexahedron import PLACES
+from evfem.mesh import faces
 from evfem.mesh.mesh import CELLS, Mesh
 from evfem.tensor import det, inv
 from evfem.tissue.kernels.blocks import Cells, blocked, loops
@@ -76,41 +77,26 @@ def points_per_cell(element: str) -> int:
 
 
 def quadrature(element: str, facet: bool = False) -> tuple[Floats, Floats]:
-    """scikit-fem's places (Q, dim) and weights (Q,) in the reference cell of an element, or its `facet`."""
-    import skfem
+    """Places (Q, dim) and weights (Q,) in the reference cell of an element, or its `facet`: Gauss's, in a
+    triangle those of scikit-fem.
+    """
+    kind, order, _ = ELEMENTS[element]
+    if CELLS[kind].corners == 3 and not facet:
+        import skfem
 
-    kind, intorder, _ = ELEMENTS[element]
-    domain = reference(kind)[0].refdom
-    X, W = skfem.quadrature.get_quadrature(domain.brefdom if facet else domain, intorder)
-    return X.T, W
-
-
-@cache
-def reference(kind: str) -> tuple[Any, Ints]:
-    """scikit-fem's element on cells of a kind, and which of its shape functions each of their nodes has."""
-    import skfem
-
-    element = {
-        "quad": skfem.ElementQuad1,
-        "quad9": skfem.ElementQuad2,
-        "triangle6": skfem.ElementTriP2,
-        "hexahedron": skfem.ElementHex1,
-        "hexahedron27": skfem.ElementHex2,
-    }[kind]()
-    if CELLS[kind].dimension == 2:
-        return element, np.arange(CELLS[kind].nodes)
-    ours = 0.5 * (PLACES[: CELLS[kind].nodes] + 1.0)
-    return element, (ours[:, None] == element.doflocs).all(axis=2).argmax(axis=1)
+        X, W = skfem.quadrature.get_quadrature(skfem.ElementTriP2.refdom, order)
+        return X.T, W
+    dim, along = CELLS[kind].dimension - facet, np.array(gauss(order // 2 + 1))
+    places, weights = np.array([list(product(one, repeat=dim)) for one in along])
+    return places, weights.prod(axis=1)
 
 
 def shape_functions(kind: str, places: Floats) -> tuple[Floats, Floats]:
     """Values (Q, n) and derivatives (Q, n, dim) of the shape functions of a cell's nodes at places (Q, dim)
     in the reference cell, whose coordinates go from 0 to 1.
     """
-    element, order = reference(kind)
-    both = [element.lbasis(places.T, i) for i in order]
-    value = np.stack([np.broadcast_to(value, len(places)) for value, _ in both], axis=1)
-    return value, np.stack([np.broadcast_to(slope, places.T.shape).T for _, slope in both], axis=1)
+    value, slope = faces.shape_functions(CELLS[kind].nodes, 2.0 * places - 1.0)
+    return value, 2.0 * slope
 
 
 def jacobians(mesh: Mesh, cells: Ints, slope: Floats) -> Floats:

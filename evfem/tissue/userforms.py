@@ -18,12 +18,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
-from evfem.mesh.faces import shape_functions as side_functions
+from evfem.mesh import faces
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import Array, complex_step, difference, inv
 from evfem.tissue.assembly import Points, UserIntegral, points_of
 from evfem.tissue.forms import Field, Integrand, Parts, fluxes
-from evfem.tissue.space import Space, jacobians, quadrature, reference, shape_functions
+from evfem.tissue.space import Space, jacobians, quadrature, shape_functions
 
 #: cells or facets that a form is tried on, size of the trial's random displacements and gradients
 PLACES, SIZE = 16, 0.1
@@ -183,9 +183,8 @@ def facet_points(space: Space, name: str, rule: tuple[Floats, Floats] | None = N
     mesh, dim = space.mesh, space.dim
     places, W = rule or quadrature(space.element, facet=True)
     cells, sides = sides_of(mesh, name)
-    element, order = reference(mesh.kind)
-    on_side, by_side = side_functions(2 * dim - 2, 2.0 * places - 1.0)
-    corners = element.doflocs[order[mesh.local_sides[:, : 2 * dim - 2]]]
+    on_side, by_side = faces.shape_functions(2 * dim - 2, 2.0 * places - 1.0)
+    corners = 0.5 * (faces.node_places(mesh.cells.shape[1], dim)[mesh.local_sides[:, : 2 * dim - 2]] + 1.0)
     both = [shape_functions(mesh.kind, on_side @ corner) for corner in corners]
     value, slope = (np.stack(part)[sides] for part in zip(*both, strict=True))
     jacobian = jacobians(mesh, cells, slope)

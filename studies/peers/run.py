@@ -10,14 +10,15 @@ import json
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
+
+from evfem.common.arrays import linalg
 
 from .apart import measured
 from .problem import GIVEN, Way
 
-#: what evfem would import while it runs
-LATE = ("evfem.simulation.model", "evfem.scene.file", "skfem", "tqdm.auto", "scipy.sparse.linalg")
+#: what evfem would import while it runs, and on meshes from this level on scipy for its dense systems
+LATE, LARGE = ("evfem.simulation.run", "numpy.ma", "email.parser"), 2
 
 
 def _evfem() -> Callable[..., dict[str, Any]]:
@@ -28,8 +29,7 @@ def _evfem() -> Callable[..., dict[str, Any]]:
 
     from ..precision.scenes import Case, build
 
-    if find_spec("pypardiso"):
-        pardiso_library()
+    pardiso_library()
 
     def solve(scene: str, element: str, level: int, way: Way) -> dict[str, Any]:
         case = Case(scene, level, element, press=way.press, steps=way.slide, tolerance=way.tolerance)
@@ -57,6 +57,8 @@ PACKAGES = {"evfem": _evfem, "felupe": _felupe}
 def run(package: str, element: str, scene: str, level: int, way: Way = GIVEN) -> dict[str, Any]:
     """Import what is needed, then run and measure."""
     solve = PACKAGES[package]()
+    if level >= LARGE:
+        linalg()
     return measured(lambda: solve(scene, element, level, way))
 
 

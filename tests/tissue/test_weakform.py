@@ -15,8 +15,10 @@ from tools.laws import LMBDA, MU, SteepVolume, neo_hookean_stress
 from tools.solids import SOLIDS, box
 
 import evfem as ev
+from evfem.mesh.faces import node_places
+from evfem.mesh.mesh import CELLS as CELLS_OF
 from evfem.tissue.dynamics import Dynamics
-from evfem.tissue.space import ELEMENTS, make_space
+from evfem.tissue.space import ELEMENTS, make_space, quadrature, shape_functions
 from evfem.tissue.weakform import Tissue, check_laws
 
 
@@ -108,6 +110,32 @@ def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(elem
         slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
         np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=5e-9 * scale)
     assert abs(K - K.T).max() < 1e-9 * scale
+
+
+# -- reference cells: scikit-fem's ----------------------------------------------------------------------
+
+REFERENCE = SHAPES | {"hexahedron": skfem.ElementHex1, "hexahedron27": skfem.ElementHex2}
+
+
+@pytest.mark.parametrize("element", list(ELEMENTS))
+def test_shape_functions_and_quadrature_are_those_of_scikit_fem(element):
+    kind, order, _ = ELEMENTS[element]
+    theirs, dim = REFERENCE[kind](), CELLS_OF[kind].dimension
+    ours = 0.5 * (node_places(CELLS_OF[kind].nodes, dim) + 1.0)
+    number = (ours[:, None] == theirs.doflocs).all(axis=2).argmax(axis=1)
+    places = np.random.default_rng(2).random((7, dim))
+    value, slope = shape_functions(kind, places)
+    for node, i in enumerate(number):
+        own, by_place = theirs.lbasis(places.T, i)
+        np.testing.assert_allclose(value[:, node], np.broadcast_to(own, 7), rtol=0, atol=2e-14)
+        np.testing.assert_allclose(slope[:, node].T, np.broadcast_to(by_place, (dim, 7)), rtol=0, atol=2e-14)
+    for facet, domain in ((False, theirs.refdom), (True, theirs.refdom.brefdom)):
+        expected = np.vstack(skfem.quadrature.get_quadrature(domain, order))
+        found = np.column_stack(quadrature(element, facet)).T
+        assert sorted(map(tuple, found.T.round(14))) == sorted(map(tuple, expected.T.round(14)))
+
+
+# -- twins ----------------------------------------------------------------------------------------------
 
 
 def twin_energy(space, u):
