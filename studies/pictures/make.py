@@ -76,6 +76,7 @@ def draw_relief(path: Path) -> None:
     motion = [ev.Press(force=0.5, steps=4), ev.Slide(0.06, steps=1, angle=45.0, hold="force")]
     result = ev.simulate(ev.Scene(finger, eggs, motion=motion))
     figure = Figure(figsize=(9.6, 4.6), layout="constrained")
+    figure.get_layout_engine().set(wspace=0.06)
     titles = "pressed to 0.5 N", "slid 0.06 mm towards 45 degrees"
     for ax, field, frame, title in zip(
         figure.subplots(1, 2), ("contact_pressure", "contact_status"), (3, 4), titles, strict=True
