@@ -307,7 +307,7 @@ def _sensitivities(given: argparse.Namespace) -> None:
     scene, by, columns = (_scene(given.scene), given.by, None) if given.by else load(given.scene)
     folder = given.out or Path(f"{given.scene.stem}-out")
     found = sensitivities(scene, by, columns, progress=True)
-    for key in (key for key in found.parameters if key in found.reasons):
+    for key in (key for key in (*found.parameters, *(columns or ())) if key in found.reasons):
         notices.tell(f"{key}: {found.reasons[key]}")
     print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
 
