@@ -186,6 +186,8 @@ class Headed:
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
     """Columns of a text with exactly the names `header` and a number everywhere, in mm, s and V."""
     allowed = f"a readable csv file with the header {','.join(header)}"
+    if path.suffix == ".json":
+        allowed += f"; the rows of a texture stand in {path.stem}.csv"
     table = read_headed(path, key, allowed, gaps=False)
     if table.names != header:
         raise InputError(
