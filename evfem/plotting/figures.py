@@ -118,7 +118,7 @@ def shaded(ax: Axes, points: Floats, triangles: Ints, values: Floats) -> Any:
     down = [[(a + 1, b), (a + 1, b + 1), (a, b + 1)] for a, b in number if a + b < n - 1]
     parts = np.array([[number[place] for place in part] for part in up + down])
     corners = np.column_stack([points, values])[triangles]
-    x, y, value = np.einsum("mk,tkc->ctm", np.column_stack([n - i - j, i, j]) / n, corners).reshape(3, -1)
+    x, y, value = np.einsum("mk,tkc->ctm", np.column_stack([n - i - j, j, i]) / n, corners).reshape(3, -1)
     own = parts + i.size * np.arange(len(triangles))[:, None, None]
     return ax.tripcolor(Triangulation(x, y, own.reshape(-1, 3)), value, shading="gouraud")
 

@@ -253,6 +253,8 @@ def test_meshed_finger_raises_its_mesh_and_wants_every_material():
     assert len(finger.mesh(2).node_sets["pad"]) == 2 * len(linear.node_sets["pad"]) - 1
     with pytest.raises(InputError, match=r"finger\.materials\.nail"):
         MeshedFinger(linear, {name: law for name, law in laws.items() if name != "nail"})
+    with pytest.raises(InputError, match=r"no such region; allowed: nail\? \("):
+        MeshedFinger(linear, {**laws, "Nail": laws["nail"]})
     with pytest.raises(InputError, match="no such region"):
         MeshedFinger(linear, {**laws, "skin": laws["nail"]})
     with pytest.raises(InputError, match=r"solver\.element"):

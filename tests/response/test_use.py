@@ -53,6 +53,23 @@ def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
         ev.plotting.tornado(found, "substeps")
 
 
+def test_what_cannot_be_asked_is_said(path):
+    cases = {
+        "surface.elastic.E": r"parameters\.surface\.elastic\.E: missing",
+        "surface.friction.0": r"parameters\.surface\.friction\.0: missing",
+        (): "parameters: given no keys",
+    }
+    for keys, said in cases.items():
+        with pytest.raises(ev.InputError, match=said):
+            ev.sensitivities(path, keys)
+    with pytest.raises(ev.InputError, match=r'columns: given "tangential"; allowed: tangential_force\?'):
+        ev.sensitivities(path, "surface.friction", "tangential")
+    found = ev.sensitivities(path, "surface.friction", ["contact_width", "external_work"])
+    assert "external_work" in repr(found)
+    with pytest.raises(ev.InputError, match=r"allowed: found\[column, parameter\]"):
+        found["external_work"]
+
+
 def test_uncertainty_of_a_result_is_that_of_its_scene(path):
     sd, columns = {"surface.friction": 0.03}, ["tangential_force"]
     found = ev.uncertainty(ev.simulate(path), sd, columns)
