@@ -32,7 +32,9 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     1.0
     """
     if isinstance(value, bool) or not isinstance(value, Real):
-        worded = not isinstance(value, str) or not allowed[:1].isdigit()  # a bare range says not of what
+        worded = (
+            not isinstance(value, str) or not allowed.lstrip("-")[:1].isdigit()
+        )  # a bare range says not of what
         raise InputError(key, quoted(value), allowed if worded else f"a number, {allowed}")
     try:
         number = float(value)

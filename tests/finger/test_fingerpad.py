@@ -240,7 +240,8 @@ def test_a_wrong_number_gets_the_sentence_of_its_parameter(name):
     for value in ("abc", None, True, low - 0.3, high + 0.3, float("nan"), float("-inf")):
         with pytest.raises(InputError) as caught:
             FingerPad(**{name: value})
-        expected = f"finger.{name}: given {readable(value)}; allowed: {low:g} to {high:g} {unit}"
+        of_what = "a number, " if value == "abc" else ""
+        expected = f"finger.{name}: given {readable(value)}; allowed: {of_what}{low:g} to {high:g} {unit}"
         assert str(caught.value) == expected.rstrip().replace("pitches", UNITS.get(name, "pitches"))
 
 
