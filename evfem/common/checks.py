@@ -32,10 +32,8 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     1.0
     """
     if isinstance(value, bool) or not isinstance(value, Real):
-        worded = (
-            not isinstance(value, str) or not allowed.lstrip("-")[:1].isdigit()
-        )  # a bare range says not of what
-        raise InputError(key, quoted(value), allowed if worded else f"a number, {allowed}")
+        bare = isinstance(value, str) and allowed.lstrip("-")[:1].isdigit()  # a range that says not of what
+        raise InputError(key, quoted(value), f"a number, {allowed}" if bare else allowed)
     try:
         number = float(value)
     except OverflowError:  # an integer beyond all floats
