@@ -171,3 +171,11 @@ def test_the_command_of_an_impedance_writes_a_table_and_a_picture(path, capsys):
     assert (out / "impedance.png").stat().st_size > 5000
     assert "Impedance, tangential" in capsys.readouterr().out
     assert main([*asked, "-1"]) == 2
+
+
+def test_a_folder_that_cannot_be_is_told_before_anything_is_computed(path, capsys, monkeypatch):
+    monkeypatch.setattr("evfem.response.sensitivities.sensitivities", None)
+    monkeypatch.setattr("evfem.response.impedance.impedance", None)
+    for asked in (["impedance", "--frequencies", "1"], ["sensitivities", "--by", "surface.friction"]):
+        assert main([asked[0], str(path), "--out", str(path / "out"), *asked[1:]]) == 4
+        assert "cannot use" in capsys.readouterr().err
