@@ -300,25 +300,29 @@ def _check(given: argparse.Namespace) -> int:
 
 
 def _sensitivities(given: argparse.Namespace) -> None:
+    from evfem.common.storage import alone_in
     from evfem.response.file import load
     from evfem.response.sensitivities import sensitivities
     from evfem.runfolder import write_sensitivities
 
     scene, by, columns = (_scene(given.scene), given.by, None) if given.by else load(given.scene)
     folder = given.out or Path(f"{given.scene.stem}-out")
-    found = sensitivities(scene, by, columns, progress=True)
-    for key in (key for key in found.parameters if key in found.reasons):
-        notices.tell(f"{key}: {found.reasons[key]}")
-    print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
+    with alone_in(folder):
+        found = sensitivities(scene, by, columns, progress=True)
+        for key in (key for key in (*found.parameters, *(columns or ())) if key in found.reasons):
+            notices.tell(f"{key}: {found.reasons[key]}")
+        print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
 
 
 def _impedance(given: argparse.Namespace) -> None:
+    from evfem.common.storage import alone_in
     from evfem.response.impedance import impedance
     from evfem.runfolder import write_impedance
 
-    found = impedance(_scene(given.scene), given.frequencies, given.axis)
-    folder = given.out or Path(f"{given.scene.stem}-out")
-    print(f"{found}\ntable in {write_impedance(found, folder)}", flush=True)
+    scene, folder = _scene(given.scene), given.out or Path(f"{given.scene.stem}-out")
+    with alone_in(folder):
+        found = impedance(scene, given.frequencies, given.axis)
+        print(f"{found}\ntable in {write_impedance(found, folder)}", flush=True)
 
 
 def _study(given: argparse.Namespace) -> None:

@@ -40,6 +40,8 @@ def readable(value: object) -> str:
     if isinstance(value, str):
         start = value[: LONGEST_VALUE + 1]  # a file of 4 MB may be one text
         return _cut(json.dumps(start, ensure_ascii=not start.isprintable()), LONGEST_VALUE)
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
     try:
         return _cut(re.sub(r"\bnp\.\w+\((.*?)\)", r"\1", repr(value)), LONGEST_VALUE)  # np.float64(1.0): 1.0
     except (ValueError, RecursionError):  # an integer of too many digits, lists in lists
@@ -141,7 +143,8 @@ def near(name: str, known: Sequence[str]) -> list[str]:
     """The name that may have been meant, if there is one."""
     from difflib import get_close_matches
 
-    return get_close_matches(name[:40], known, n=1)
+    small = {one.lower(): one for one in known}
+    return [small[one] for one in get_close_matches(name[:40].lower(), small, n=1)]
 
 
 def together(mistakes: Sequence[InputError]) -> InputError:

@@ -111,7 +111,7 @@ def _signal(path: Path) -> Found:
         if path.suffix.lower() != ".csv":
             raise
         allowed = "a voltage (position,voltage or time,voltage) or the table of a sweep; measurements: "
-        allowed += "`ev.MeasuredCurve.from_csv`, heights and friction: `evfem texture import`"
+        allowed += "`ev.MeasuredCurve.from_csv`, heights: `ev.Profile.from_csv`, `evfem texture import`"
         raise InputError("path", error.given, allowed) from None
 
 

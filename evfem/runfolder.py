@@ -376,8 +376,6 @@ def write_sensitivities(found: Sensitivities, folder: Path) -> Path:
     """Write `sensitivities.csv` and a picture of the last step into a folder; returns the table's path."""
     from evfem.plotting.response import tornado
 
-    with disk(f"write to {folder}"):
-        folder.mkdir(parents=True, exist_ok=True)
     found.to_csv(table := folder / "sensitivities.csv")
     for column in (*FORCES, *found.columns):
         if column in found.columns and np.isfinite(list(found.effects(column)[0].values())).any():
@@ -390,8 +388,6 @@ def write_impedance(found: Impedance, folder: Path) -> Path:
     """Write `impedance.csv` and its picture into a folder; returns the table's path."""
     from evfem.plotting.response import impedance
 
-    with disk(f"write to {folder}"):
-        folder.mkdir(parents=True, exist_ok=True)
     found.to_csv(table := folder / "impedance.csv")
     _save(impedance(found).figure, folder / "impedance.png")
     return table

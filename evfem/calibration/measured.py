@@ -160,6 +160,8 @@ class MeasuredCurve:
         if columns is None and not {over, *others} <= {*NUMBERS}:
             allowed = 'columns of the history, or columns={"indentation": %s, "normal_force": %s}'
             raise InputError("data", given, allowed % tuple(map(readable, (over, *others))))
+        for name in {over, *others} - {*NUMBERS}:
+            raise unknown("data.columns", name, list(NUMBERS), f"{quoted(name)}, no column")
         found = []
         for name, of in zip((over, *others, "sd"), (over, *others, *others), strict=True):
             if name in wanted:  # per mm of depth, or in all

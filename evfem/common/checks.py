@@ -32,7 +32,8 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     1.0
     """
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(key, quoted(value), allowed)
+        bare = isinstance(value, str) and allowed.lstrip("-")[:1].isdigit()  # a range that says not of what
+        raise InputError(key, quoted(value), f"a number, {allowed}" if bare else allowed)
     try:
         number = float(value)
     except OverflowError:  # an integer beyond all floats

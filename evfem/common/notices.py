@@ -11,7 +11,7 @@ import shutil
 import sys
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any, TextIO
 
@@ -129,6 +129,8 @@ def check_observers(observers: Sequence[object]) -> None:
     allowed = (
         "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint), finished(result)"
     )
+    if not isinstance(observers, Iterable):
+        raise InputError("observers", quoted(observers), f"a list of observers, each {allowed}")
     for i, observer in enumerate(observers):
         if not any(hasattr(observer, event) for event in ("started", "step", "finished")):
             raise InputError(f"observers[{i}]", quoted(observer), allowed)

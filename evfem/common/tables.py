@@ -163,6 +163,12 @@ class Headed:
     columns: list[Floats]
     commas: bool
 
+    @property
+    def start(self) -> str:
+        """Its header in words."""
+        bare = self.names == [str(i) for i in range(1, len(self.names) + 1)]
+        return "has no header" if bare else f"starts with {','.join(self.names)[:60]!r}"
+
     def column(self, key: str, given: int | str, bases: Collection[str | None]) -> Floats:
         """A column by its name or its number from 1, in one of the units `bases`."""
         called = [*self.names, *map(str, range(1, len(self.names) + 1))]
@@ -180,11 +186,13 @@ class Headed:
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
     """Columns of a text with exactly the names `header` and a number everywhere, in mm, s and V."""
     allowed = f"a readable csv file with the header {','.join(header)}"
+    if path.suffix == ".json":
+        allowed += f"; the rows of a texture stand in {path.stem}.csv"
     table = read_headed(path, key, allowed, gaps=False)
     if table.names != header:
-        bare = table.names == [str(i) for i in range(1, len(table.names) + 1)]
-        start = "has no header" if bare else f"starts with {','.join(table.names)[:60]!r}"
-        raise InputError(key, f"{path.name}, which {start}", allowed)
+        raise InputError(
+            key, f"{path.name}, which {table.start}", f"{allowed}, or {' [UNIT],'.join(header)} [UNIT]"
+        )
     return [table.column(f"{key}.{name}", name, (IN.get(name),)) for name in header]
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from evfem.common.checks import between, check_fields, instance, one_of, set_frozen, truth
 from evfem.common.views import short
-from evfem.errors import ABSENT, InputError, Mistakes, quoted
+from evfem.errors import ABSENT, InputError, Mistakes, quoted, unknown
 from evfem.finger.layers import NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.scan import RidgeScan, ScannedRidges, is_texture
@@ -62,6 +62,9 @@ RESOLUTIONS: Mapping[str, Divisions] = {
 
 def _ridges(key: str, value: Any) -> Any:
     """True, False, or a scan: what a file has in `ridge_scan`."""
+    if isinstance(value, str):
+        patterns = 'patterns and prints are those of a Fingertip (kind = "fingertip"), scans are `ridge_scan`'
+        raise InputError(key, quoted(value), f"true | false; {patterns}")
     return value if isinstance(value, RidgeScan) or is_texture(value) else truth(key, value)
 
 
@@ -274,7 +277,7 @@ class MeshedFinger:
                 )
         for name in self.materials:
             if name not in names:
-                raise InputError(f"finger.materials.{name}", "no such region", " | ".join(names))
+                raise unknown(f"finger.materials.{name}", name, tuple(names), "no such region")
 
     def mesh(self, order: int = 2) -> Mesh:
         """The mesh with cells of `order` 1 or 2; a linear mesh is raised with straight edges."""

@@ -12,7 +12,7 @@ from evfem import data
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, between, choice, number, set_frozen, whole
 from evfem.common.views import called, changed, short, table
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, quoted, unknown
 from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
 from evfem.finger.outline import Ridges
 from evfem.mesh.mesh import Mesh
@@ -183,7 +183,7 @@ class LayeredFinger:
         laws = self._usual
         for name in self.materials:
             if name not in laws:
-                raise InputError(f"finger.materials.{name}", "no such region", " | ".join(laws))
+                raise unknown(f"finger.materials.{name}", name, tuple(laws), "no such region")
         set_frozen(self, materials=laws | dict(self.materials))
 
     @property

@@ -114,7 +114,7 @@ def _check_material(key: str, law: Any, dim: int) -> None:
             raise InputError(key, given, f"an array of shape {expected}, with a value for every point")
     name, method = next(iter(methods.items()), ("", law))  # P where there are both
     if not name:
-        split(law, dim)  # says what a material is
+        split(law, dim, key)  # says what a material is
     _check_complex(key, f"{name}(F)", method, F[..., 1:, :])
     P = np.asarray(method(F)) if name == "P" else complex_step(method, F, rank=2)
     _check_rest(key, P[..., 0, 0], float(np.abs(P[..., 1, 0] - P[..., 0, 0]).max()) / STRAIN)

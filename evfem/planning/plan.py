@@ -149,6 +149,11 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         raise InputError("motion", ABSENT, f"at least one of {names}")
     check_parts(scene, mesh.dim)
     check_space(scene, mesh)
+    if scene.output.probes:
+        from evfem.scene.probes import points_of
+
+        for name, one in scene.output.probes.items():
+            points_of(f"output.probes.{name}", one, mesh)
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
             raise InputError(
@@ -217,8 +222,9 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
 def _contact(scene: Scene) -> Term:
     shape = "a flat surface" if scene.ground.is_flat else "a textured surface: its slope and curvature enter"
     if cells := getattr(scene.finger, "ridge_cells", 0.0):
-        error = f"{100.0 * area_error(cells):.2g} %"
-        shape += f"; with {cells:g} cells per ridge the real contact area is known to {error}"
+        error = 100.0 * area_error(cells)
+        known = f"known to {error:.2g} %" if error < 100.0 else "not known"
+        shape += f"; with {cells:g} cells per ridge the real contact area is {known}"
     return Term("contact", True, shape + _giving_way(scene))
 
 

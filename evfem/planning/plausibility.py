@@ -37,6 +37,8 @@ THIN = 1.0
 SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.95, 0.2, 20.0
 #: stiffness against a change of volume over that in shear, of tissue in which elements lock: nu = 0.499995
 LOCKED = 1e5
+#: length (mm) of a sampled profile, at least, where it has more points than a step or a bump needs
+SHORTEST, FEW = 0.15, 20
 #: field (V/um) that breaks any solid down
 BREAKDOWN = 300.0
 #: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
@@ -58,6 +60,7 @@ def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[
         *_small(scene),
         *_large(scene, mesh, min(moduli.values())),
         *_other_units(scene, mesh),
+        *_at_rest(scene),
         *_breakdown(scene),
         *_unbearable(scene),
         *_hovering(scene, mesh),
@@ -115,9 +118,20 @@ def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
             slow = f"motion {i} slides at {course.speed:g} mm/s, slower than any finger explores"
             yield f"{slow}: speeds are in mm/s, not in m/s"
     if isinstance(scene.ground, Profile):
+        length = float(np.ptp(scene.ground.x))
+        if length < SHORTEST and scene.ground.x.size > FEW:
+            yield f"the profile is {length:.3g} mm long: lengths are in mm, not in m"
         slope = np.diff(scene.ground.samples) / np.diff(scene.ground.x)
         if (rms := float(np.sqrt(np.mean(slope**2)))) > STEEPEST:
             yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
+
+
+def _at_rest(scene: Scene) -> Iterator[str]:
+    """Branches that nothing loads in time."""
+    givers = (scene.finger, *scene.finger.materials.values())
+    timed = any(motion.timed for motion in scene.motion)
+    if timed and not scene.solver.timed and any(getattr(one, "relaxation", None) for one in givers):
+        yield 'tissue relaxes with dynamics = "viscous" or "inertial" alone: here its branches do nothing'
 
 
 def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:

@@ -356,7 +356,11 @@ def _over(results: labels.Results, over: str | None) -> tuple[dict[str, Result],
 
 def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, label: str) -> Axes:
     lines = [(along(one, over, over), along(one, column, over), look) for one, look in figures.styled(found)]
-    return _marked(figures.curves(ax, lines, "", label), over, *found.values())
+    ax = figures.curves(ax, lines, "", label)
+    largest = max(float(np.abs(labels.values_of(one, "normal_force")).max()) for one in found.values())
+    if column.endswith("force") and all(np.abs(y).max() <= ZERO * largest for _, y, _ in lines):
+        ax.set_ylim(-largest, largest)  # what rounding leaves is no curve
+    return _marked(ax, over, *found.values())
 
 
 def _of_presses(result: Result, *columns: str) -> list[Any]:

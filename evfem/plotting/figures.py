@@ -18,6 +18,10 @@ from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -37,6 +41,8 @@ TISSUE, GROUND, EDGE = "#EFEBE7", "#D0D0D0", "0.25"
 FILES_ONLY = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
 WIDTH, HEIGHT = 7.0, 4.5  # of a figure, in inches
 SLENDER = 25.0  # height of a colour bar over its width
+#: triangles of smooth colours in a picture, and parts of a side of one, at most
+PARTS, FINEST = 40_000, 6
 #: x, y and look of a curve
 Line = tuple[Any, Any, Mapping[str, Any]]
 
@@ -97,6 +103,24 @@ def curves(ax: Axes | None, lines: Sequence[Line], xlabel: str, ylabel: str) -> 
     if len(lines) > 1:
         ax.legend()
     return ax
+
+
+def shaded(ax: Axes, points: Floats, triangles: Ints, values: Floats) -> Any:
+    """Colours of values at points (P, 2) that are linear in each triangle (T, 3). The shading of a triangle
+    is linear between the colours of its corners, which is another colour: large ones are drawn in parts.
+    """
+    from matplotlib.tri import Triangulation
+
+    n = int(np.clip(np.sqrt(PARTS / len(triangles)), 1, FINEST))
+    i, j = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)]).T
+    number = {place: k for k, place in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
+    up = [[(a, b), (a + 1, b), (a, b + 1)] for a, b in number if a + b < n]
+    down = [[(a + 1, b), (a + 1, b + 1), (a, b + 1)] for a, b in number if a + b < n - 1]
+    parts = np.array([[number[place] for place in part] for part in up + down])
+    corners = np.column_stack([points, values])[triangles]
+    x, y, value = np.einsum("mk,tkc->ctm", np.column_stack([n - i - j, j, i]) / n, corners).reshape(3, -1)
+    own = parts + i.size * np.arange(len(triangles))[:, None, None]
+    return ax.tripcolor(Triangulation(x, y, own.reshape(-1, 3)), value, shading="gouraud")
 
 
 def whole_figure(ax: Axes) -> Figure:

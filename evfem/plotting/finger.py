@@ -256,12 +256,9 @@ def _draw_tissue(
         mapped: Any = PolyCollection(list(outlines), array=array, edgecolors="face", linewidths=0.3)
         ax.add_collection(mapped)
     else:
-        from matplotlib.tri import Triangulation
-
         pieces = fields.patches(mesh)
         array = pieces.averages(values, fields.areas(outlines)) if of_cells else values[pieces.nodes]
-        x, y = points[pieces.nodes].T
-        mapped = ax.tripcolor(Triangulation(x, y, pieces.triangles), array, shading="gouraud")
+        mapped = figures.shaded(ax, points[pieces.nodes], pieces.triangles, array)
     scale.apply(mapped)
     mapped.set_rasterized(True)
     return mapped

@@ -18,7 +18,7 @@ from evfem.common.checks import choice
 from evfem.errors import InputError
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.plotting.fields import TRACTIONS, Scale, Window, frame_of, values_of, within
-from evfem.plotting.figures import TISSUE
+from evfem.plotting.figures import TISSUE, shaded
 from evfem.plotting.finger import Near, checked_window, picture
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 from evfem.surface.skin import Skin, make_skin
@@ -135,15 +135,12 @@ class SkinView:
 
     def _draw(self, ax: Axes, faces: Ints) -> Any:
         """Smooth colours in triangles through all nodes."""
-        from matplotlib.tri import Triangulation
-
         triangles, values = np.concatenate([faces[:, fan] for fan in FANS[faces.shape[1]]]), self.values
-        x, z = self.position[:, 0], self.position[:, 2]
         if self.field in TRACTIONS:
             triangles = triangles[(values[triangles] != 0.0).any(axis=1)]
         if not len(triangles):
             return ax.scatter([], [], c=[])
-        return ax.tripcolor(Triangulation(x, z, triangles), values, shading="gouraud")
+        return shaded(ax, self.position[:, ::2], triangles, values)
 
     def _draw_shares(self, ax: Axes, faces: Ints) -> Any:
         from matplotlib.collections import PolyCollection
@@ -155,7 +152,7 @@ class SkinView:
             shares.append(np.einsum("qm,kmc->kqc", value, self.position[faces][..., ::2]))
             values.append(self.values[faces[:, node]])
         array = np.concatenate(values).astype(float)
-        mapped = PolyCollection(list(np.concatenate(shares)), array=array, edgecolors="face", linewidths=0.2)
+        mapped = PolyCollection(list(np.concatenate(shares)), array=array, edgecolors="face", linewidths=0.5)
         return ax.add_collection(mapped)
 
 

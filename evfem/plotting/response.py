@@ -81,8 +81,9 @@ def impedance(found: Impedance | Mapping[str, Impedance]) -> Panels:
     curves(upper, sizes, "", f"magnitude ({units.pop()})")
     curves(lower, phases, "frequency (Hz)", "phase (degrees)")
     upper.set(xscale="log", yscale="log")
-    lower.set_yticks(np.arange(-180, 181, 45))
     degrees = np.concatenate([y for _, y, _ in phases])
+    if np.ptp(degrees) > 60.0:
+        lower.set_yticks(np.arange(-180, 181, 45))
     lower.set_ylim(max(-185.0, degrees.min() - 10.0), min(185.0, degrees.max() + 10.0))
     if (legend := lower.get_legend()) is not None:
         legend.remove()

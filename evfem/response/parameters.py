@@ -18,7 +18,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import fields_of
-from evfem.errors import InputError, quoted, unknown
+from evfem.errors import ABSENT, InputError, quoted, unknown
 from evfem.mesh.mesh import Mesh, raised
 from evfem.planning.plan import scene_mesh
 from evfem.scene import file as scenefile
@@ -227,6 +227,8 @@ def _part(owner: Any, step: str, key: str) -> Any:
             raise InputError(f"parameters.{key}", step, f"numbers from 0 to {len(owner) - 1}")
         return owner[int(step)]
     attribute = _field(owner, step)
+    if attribute is None and not hasattr(owner, "__dict__"):  # a number, or a part that is not there
+        raise InputError(f"parameters.{key}", ABSENT, NUMBER)
     if attribute is None:
         names = [spec.name for spec in fields(owner)] if is_dataclass(owner) else sorted(vars(owner))
         raise unknown(f"parameters.{key}", step, tuple(names))

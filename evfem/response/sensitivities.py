@@ -52,7 +52,7 @@ from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.contact.signorini import OPEN
 from evfem.electrostatics.laws import traction_derivative
-from evfem.errors import InputError, unknown
+from evfem.errors import InputError, quoted, readable, unknown
 from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
 from evfem.newton.control import FollowFriction, Target, Unsupported
 from evfem.newton.state import State
@@ -235,11 +235,13 @@ class Sensitivities:
 
     def __getitem__(self, which: tuple[str, str]) -> Floats:
         """The derivative (steps,) of a column by a parameter."""
+        if isinstance(which, str):
+            raise InputError("derivative", quoted(which), "found[column, parameter]")
         column, parameter = which
         if parameter not in self.parameters:
-            raise unknown("parameter", str(parameter), tuple(self.parameters))
+            raise unknown("parameter", str(parameter), tuple(self.parameters), readable(parameter))
         if column not in self.columns:
-            raise unknown("column", str(column), self.columns)
+            raise unknown("column", str(column), self.columns, readable(column))
         return self.values[column, parameter]
 
     @property
@@ -297,9 +299,10 @@ class Sensitivities:
 
     def __repr__(self) -> str:
         """The parameters by the relative change of normal and tangential force at the end."""
-        lines = [f"Sensitivities of {len(self.result.step)} steps, d ln force / d ln parameter at the end:"]
+        lines = [f"Sensitivities of {len(self.result.step)} steps, d ln column / d ln parameter at the end:"]
+        known = [name for name in self.columns if name not in self.reasons]
+        names = [name for name in known if name in ("normal_force", "tangential_force")] or known
         for key in self.parameters:
-            names = [name for name in ("normal_force", "tangential_force") if name in self.columns]
             shares = [f"{name} {self.elasticity[name, key][-1]:.4g}" for name in names]
             lines.append(f"  {key}: {', '.join(shares)}")
         return "\n".join(lines)
@@ -365,6 +368,8 @@ def sensitivities(
     _check(scene)
     single = isinstance(parameters, str) or hasattr(parameters, "applied")
     given = [parameter_of(scene, each) for each in ([parameters] if single else parameters)]
+    if not given:
+        raise InputError("parameters", "no keys", "dotted keys of the scene, and ShapeChange objects")
     known = {one.name: one for one in given}
     with blas_limits(), notices.shown(progress):
         wanted = _columns(scene_mesh(scene)[0].dim, columns)
@@ -395,7 +400,7 @@ def _columns(dim: int, columns: str | Sequence[str] | None) -> tuple[str, ...]:
     numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
     for name in columns or ():
         if name not in numbers:
-            raise unknown("columns", str(name), numbers)
+            raise unknown("columns", str(name), numbers, readable(name))
     return numbers if columns is None else tuple(columns)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from evfem.common.checks import MOST_STEPS
 from evfem.electrostatics.laws import FORCE_LAWS
-from evfem.errors import ABSENT, InputError, Mistakes, StorageError
+from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.newton.hand import Hand
@@ -77,7 +77,8 @@ def tables_of(key: str, text: str) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML") from error
+        several = "; each motion is a table [[motion]]" if "'motion'" in str(error) else ""
+        raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML{several}") from error
     if type(version := tables.get("version", ABSENT)) is not int or version != VERSION:
         given = ABSENT if version is ABSENT else shown(version)
         raise InputError("version", given, f"version = {VERSION}")
@@ -212,9 +213,9 @@ def _parametric(table: Mapping[str, Any], folder: Path) -> Any:
     with mistakes.of_a_part(), at("finger"):
         if "participant" in table:
             sizes = cls.sizes_of(table["participant"])
-    if isinstance(laws := table.get("materials"), Mapping):
-        table = {**table, "materials": {name: _completed(name, law) for name, law in laws.items()}}
     with mistakes.of_a_part():
+        if isinstance(laws := table.get("materials"), Mapping):
+            table = {**table, "materials": {name: _completed(name, law) for name, law in laws.items()}}
         beside = [*names(Measured, BesideFinger), "mesh"]
         found = read(cls, {**sizes, **table}, "finger", folder, tag="kind", beside=beside, homes=HOMES)
     mistakes.report()
@@ -223,6 +224,8 @@ def _parametric(table: Mapping[str, Any], folder: Path) -> Any:
 
 def _completed(name: str, table: Any) -> Any:
     """A layer of Table 2 whose table names no law is neo-Hookean, and keeps the moduli it does not name."""
-    if not isinstance(table, Mapping) or "law" in table or name not in TABLE_2:
+    if not isinstance(table, Mapping) or "law" in table:
         return table
+    if name not in TABLE_2:
+        raise unknown(f"finger.materials.{name}", name, tuple(TABLE_2), "no such region")
     return {"law": "neo_hookean", **TABLE_2[name]._asdict(), **table}

@@ -118,7 +118,8 @@ def check_size(key: str, path: Path, most: int) -> None:
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
         reason = getattr(error, "strerror", None) or "no path"
         given, allowed = f"{shown(str(path))} ({reason})", "a file that exists and can be read"
-        close = near(path.name, _beside(path))
+        beside = _beside(path)
+        close = [one for one in beside if one == f"{path.name}.toml"] or near(path.name, beside)
         raise InputError(key, given, f"{close[0]}? ({allowed})" if close else allowed) from error
     if not path.is_file():
         raise InputError(key, f"{path}, which is no file", "a file")

@@ -229,7 +229,7 @@ class Probes:
         self.space, mesh = tissue.space, tissue.space.mesh
         places, layers = [], []
         for name, one in wanted.items():
-            points, layer = _points_of(f"output.probes.{name}", one, mesh)
+            points, layer = points_of(f"output.probes.{name}", one, mesh)
             places.append(points)
             layers += [layer] * len(points)
         self.place = np.concatenate(places)
@@ -374,7 +374,7 @@ class Cells:
         return int(near[best]), xi[best]
 
 
-def _points_of(key: str, one: Any, mesh: Mesh) -> tuple[Floats, str | None]:
+def points_of(key: str, one: Any, mesh: Mesh) -> tuple[Floats, str | None]:
     """The points (P, d) of a probe, and the layer that they belong to where it says so."""
     if not isinstance(one, Probe):
         points = np.array(one)

@@ -7,11 +7,11 @@ outline at the start.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import Annotated, Any, Protocol, runtime_checkable
+from typing import Annotated, Any, Protocol, cast, runtime_checkable
 
 from evfem.common.checks import Within, check_fields, number, one_of, real, set_frozen, yes_or_no
 from evfem.common.digest import digest
@@ -78,7 +78,8 @@ class Motions:
         return () if scene is None else vars(scene)["motion"]
 
     def __set__(self, scene: Scene, motions: Motion | Sequence[Motion]) -> None:
-        vars(scene)["motion"] = (motions,) if isinstance(motions, Motion) else tuple(motions)
+        one = isinstance(motions, (str, type)) or not isinstance(motions, Iterable)
+        vars(scene)["motion"] = (motions,) if one else tuple(cast(Iterable[Motion], motions))
 
 
 @dataclass(frozen=True)
@@ -220,7 +221,7 @@ def _volts(voltage: object) -> str:
 
 def _check_parts(scene: Scene) -> None:
     if not isinstance(scene.finger, Finger):
-        raise InputError("finger", quoted(scene.finger), "a FingerPad or a MeshedFinger")
+        raise InputError("finger", quoted(scene.finger), "a FingerPad, a Fingertip or a MeshedFinger")
     real("finger.viscosity", scene.finger.viscosity, "a relaxation time in s, not negative", lambda t: t >= 0)
     completed(scene.surface)
     if not isinstance(scene.solver, Solver):

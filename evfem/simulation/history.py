@@ -180,14 +180,14 @@ def over_depth(columns: Mapping[str, Any], depth: float) -> dict[str, Any]:
 
 def load_drift(rows: Sequence[Row]) -> float:
     """Largest relative change of the load, `applied_force`, since the last press to a positive one,
-    in rows that still have its indentation; 0 without such rows.
+    in rows that still have its indentation and do not wait, as tissue then relaxes; 0 without such rows.
 
     >>> held = {"motion": "slide", "indentation": 0.5, "applied_force": 0.06}
     >>> round(load_drift([held | {"motion": "press", "applied_force": 0.05}, held]), 3)
     0.2
     """
     largest, pressed = 0.0, None
-    for row in rows:
+    for row in (one for one in rows if one["motion"] != "wait"):
         if row["motion"] in ("press", "hover"):
             pressed = row if row["motion"] == "press" and row["applied_force"] > SAME else None
         elif pressed is not None and abs(row["indentation"] - pressed["indentation"]) <= SAME:

@@ -116,8 +116,9 @@ class Table(Heights, kind="csv"):
         quantity = _quantity_of(table.names)
         if quantity is None:
             headers = " | ".join(",".join(header) for header, _ in QUANTITIES.values())
-            given = f"{path.name}, which starts with {','.join(table.names)[:60]!r}"
-            return self._scanned(path, InputError("file", given, headers), table.names[0] == "1")
+            given = f"{path.name}, which {table.start}"
+            refusal = InputError("file", given, f"{headers}, so called in the file")
+            return self._scanned(path, refusal, table.names[0] == "1")
         used = [[_usual(name) for name in table.names].index(name) for name in QUANTITIES[quantity][0]]
         first, second = (table.columns[i] * _scale(table.names[i], table.units[i], self.unit) for i in used)
         lengths = [(table.names[i], table.units[i]) for i in used if table.names[i] not in PURE]
@@ -280,8 +281,7 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
     else:
         table = read_headed(path, "file")
         if table.names[0] != "time":
-            given = f"{path.name}, which starts with {table.names[0]!r}"
-            raise InputError("file", given, "a column time first")
+            raise InputError("file", f"{path.name}, which {table.start}", "a column time first")
         time = table.column("time", 1, ("s",))
         if time.size < 16 or not is_even(time):
             raise InputError("time", f"{time.size} rows", "at least 16 rows at an even spacing in s")

@@ -98,7 +98,7 @@ class Heights(Importer):
             notes.append(f"Cut to {start:g} ... {min(stop, float(np.ptp(x))):g} mm.")
         if inside.sum() < 4:
             given = f"{inside.sum()} of {x.size} points"
-            raise InputError("start, stop", given, "a cut that leaves at least four points")
+            raise InputError("start, stop", given, "at least four points in what is left")
         x, height = x[inside] - x[inside][0], height[inside]
         known = np.isfinite(height)
         if missing := int((~known).sum()):

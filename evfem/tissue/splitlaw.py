@@ -183,11 +183,11 @@ class FormLaw:
         return np.full(theta.shape, np.nan)
 
 
-def split(law: Any, dim: int = 2) -> SplitLaw:
+def split(law: Any, dim: int = 2, key: str = "material") -> SplitLaw:
     """The law itself if it has the split form, else a `FormLaw` around a form, in `dim` dimensions
     at the origin, or a `UserLaw` around `P(F)` or `psi(F)`.
 
-    Raises `InputError` for an object that has none of them.
+    Raises `InputError` with `key` for an object that has none of them.
     """
     if isinstance(law, SplitLaw):
         return law
@@ -195,7 +195,7 @@ def split(law: Any, dim: int = 2) -> SplitLaw:
         return cast(SplitLaw, FormLaw(law, SimpleNamespace(x=np.zeros((dim, 1, 1)), n=None, law=None)))
     if not (hasattr(law, "P") or hasattr(law, "psi")):
         allowed = "a law of evfem, a form, or an object with a method P(F) or psi(F)"
-        raise InputError("material", quoted(law), allowed)
+        raise InputError(key, quoted(law), allowed)
     return cast(SplitLaw, UserLaw(law))
 
 

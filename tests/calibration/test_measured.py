@@ -102,6 +102,8 @@ def test_a_file_as_machines_write_it(tmp_path, coding, columns):
     loading = MeasuredCurve.from_csv(path, 0, columns=chosen, zero=0.5, branch="loading", depth=10.0)
     np.testing.assert_allclose(loading.at, [0.0, 0.2, 0.4], atol=1e-15)
     np.testing.assert_allclose(loading.values, [1e-4, 9e-4, 36e-4])  # mN over 10 mm
+    with pytest.raises(InputError, match=r'data\.columns: given "travel", no column; allowed: step, '):
+        MeasuredCurve.from_csv(path, 0, columns={"travel": 2, "normal_force": 3})
     unloading = MeasuredCurve.from_csv(path, 1, columns=chosen, branch="unloading")
     assert unloading.at.tolist() == [0.9, 0.89, 0.69]
     np.testing.assert_allclose(unloading.values, [0.036, 0.035, 0.008])

@@ -229,7 +229,8 @@ def test_a_wrong_number_gets_the_sentence_of_its_parameter(name):
     for value in ("abc", None, True, low - 0.3, high + 0.3, float("nan"), float("-inf")):
         with pytest.raises(InputError) as caught:
             FingerPad(**{name: value})
-        expected = f"finger.{name}: given {readable(value)}; allowed: {low:g} to {high:g} {unit}"
+        of_what = "a number, " if value == "abc" else ""
+        expected = f"finger.{name}: given {readable(value)}; allowed: {of_what}{low:g} to {high:g} {unit}"
         assert str(caught.value) == expected.rstrip().replace("pitches", UNITS.get(name, "pitches"))
 
 
@@ -242,6 +243,8 @@ def test_meshed_finger_raises_its_mesh_and_wants_every_material():
     assert len(finger.mesh(2).node_sets["pad"]) == 2 * len(linear.node_sets["pad"]) - 1
     with pytest.raises(InputError, match=r"finger\.materials\.nail"):
         MeshedFinger(linear, {name: law for name, law in laws.items() if name != "nail"})
+    with pytest.raises(InputError, match=r"no such region; allowed: nail\? \("):
+        MeshedFinger(linear, {**laws, "Nail": laws["nail"]})
     with pytest.raises(InputError, match="no such region"):
         MeshedFinger(linear, {**laws, "skin": laws["nail"]})
     with pytest.raises(InputError, match=r"solver\.element"):

@@ -148,5 +148,5 @@ def test_a_texture_of_heights_gives_ridges_below_the_middle(relief):
     slippery = ev.Texture("a", "measured", [0.0, 1.0], [0.3, 0.4], "CC0-1.0", quantity="friction")
     with pytest.raises(InputError, match="ridges: given a texture of friction; allowed: a texture of"):
         FingerPad(ridges=slippery)
-    with pytest.raises(InputError, match=r'^finger\.ridges: given "yes"; allowed: true \| false$'):
+    with pytest.raises(InputError, match=r'^finger\.ridges: given "yes"; allowed: true \| false; patterns'):
         FingerPad(ridges="yes")

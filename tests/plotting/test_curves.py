@@ -196,6 +196,13 @@ def test_a_signal_stands_above_the_friction_that_it_makes():
     assert below.get_xlabel() == "position of the bone (mm)"
 
 
+def test_forces_that_rounding_leaves_are_no_curve():
+    one = fake_result()
+    resting = replace(one, applied_tangential_force=1e-15 * one.normal_force)
+    _, below = signal(resting)
+    assert below.get_ylim()[1] == pytest.approx(np.abs(one.normal_force).max())
+
+
 def test_a_spectrum_is_that_of_the_waiting_finger_without_its_mean():
     time = np.arange(1, 41) * 0.005  # 0.2 s: lines every 5 Hz up to 100 Hz
     force = 1.0 + 0.25 * np.sin(2.0 * np.pi * 20.0 * time)

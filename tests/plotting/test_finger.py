@@ -10,7 +10,7 @@ from tools.fakes import fake_result
 from tools.meshes import KINDS, square_mesh
 
 import evfem as ev
-from evfem.plotting import FIELDS, contact_pressure, deformed, regions, side_by_side
+from evfem.plotting import FIELDS, contact_pressure, deformed, figures, regions, side_by_side
 from evfem.plotting.fields import patches, scale_of
 from evfem.scene.file import dump
 from evfem.simulation.model import placed
@@ -85,8 +85,29 @@ def test_a_flat_nodal_field_is_the_mean_of_each_cell():
     np.testing.assert_allclose(ax.collections[0].get_array(), means)
 
 
+@pytest.fixture
+def undivided(monkeypatch):
+    monkeypatch.setattr(figures, "FINEST", 1)
+
+
+def test_large_triangles_of_smooth_colours_are_drawn_in_parts():
+    """A linear field stays linear, on the same area: no colour is mixed from those of far corners."""
+    points, corners = (
+        np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0]]),
+        np.array([[0, 1, 2], [1, 3, 2]]),
+    )
+    drawn = figures.shaded(figures.new_figure().subplots(), points, corners, points @ [3.0, -1.0] + 0.5)
+    mesh, values = drawn._triangulation, drawn.get_array()
+    assert len(mesh.triangles) == 2 * figures.FINEST**2
+    np.testing.assert_allclose(values, 3.0 * mesh.x - mesh.y + 0.5)
+    x, y = mesh.x[mesh.triangles], mesh.y[mesh.triangles]
+    twice = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    np.testing.assert_allclose(np.abs(twice), 4.0 / figures.FINEST**2)
+    assert np.ptp(values[mesh.triangles], axis=1).max() < 1.01 * np.ptp(values) / figures.FINEST
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_smooth_colours_are_averages_by_area_within_each_region(kind):
+def test_smooth_colours_are_averages_by_area_within_each_region(kind, undivided):
     """By hand, node by node: the cells of the same region around it, weighted by their areas."""
     result = fake_result(kind)
     mesh, frame = result.mesh, result.frames[-1]
@@ -110,7 +131,8 @@ def test_smooth_colours_are_averages_by_area_within_each_region(kind):
     region[pieces.cells[mesh.region == 1]] = 1
     assert len(wanted) == len(pieces.nodes)
     keys = zip(pieces.nodes.tolist(), region.tolist(), strict=True)
-    np.testing.assert_allclose(drawn.get_array(), [wanted[key] for key in keys])
+    values = np.array([wanted[key] for key in keys])
+    np.testing.assert_allclose(drawn.get_array(), values[pieces.triangles].ravel())
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -125,11 +147,12 @@ def test_triangles_cover_the_cells_once(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_smooth_nodal_fields_are_the_nodal_values(kind):
+def test_smooth_nodal_fields_are_the_nodal_values(kind, undivided):
     result = fake_result(kind)
     drawn = deformed(result, "displacement").collections[0]
-    nodes = patches(result.mesh).nodes
-    np.testing.assert_array_equal(drawn.get_array(), np.hypot(*result.frames[-1].displacement.T)[nodes])
+    pieces = patches(result.mesh)
+    corners = pieces.nodes[pieces.triangles].ravel()
+    np.testing.assert_array_equal(drawn.get_array(), np.hypot(*result.frames[-1].displacement.T)[corners])
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -53,6 +53,23 @@ def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
         ev.plotting.tornado(found, "substeps")
 
 
+def test_what_cannot_be_asked_is_said(path):
+    cases = {
+        "surface.elastic.E": r"parameters\.surface\.elastic\.E: missing",
+        "surface.friction.0": r"parameters\.surface\.friction\.0: missing",
+        (): "parameters: given no keys",
+    }
+    for keys, said in cases.items():
+        with pytest.raises(ev.InputError, match=said):
+            ev.sensitivities(path, keys)
+    with pytest.raises(ev.InputError, match=r'columns: given "tangential"; allowed: tangential_force\?'):
+        ev.sensitivities(path, "surface.friction", "tangential")
+    found = ev.sensitivities(path, "surface.friction", ["contact_width", "external_work"])
+    assert "external_work" in repr(found)
+    with pytest.raises(ev.InputError, match=r"allowed: found\[column, parameter\]"):
+        found["external_work"]
+
+
 def test_uncertainty_of_a_result_is_that_of_its_scene(path):
     sd, columns = {"surface.friction": 0.03}, ["tangential_force"]
     found = ev.uncertainty(ev.simulate(path), sd, columns)
@@ -154,3 +171,11 @@ def test_the_command_of_an_impedance_writes_a_table_and_a_picture(path, capsys):
     assert (out / "impedance.png").stat().st_size > 5000
     assert "Impedance, tangential" in capsys.readouterr().out
     assert main([*asked, "-1"]) == 2
+
+
+def test_a_folder_that_cannot_be_is_told_before_anything_is_computed(path, capsys, monkeypatch):
+    monkeypatch.setattr("evfem.response.sensitivities.sensitivities", None)
+    monkeypatch.setattr("evfem.response.impedance.impedance", None)
+    for asked in (["impedance", "--frequencies", "1"], ["sensitivities", "--by", "surface.friction"]):
+        assert main([asked[0], str(path), "--out", str(path / "out"), *asked[1:]]) == 4
+        assert "cannot use" in capsys.readouterr().err

@@ -146,8 +146,23 @@ def test_lengths_in_metres_are_doubted():
     assert said == "a stratum corneum of 0.00038 mm is thinner than any: lengths are in mm, not in m"
     (said,) = plan(whole(ev.Press(indentation=1.5e-3), ev.Slide(distance=-5e-3))).warnings
     assert said == "a finger of 16.68 mm is moved by 0.005 mm at most: lengths are in mm, not in m"
+    x = np.linspace(-0.01, 0.01, 50)
+    scan = ev.Profile(x, 1e-6 * np.sin(3e3 * x))
+    said = plan(ev.Scene(ev.FingerPad(resolution="coarse"), scan, motion=PRESS)).warnings
+    assert "the profile is 0.02 mm long: lengths are in mm, not in m" in said
     assert plan(whole(ev.Press(force=0.05), ev.Slide(distance=0.05))).warnings == ()
     assert plan(whole(ev.Press(force=0.05))).warnings == ()
+
+
+def test_branches_that_no_time_loads_are_doubted():
+    finger = ev.FingerPad(resolution="coarse", ridges=False, relaxation=[(0.8, 0.04)])
+    rest = ev.Scene(finger, ev.Flat(), motion=[PRESS, ev.Wait(1.0, steps=2)])
+    assert plan(rest).warning.endswith("alone: here its branches do nothing")
+    assert plan(replace(rest, solver=ev.Solver(dynamics="viscous"))).warnings == ()
+    assert plan(replace(rest, motion=PRESS)).warnings == ()  # as for an impedance
+
+
+# -- slides that never touch -----------------------------------------------------------------------------
 
 
 WEAK = {"law": ev.Kaczmarek(), "voltage": 100.0}

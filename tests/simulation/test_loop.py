@@ -147,6 +147,8 @@ def test_observers_are_told_and_may_stop():
     assert watch.told == [1, (1, True, True), (2, True, True), (3, False, True), 3]
     assert found.provenance["stopped"] == "far enough"
     assert [frame.step for frame in found.frames] == [1, 2, 3]
+    with pytest.raises(ev.InputError, match=r"observers: given .*; allowed: a list of observers"):
+        ev.loop(plane(), observers=watch)
     with pytest.raises(ev.InputError, match=r"observers\[0\]"):
         ev.loop(plane(), observers=[3])
 
