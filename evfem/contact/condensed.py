@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import DenseSolver, Floats, Ints, inverse
+from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
 from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
@@ -71,6 +71,10 @@ class Candidates:
     roughness: Roughness | None = None
     cohesion: Floats | None = None
     slip_stiffness: Floats | None = None
+
+    def __getitem__(self, nodes: Ints) -> Candidates:
+        """These of the candidates alone."""
+        return Candidates(*(None if part is None else part[nodes] for part in vars(self).values()))
 
     def follower_rate(self, own: Floats) -> Floats:
         """Change of the contact force (y, x[, z]) per displacement of its node along x[, z], (c, 1 + d, d),
@@ -172,7 +176,7 @@ class CondensedTangent:
         if key not in self._last:
             rows = self.rows(near)
             self._last.clear()
-            self._last[key] = self.compliance[np.ix_(rows, rows)]
+            self._last[key] = block(self.compliance, rows, rows)
         return self._last[key]
 
     @cached_property
@@ -279,7 +283,7 @@ class LinearContactStep:
         if self.bed is None:
             return self.body.among(near)
         rows = self.body.rows(near)
-        return self.body.among(near) + self.bed.compliance[np.ix_(rows, rows)]
+        return self.body.among(near) + block(self.bed.compliance, rows, rows)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
         """Force (N/mm) that the bone lacks along the first unknown's axis, were its `travel` given."""

@@ -259,7 +259,7 @@ class SurfaceState:
     slope: Floats
     curvature: Floats
 
-    def of(self, nodes: Ints) -> SurfaceState:
+    def __getitem__(self, nodes: Ints) -> SurfaceState:
         """At these of the nodes alone."""
         return SurfaceState(self.gap[nodes], self.slope[nodes], self.curvature[nodes])
 
