@@ -68,7 +68,7 @@ def stability_ratio(step: LinearContactStep, least: float = 0.0) -> StabilityRat
 
 
 def _freed(step: LinearContactStep, nodes: Ints, slipping: Ints, opened: Ints) -> Floats:
-    """Compliance (f, f) of slips and gaps among these nodes, contact held, the bone free where it is loaded."""
+    """Compliance (f, f) of slips and gaps of these nodes, contact held, the bone free where it is loaded."""
     known, bone = step.candidates[nodes], _bone(step, nodes)
     axes, closed, stick = known.surface.axes, np.flatnonzero(known.status != OPEN), known.status == STICK
     C = local(axes, local(axes, step.among(nodes)).T).T + np.diag(_yielding(known).ravel())
