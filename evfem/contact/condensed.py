@@ -93,14 +93,14 @@ class Candidates:
         slips = (self.status == SLIP) & (shear > 0.0)
         return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
 
-    def by_chords(self, near: Ints, compliance: Floats) -> Floats | None:
-        """Coefficients (k,) of `near` nodes by the chords of their friction law, not too steep, or None."""
+    def by_chords(self, compliance: Floats) -> Floats | None:
+        """Coefficients (c,) by the chords of their friction law, not too steep, or None."""
         if self.cohesion is None:
             return None
-        normal, along = np.maximum(self.force[near, 0], 0.0), self.shear_direction[near]
-        n = self.force.shape[1]
-        chord = self.friction[near] + self.cohesion[near] / np.where(normal > 0.0, normal, np.inf)
-        blocks = compliance.reshape(near.size, n, near.size, n)[np.arange(near.size), 0, np.arange(near.size)]
+        normal, along = np.maximum(self.force[:, 0], 0.0), self.shear_direction
+        (c, n), every = self.force.shape, np.arange(len(normal))
+        chord = self.friction + self.cohesion / np.where(normal > 0.0, normal, np.inf)
+        blocks = compliance.reshape(c, n, c, n)[every, 0, every]
         pressed = -blocks[:, 1:] / blocks[:, :1]
         on = np.where(along.any(axis=1), np.sum(pressed * along, axis=1), np.linalg.norm(pressed, axis=1))
         return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
@@ -327,17 +327,17 @@ class LinearContactStep:
         That stiffness may be steep: it multiplies what moves beyond the present forces `held`, which is small
         near the equilibrium, and not the whole free motion.
         """
-        known, rows, dim = self.candidates, self.body.rows(near), self.body.dim
-        follower = FollowerStiffness.of(known.follower_rate(self._own)[near])
+        known, rows, dim = self.candidates[near], self.body.rows(near), self.body.dim
+        follower = FollowerStiffness.of(known.follower_rate(self._own[near]))
         among, own, held = self.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
         W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
-        problem = self._problem(near, (C, W), self._bone_balance(rows, alone, (C, W), follower))
-        rough = None if known.roughness is None else known.roughness.of(near)
-        gap, gain = known.surface.normal_gap[near], known.gain_on_closing[near]
-        attraction = AttractionStiffness(known.negative_stiffness[near], gap, gain, rough)
-        touching = np.where((status != OPEN)[:, None], known.force[near], 0.0).ravel()
+        problem = self._problem(known, (C, W), self._bone_balance(rows, alone, (C, W), follower))
+        attraction = AttractionStiffness(
+            known.negative_stiffness, known.surface.normal_gap, known.gain_on_closing, known.roughness
+        )
+        touching = np.where((status != OPEN)[:, None], known.force, 0.0).ravel()
         try:
             found = solve_with_attraction(problem, attraction, status, touching)
         except ContactNotSolved as error:
@@ -345,18 +345,17 @@ class LinearContactStep:
                 raise Unstable(LOST_STABILITY) from error
             raise
         pressed = (found.force + found.attraction_drop).reshape(-1, dim)
-        force = np.einsum("ka,kab->kb", pressed, known.surface.axes[near]).ravel()
+        force = np.einsum("ka,kab->kb", pressed, known.surface.axes).ravel()
         if follower.loaded.size:
             force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
         return found, force
 
     def _problem(
-        self, near: Ints, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
+        self, known: Candidates, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
     ) -> ContactProblem:
-        """Compliance of the `near` nodes in their frames, which other forces have `moved`."""
-        known, (C, W), extra = self.candidates, moved, None
-        axes = known.surface.axes[near]
-        at_rest = np.column_stack([known.surface.normal_gap[near], known.slip[near]])
+        """Compliance of these nodes in their frames, which other forces have `moved`."""
+        (C, W), extra, axes = moved, None, known.surface.axes
+        at_rest = np.column_stack([known.surface.normal_gap, known.slip])
         if balance is not None:
             row, pivot, right = balance
             own = np.flatnonzero([unknown.condition is not None for unknown in self.unknowns])
@@ -365,11 +364,11 @@ class LinearContactStep:
         return ContactProblem(
             local(axes, W[:, :1])[:, 0] + at_rest.ravel(),
             compliance,
-            known.friction[near],
+            known.friction,
             extra,
-            chords=known.by_chords(near, compliance),
-            cohesion=None if known.cohesion is None else known.cohesion[near],
-            give=known.interface_compliance[near].ravel() if known.interface_compliance.any() else None,
+            chords=known.by_chords(compliance),
+            cohesion=known.cohesion,
+            give=known.interface_compliance.ravel() if known.interface_compliance.any() else None,
             tolerance=self.tolerance,
             dense=self.body.dense,
         )
