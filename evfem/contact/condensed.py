@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
-from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
+from evfem.common.constants import DISC_OWN, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
     OPEN,
@@ -41,11 +41,17 @@ from evfem.contact.signorini import (
 )
 from evfem.contact.solve import solve_with_attraction
 from evfem.surface.pad import SurfaceState
+from evfem.tissue.kernels.blocks import contact_loop
 
 #: y, x and z of a vector (x, y, z), and the other way round
 COMPONENTS = np.array([1, 0, 2])
 #: why there is no solution where the compliance is not positive
 LOST_STABILITY = "the body gives way the more, the more it is loaded"
+
+
+#: displacements, forces on the body (dim c,), contact forces (c, dim), statuses (c,), extra unknowns (p,),
+#: linear systems solved, whether the attraction was scaled down
+Settled = tuple[Floats, Floats, Floats, Ints, Floats, int, bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,29 +251,14 @@ class LinearContactStep:
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(free[:, 0] + self.seen @ self._present)
-        status, solves = self.candidates.status.copy(), 0
+        status = self.candidates.status
         own = np.diagonal(self.seen)[1 :: self.body.dim]
         # in contact, in the surface, or attracted with a feedback on the node itself
-        near = np.flatnonzero(
-            (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
-        )
-        if not near.size:  # the dense problem has at least one node: the one with the smallest gap
-            near = np.array([np.argmin(gap)])
-        while True:  # solve on the near nodes, join those that sink in, until none does
-            found, pushed = self._solve_near(near, free, alone, status[near])
-            solves += found.solves
-            status[near] = found.status
-            whole = np.zeros(free.shape[0])
-            whole[self.body.rows(near)] = pushed
-            moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
-            gap = normal_gap + self._along_normal(moved)
-            gap[near] = 0.0  # the dense problem has settled theirs
-            penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
-            if not penetrated.size:
-                break
-            near = np.union1d(near, penetrated)
-        force = np.zeros_like(self.candidates.force)
-        force[near] = found.force.reshape(-1, self.body.dim)
+        near = (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
+        if not near.any():  # the dense problem has at least one node: the one with the smallest gap
+            near[np.argmin(gap)] = True
+        found = self._compiled(near, free, alone) if self.body.dim == 2 else None
+        moved, whole, force, status, extra, solves, reduced = found or self._settled(near, free, alone)
         # the shear of closed nodes also follows its place within the step, by the slope of their friction
         horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
@@ -276,7 +267,57 @@ class LinearContactStep:
         if self.bed is not None:
             given = self.bed.pulled + self.bed.compliance @ whole
             moved = moved - given
-        return StepSolution(moved, force, status, found.extra, solves, found.reduced, given)
+        return StepSolution(moved, force, status, extra, solves, reduced, given)
+
+    def _settled(self, near: Any, free: Floats, alone: Floats) -> Settled:
+        """Contact of the `near` nodes (c,) bool, which others join that sink in, until none does."""
+        known, status, solves, nodes = self.candidates, self.candidates.status.copy(), 0, np.flatnonzero(near)
+        while True:
+            found, pushed = self._solve_near(nodes, free, alone, status[nodes])
+            solves += found.solves
+            status[nodes] = found.status
+            whole = np.zeros(free.shape[0])
+            whole[self.body.rows(nodes)] = pushed
+            moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
+            gap = known.surface.normal_gap + self._along_normal(moved)
+            gap[nodes] = 0.0  # the dense problem has settled theirs
+            penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(known.surface.gap)))
+            if not penetrated.size:
+                break
+            nodes = np.union1d(nodes, penetrated)
+        force = np.zeros_like(known.force)
+        force[nodes] = found.force.reshape(-1, self.body.dim)
+        return moved, whole, force, status, found.extra, solves, found.reduced
+
+    def _compiled(self, near: Any, free: Floats, alone: Floats) -> Settled | None:
+        """The same in the plane in compiled code, None where that is not there, or goes round in a circle."""
+        if (settle := contact_loop()) is None:
+            return None
+        known, c, p = self.candidates, len(near), len(self.unknowns)
+        none, rough = np.zeros((c, 2)), known.roughness
+        parts = (
+            known.surface.normal_gap,
+            known.slip,
+            known.friction,
+            none[:, 0] if known.cohesion is None else known.cohesion,
+            known.interface_compliance,
+            known.surface.axes.reshape(c, -1),
+            self._present.reshape(c, -1)[:, ::-1],
+            known.follower_rate(self._own)[:, :, 0],
+            known.negative_stiffness,
+            known.gain_on_closing,
+            *((none, none, none[:, 0]) if rough is None else (rough.gain, rough.loss_on_opening, rough.present)),
+            -ROUNDING * (1.0 + np.abs(known.surface.gap)),
+        )
+        balance, pivot, value, floor = np.zeros((0, 2 * c)), np.zeros((0, 0)), np.zeros(0), np.zeros(0)
+        if self.unknowns:
+            balance, pivot, value, floor = self._far_balance(alone)
+        given = (self.seen, free, np.column_stack(parts), balance, pivot, value, floor)
+        status, moved, whole = known.status.astype(np.int32), np.empty(2 * c), np.empty(2 * c)
+        force, extra = np.empty((c, 2)), np.empty(p)
+        found = (status, near.astype(np.int32), moved, whole, force, extra)
+        solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, given, found)
+        return None if solves < 0 else (moved, whole, force, status.astype(np.int64), extra, solves, False)
 
     def among(self, near: Ints) -> Floats:
         """`seen` among these candidates, in the order of `CondensedTangent.rows`."""
@@ -373,19 +414,31 @@ class LinearContactStep:
             dense=self.body.dense,
         )
 
+    def _far_balance(self, alone: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """The unknowns' equations without follower forces: by forces on candidates (p, dim c), by unknowns (p,
+        p), what lacks (p,), and the least (p,) of a pivot: 0 of a body that nothing holds, which is to fall.
+        """
+        (S, by_unknowns, wanted, carried), dim = self.equations, self.body.dim
+        pivot = S[:, :-dim] @ alone[:, 1:] + by_unknowns
+        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ alone[:, 0]
+        bone = np.array([unknown.condition is None for unknown in self.unknowns])
+        held = np.stack([unknown.part(self.body.schur[-dim:]) for unknown in self.unknowns])[:, :-dim]
+        floor = SMALLEST_PIVOT * np.abs(held @ alone[:, 1:]).max(initial=0.0)
+        return carried, pivot, value, np.where(bone, floor, 0.0)
+
     def _bone_balance(
-        self, rows: Ints, free: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
+        self, rows: Ints, alone: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
     ) -> tuple[Floats, Floats, Floats] | None:
-        """The bone's balance along the unknowns' axes: by forces on candidates, unknowns, and what lacks."""
+        """These equations with the follower forces of the near nodes, at `rows` (dim k,)."""
         if not self.unknowns:
             return None
-        C, W = near
-        S, by_unknowns, wanted, carried = self.equations
-        dim, row = self.body.dim, carried[:, rows]
+        (C, W), (carried, pivot, value, floor) = near, self._far_balance(alone)
+        row = carried[:, rows]
         through = follower.transposed(row)
-        pivot = S[:, :-dim] @ free[:, 1:] + by_unknowns + through @ W[:, 1:]
-        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0] - through @ W[:, 0]
-        return row + through @ C, self._held(pivot, free), value
+        pivot = pivot + through @ W[:, 1:]
+        own = np.diagonal(pivot)
+        held = np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
+        return row + through @ C, pivot + held, value - through @ W[:, 0]
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -402,11 +455,3 @@ class LinearContactStep:
                 S[i], by_unknowns[i], wanted[i] = condition.row, condition.by_unknowns, condition.wanted
                 carried[i] = condition.row[:-dim] @ self.body.compliance
         return S, by_unknowns, wanted, carried
-
-    def _held(self, pivot: Floats, free: Floats) -> Floats:
-        """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
-        dim = self.body.dim
-        S = np.stack([unknown.part(self.body.schur[-dim:]) for unknown in self.unknowns])
-        floor = SMALLEST_PIVOT * np.abs(S[:, :-dim] @ free[:, 1:]).max(initial=0.0)
-        own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
-        return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
