@@ -57,9 +57,9 @@ def contact_loop() -> Any:
         settle = import_module("evfem.tissue.kernels.contact").settle
     except ImportError:
         return None
-    from scipy.linalg import cython_blas, cython_lapack
+    from scipy.linalg import cython_lapack
 
-    return partial(settle, cython_lapack.__pyx_capi__["dgesv"], cython_blas.__pyx_capi__["dgemm"])
+    return partial(settle, cython_lapack.__pyx_capi__["dgesv"])
 
 
 def blocked(values: Any) -> Any:
