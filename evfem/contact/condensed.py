@@ -305,18 +305,20 @@ class LinearContactStep:
             known.follower_rate(self._own)[:, ::-1, 0],
             known.negative_stiffness,
             known.gain_on_closing,
-            *((none, none, none[:, 0]) if rough is None else (rough.gain, rough.loss_on_opening, rough.present)),
+            *(
+                (none, none, none[:, 0])
+                if rough is None
+                else (rough.gain, rough.loss_on_opening, rough.present)
+            ),
             -ROUNDING * (1.0 + np.abs(known.surface.gap)),
         )
-        balance, pivot, value, floor = np.zeros((0, 2 * c)), np.zeros((0, 0)), np.zeros(0), np.zeros(0)
-        if self.unknowns:
-            balance, pivot, value, floor = self._far_balance(alone)
-        given = (self.seen, free, np.column_stack(parts), balance, pivot, value, floor)
-        status, moved, whole = known.status.astype(np.int32), np.empty(2 * c), np.empty(2 * c)
-        force, extra = np.empty((c, 2)), np.empty(p)
-        found = (status, near.astype(np.int32), moved, whole, force, extra)
-        solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, given, found)
-        return None if solves < 0 else (moved, whole, force, status.astype(np.int64), extra, solves, False)
+        equations = np.column_stack(self._far_balance(alone)) if p else np.zeros((0, 2 * c + 2))
+        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(6 * c + p + 1)
+        arrays = (self.seen, free, np.column_stack(parts), equations, marks, found)
+        solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, arrays)
+        moved, whole, force, extra, _ = np.split(found, [2 * c, 4 * c, 6 * c, 6 * c + p])
+        status = marks[0].astype(np.int64)
+        return None if solves < 0 else (moved, whole, force.reshape(c, 2), status, extra, solves, False)
 
     def among(self, near: Ints) -> Floats:
         """`seen` among these candidates, in the order of `CondensedTangent.rows`."""

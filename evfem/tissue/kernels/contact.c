@@ -31,12 +31,12 @@ typedef struct {
     lu solve;
     int c, p, rough, attracted, count;
     double tolerance, stable, least_own;
-    const double *C, *free, *nodes, *balance, *pivot, *value, *floor;
+    const double *C, *free, *nodes, *equations; /* of p unknowns: by forces (2 c), by them (p), right, least pivot */
     int32_t *status, *near;
     double *moved, *pushed, *force, *extra; /* found */
+    double *G, *x, *line, *drop, *own;
     unknown *unknowns;
     int *pivots;
-    double *G, *x, *line, *drop, *own;
 } step;
 
 #define NODE(s, a) ((s)->nodes + (Py_ssize_t)COLUMNS * (a))
@@ -61,8 +61,9 @@ static void row_of(const step *s, int node, const double *along, double *row) {
 
 /* Own compliances of the near nodes; whether the attraction does not return to itself. */
 static int begin(step *s) {
-    double mean[2] = {0}, most = 0.0;
+    double mean[2] = {0}, most = 0.0, *root = s->x;
     int k = 0, weakens = 0;
+    EACH_NEAR(s, a) root[a] = sqrt(NODE(s, a)[WEAKENING]);
     EACH_NEAR(s, a) {
         const double *node = NODE(s, a);
         double sum = 0.0;
@@ -71,9 +72,8 @@ static int begin(step *s) {
             s->own[2 * a + r] = fabs(pair(s->line + 2 * a, node + N + 2 * r) + node[GIVE + r]);
             mean[r] += s->own[2 * a + r];
         }
-        EACH_NEAR(s, b) if (node[WEAKENING] > 0.0)
-            sum += fabs(pair(s->line + 2 * b, NODE(s, b) + N)) * sqrt(node[WEAKENING] * NODE(s, b)[WEAKENING]);
-        weakens |= node[WEAKENING] > 0.0, most = fmax(most, sum), k++;
+        EACH_NEAR(s, b) if (root[a] > 0.0) sum += fabs(root[a] * pair(s->line + 2 * b, NODE(s, b) + N)) * root[b];
+        weakens |= root[a] > 0.0, most = fmax(most, sum), k++;
         if (s->status[a] != OPEN && !(node[MU] > 0.0 || node[COHESION] > 0.0)) s->status[a] = FORWARD;
     }
     EACH_NEAR(s, a)
@@ -112,24 +112,31 @@ static void pose(step *s) {
     }
 }
 
+/* The equation of an unknown, or of one of the p further ones, as a row of G, which has its columns together. */
+static void equation(step *s, int i) {
+    int c = s->c, p = s->p, u = s->count, t = u + p;
+    double *G = s->G + i, right;
+    const double *row = s->equations + (Py_ssize_t)(2 * c + p + 2) * (i - u), *at = row + 2 * c;
+    if (i < u) {
+        const unknown *it = s->unknowns + i;
+        const double *free = s->free + (Py_ssize_t)2 * (1 + p) * it->node;
+        for (int q = 0; q <= p; q++) s->extra[q] = it->row[0] * free[q] + it->row[1] * free[1 + p + q];
+        row_of(s, it->node, it->row, s->line);
+        row = s->line, right = it->right - s->extra[0], at = s->extra + 1;
+    } else
+        right = at[p];
+    for (int j = 0; j < u; j++)
+        G[(Py_ssize_t)t * j] = pair(row + 2 * s->unknowns[j].node, s->unknowns[j].force);
+    for (int q = 0; q < p; q++) G[(Py_ssize_t)t * (u + q)] = at[q];
+    s->x[i] = right - dot(row, s->pushed, 2 * c);
+    if (i < u) G[(Py_ssize_t)t * i] += s->unknowns[i].own;
+    else if (fabs(G[(Py_ssize_t)t * i]) < at[p + 1]) G[(Py_ssize_t)t * i] = at[p + 1];
+}
+
 /* Forces of nodes that have their statuses, and where they move the candidates; 0 where there are none. */
 static int solve_statuses(step *s) {
     int c = s->c, p = s->p, u = s->count, t = u + p, one = 1, failed = 0;
-    for (int i = 0; i < t; i++) { /* one equation after the other, G column by column */
-        const unknown *it = s->unknowns + i;
-        const double *free = i < u ? s->free + (Py_ssize_t)2 * (1 + p) * it->node : NULL;
-        const double *row = i < u ? s->line : s->balance + (Py_ssize_t)2 * c * (i - u);
-        if (i < u) row_of(s, it->node, it->row, s->line);
-        for (int j = 0; j < u; j++)
-            s->G[(Py_ssize_t)t * j + i] = pair(row + 2 * s->unknowns[j].node, s->unknowns[j].force);
-        for (int q = 0; q < p; q++)
-            s->G[(Py_ssize_t)t * (u + q) + i] =
-                i < u ? it->row[0] * free[1 + q] + it->row[1] * free[2 + p + q] : s->pivot[p * (i - u) + q];
-        s->x[i] = i < u ? it->right - it->row[0] * free[0] - it->row[1] * free[1 + p] : s->value[i - u];
-        s->x[i] -= dot(row, s->pushed, 2 * c);
-        if (i < u) s->G[(Py_ssize_t)t * i + i] += it->own;
-        else if (fabs(s->G[(Py_ssize_t)t * i + i]) < s->floor[i - u]) s->G[(Py_ssize_t)t * i + i] = s->floor[i - u];
-    }
+    for (int i = 0; i < t; i++) equation(s, i);
     if (t) s->solve(&t, &one, s->G, &t, s->pivots, s->x, &t, &failed);
     if (failed) return 0;
     for (int i = 0; i < u; i++) {
@@ -205,31 +212,30 @@ static int settle(step *s) {
 static PyObject *call_settle(PyObject *self, PyObject *args) {
     held all;
     step s = {0};
-    PyObject *lapack, *given[13];
-    all.count = 0;
-    if (!PyArg_ParseTuple(args, "Oiiiddd(OOOOOOO)(OOOOOO)", &lapack, &s.c, &s.p, &s.rough, &s.tolerance, &s.stable,
-                          &s.least_own, &given[0], &given[1], &given[2], &given[3], &given[4], &given[5], &given[6],
-                          &given[7], &given[8], &given[9], &given[10], &given[11], &given[12]))
-        return NULL;
-    Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p;
-    if (c < 1 || c > INT16_MAX || p < 0 || p > INT16_MAX) return PyErr_Format(PyExc_ValueError, "%zd candidates", c);
-    const Py_ssize_t sizes[] = {m * m, m * (1 + p), COLUMNS * c, p * m, p * p, p, p, c, c, m, m, m, p};
-    void *data[13], *room = NULL;
-    for (int i = 0; i < 13; i++) data[i] = hold(&all, given[i], i == 7 || i == 8 ? 'i' : 'd', sizes[i], i > 6);
-    if (!PyErr_Occurred()) s.solve = (lu)PyCapsule_GetPointer(lapack, PyCapsule_GetName(lapack));
-    if (s.solve && !(room = PyMem_Malloc((t * t + t + 3 * m) * sizeof(double) + t * (sizeof(unknown) + sizeof(int)))))
-        PyErr_NoMemory();
+    PyObject *lapack, *given[6];
     int solves = 0;
-    if (room) {
-        s.C = data[0], s.free = data[1], s.nodes = data[2], s.balance = data[3], s.pivot = data[4], s.value = data[5];
-        s.floor = data[6], s.status = data[7], s.near = data[8], s.moved = data[9], s.pushed = data[10];
-        s.force = data[11], s.extra = data[12];
-        s.unknowns = room, s.G = (double *)(s.unknowns + t), s.x = s.G + t * t, s.line = s.x + t;
-        s.drop = s.line + m, s.own = s.drop + m, s.pivots = (int *)(s.own + m);
+    all.count = 0;
+    if (!PyArg_ParseTuple(args, "Oiipddd(OOOOOO)", &lapack, &s.c, &s.p, &s.rough, &s.tolerance, &s.stable,
+                          &s.least_own, &given[0], &given[1], &given[2], &given[3], &given[4], &given[5]))
+        return NULL;
+    Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p, room = (t * t + t + 3 * m) * sizeof(double);
+    if (c < 1 || c > INT16_MAX || p < 0 || p > INT16_MAX) return PyErr_Format(PyExc_ValueError, "%zd nodes", c);
+    s.C = hold(&all, given[0], 'd', m * m, 0);
+    s.free = hold(&all, given[1], 'd', m * (1 + p), 0);
+    s.nodes = hold(&all, given[2], 'd', COLUMNS * c, 0);
+    s.equations = hold(&all, given[3], 'd', p * (m + p + 2), 0);
+    s.status = hold(&all, given[4], 'i', 2 * c, 1);
+    s.moved = hold(&all, given[5], 'd', 3 * m + p + 1, 1);
+    if (s.moved) s.solve = (lu)PyCapsule_GetPointer(lapack, PyCapsule_GetName(lapack));
+    if (s.solve && !(s.G = PyMem_Malloc(room + t * (sizeof(unknown) + sizeof(int))))) PyErr_NoMemory();
+    if (s.G) {
+        s.near = s.status + c, s.pushed = s.moved + m, s.force = s.pushed + m, s.extra = s.force + m;
+        s.x = s.G + t * t, s.line = s.x + t, s.drop = s.line + m, s.own = s.drop + m;
+        s.unknowns = (unknown *)(s.own + m), s.pivots = (int *)(s.unknowns + t);
         Py_BEGIN_ALLOW_THREADS
         solves = settle(&s);
         Py_END_ALLOW_THREADS
-        PyMem_Free(room);
+        PyMem_Free(s.G);
     }
     release(&all);
     return PyErr_Occurred() ? NULL : PyLong_FromLong(solves);
@@ -237,9 +243,8 @@ static PyObject *call_settle(PyObject *self, PyObject *args) {
 
 static PyMethodDef methods[] = {
     {"settle", call_settle, METH_VARARGS,
-     "settle(dgesv, c, p, rough, tolerance, stable, least_own, (compliance, free, nodes, balance, pivot, value,\n"
-     "floor), (status, near, moved, pushed, force, extra)): contact among c candidates with p more unknowns;\n"
-     "how many systems were solved, -1 where none was found."},
+     "settle(dgesv, c, p, rough, tolerance, stable, least_own, (compliance, free, nodes, equations, marks,\n"
+     "found)): contact among c candidates with p more unknowns; number of solves, -1 if nothing was found."},
     {NULL, NULL, 0, NULL}};
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "contact", "Compiled contact in the plane.", -1, methods};
