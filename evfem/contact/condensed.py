@@ -313,10 +313,10 @@ class LinearContactStep:
             -ROUNDING * (1.0 + np.abs(known.surface.gap)),
         )
         equations = np.column_stack(self._far_balance(alone)) if p else np.zeros((0, 2 * c + 2))
-        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(6 * c + p + 1)
+        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(6 * c + p)
         arrays = (self.seen, free, np.column_stack(parts), equations, marks, found)
         solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, arrays)
-        moved, whole, force, extra, _ = np.split(found, [2 * c, 4 * c, 6 * c, 6 * c + p])
+        moved, whole, force, extra = np.split(found, [2 * c, 4 * c, 6 * c])
         status = marks[0].astype(np.int64)
         return None if solves < 0 else (moved, whole, force.reshape(c, 2), status, extra, solves, False)
 
@@ -416,8 +416,8 @@ class LinearContactStep:
         )
 
     def _far_balance(self, alone: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """The unknowns' equations without follower forces: by forces on candidates (p, dim c), by unknowns (p,
-        p), what lacks (p,), and the least (p,) of a pivot: 0 of a body that nothing holds, which is to fall.
+        """The unknowns' equations without follower forces: by forces on candidates (p, dim c), by unknowns
+        (p, p), what lacks (p,), and the least pivots (p,): a body that nothing holds is to fall, not to rise.
         """
         (S, by_unknowns, wanted, carried), dim = self.equations, self.body.dim
         pivot = S[:, :-dim] @ alone[:, 1:] + by_unknowns

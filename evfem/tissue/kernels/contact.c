@@ -98,8 +98,7 @@ static void pose(step *s) {
         int opened = s->status[a] == OPEN;
         double along = (s->status[a] == BACKWARD) - (s->status[a] == FORWARD), *drop = s->drop + 2 * a, felt[2];
         s->force[2 * a + 1] = node[COHESION] * along;
-        for (int r = 0; r < 2; r++)
-            drop[r] = opened ? node[LOSS + r] : node[GAIN + r] * node[PRESENT];
+        for (int r = 0; r < 2; r++) drop[r] = opened ? node[LOSS + r] : node[GAIN + r] * node[PRESENT];
         if (s->attracted && !opened) drop[0] -= node[CLOSING];
         for (int i = 0; i < 2; i++) {
             s->pushed[2 * a + i] = drop[0] * n[i] + (drop[1] + s->force[2 * a + 1]) * t[i];
@@ -112,25 +111,24 @@ static void pose(step *s) {
     }
 }
 
-/* The equation of an unknown, or of one of the p further ones, as a row of G, which has its columns together. */
+/* The equation of an unknown, or of one of the p further ones: a row of G, which has its columns together. */
 static void equation(step *s, int i) {
     int c = s->c, p = s->p, u = s->count, t = u + p;
-    double *G = s->G + i, right;
-    const double *row = s->equations + (Py_ssize_t)(2 * c + p + 2) * (i - u), *at = row + 2 * c;
+    double *row = s->line, *at = row + 2 * c, *G = s->G + i;
+    const unknown *it = s->unknowns + i;
     if (i < u) {
-        const unknown *it = s->unknowns + i;
-        const double *free = s->free + (Py_ssize_t)2 * (1 + p) * it->node;
-        for (int q = 0; q <= p; q++) s->extra[q] = it->row[0] * free[q] + it->row[1] * free[1 + p + q];
-        row_of(s, it->node, it->row, s->line);
-        row = s->line, right = it->right - s->extra[0], at = s->extra + 1;
+        const double *x = s->free + (Py_ssize_t)2 * (1 + p) * it->node, *y = x + 1 + p;
+        row_of(s, it->node, it->row, row);
+        for (int q = 0; q < p; q++) at[q] = it->row[0] * x[1 + q] + it->row[1] * y[1 + q];
+        at[p] = it->right - it->row[0] * x[0] - it->row[1] * y[0];
     } else
-        right = at[p];
-    for (int j = 0; j < u; j++)
-        G[(Py_ssize_t)t * j] = pair(row + 2 * s->unknowns[j].node, s->unknowns[j].force);
+        memcpy(row, s->equations + (Py_ssize_t)(2 * c + p + 2) * (i - u), (2 * c + p + 2) * sizeof(double));
+    for (int j = 0; j < u; j++) G[(Py_ssize_t)t * j] = pair(row + 2 * s->unknowns[j].node, s->unknowns[j].force);
     for (int q = 0; q < p; q++) G[(Py_ssize_t)t * (u + q)] = at[q];
-    s->x[i] = right - dot(row, s->pushed, 2 * c);
-    if (i < u) G[(Py_ssize_t)t * i] += s->unknowns[i].own;
-    else if (fabs(G[(Py_ssize_t)t * i]) < at[p + 1]) G[(Py_ssize_t)t * i] = at[p + 1];
+    s->x[i] = at[p] - dot(row, s->pushed, 2 * c);
+    double *own = G + (Py_ssize_t)t * i;
+    if (i < u) *own += it->own;
+    else if (fabs(*own) < at[p + 1]) *own = at[p + 1];
 }
 
 /* Forces of nodes that have their statuses, and where they move the candidates; 0 where there are none. */
@@ -218,19 +216,19 @@ static PyObject *call_settle(PyObject *self, PyObject *args) {
     if (!PyArg_ParseTuple(args, "Oiipddd(OOOOOO)", &lapack, &s.c, &s.p, &s.rough, &s.tolerance, &s.stable,
                           &s.least_own, &given[0], &given[1], &given[2], &given[3], &given[4], &given[5]))
         return NULL;
-    Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p, room = (t * t + t + 3 * m) * sizeof(double);
+    Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p, room = (t * t + t + 3 * m + p + 2) * sizeof(double);
     if (c < 1 || c > INT16_MAX || p < 0 || p > INT16_MAX) return PyErr_Format(PyExc_ValueError, "%zd nodes", c);
     s.C = hold(&all, given[0], 'd', m * m, 0);
     s.free = hold(&all, given[1], 'd', m * (1 + p), 0);
     s.nodes = hold(&all, given[2], 'd', COLUMNS * c, 0);
     s.equations = hold(&all, given[3], 'd', p * (m + p + 2), 0);
     s.status = hold(&all, given[4], 'i', 2 * c, 1);
-    s.moved = hold(&all, given[5], 'd', 3 * m + p + 1, 1);
+    s.moved = hold(&all, given[5], 'd', 3 * m + p, 1);
     if (s.moved) s.solve = (lu)PyCapsule_GetPointer(lapack, PyCapsule_GetName(lapack));
     if (s.solve && !(s.G = PyMem_Malloc(room + t * (sizeof(unknown) + sizeof(int))))) PyErr_NoMemory();
     if (s.G) {
         s.near = s.status + c, s.pushed = s.moved + m, s.force = s.pushed + m, s.extra = s.force + m;
-        s.x = s.G + t * t, s.line = s.x + t, s.drop = s.line + m, s.own = s.drop + m;
+        s.x = s.G + t * t, s.line = s.x + t, s.drop = s.line + m + p + 2, s.own = s.drop + m;
         s.unknowns = (unknown *)(s.own + m), s.pivots = (int *)(s.unknowns + t);
         Py_BEGIN_ALLOW_THREADS
         solves = settle(&s);
