@@ -42,6 +42,11 @@ typedef struct {
 #define NODE(s, a) ((s)->nodes + (Py_ssize_t)COLUMNS * (a))
 #define EACH_NEAR(s, a) for (int a = 0; a < (s)->c; a++) if ((s)->near[a])
 
+#define RESISTS(node) ((node)[MU] > 0.0 || (node)[COHESION] > 0.0)
+#define TURNS(node) ((node)[RATE] != 0.0 || (node)[RATE + 1] != 0.0)
+
+static const double x_axis[2] = {1.0, 0.0};
+
 static double dot(const double *a, const double *b, int n) {
     double sums[8] = {0}, total = 0.0;
     for (; n >= 8; n -= 8, a += 8, b += 8)
@@ -59,28 +64,42 @@ static void row_of(const step *s, int node, const double *along, double *row) {
     for (int i = 0; i < 2 * s->c; i++) row[i] = along[0] * x[i] + along[1] * y[i];
 }
 
-/* Own compliances of the near nodes; whether the attraction does not return to itself. */
+/* By how much, at most, attraction (its stiffness by roots) and forces that turn move a node along a vector, if all
+   near nodes move by 1: the larger of these and of what was known. */
+static void feedback(step *s, int a, const double *along, double by, const double *root, double *most) {
+    double sums[2] = {0};
+    row_of(s, a, along, s->line);
+    EACH_NEAR(s, b) {
+        sums[0] += fabs(pair(s->line + 2 * b, NODE(s, b) + N)) * root[b];
+        sums[1] += fabs(pair(s->line + 2 * b, NODE(s, b) + RATE));
+    }
+    for (int i = 0; i < 2; i++) most[i] = fmax(most[i], by * sums[i]);
+}
+
+/* Own compliances of the near nodes; whether the attraction, forces turning, surely does not return to itself. */
 static int begin(step *s) {
-    double mean[2] = {0}, most = 0.0, *root = s->x;
+    double mean[2] = {0}, up[2] = {0}, aside[2] = {0}, *root = s->x;
     int k = 0, weakens = 0;
     EACH_NEAR(s, a) root[a] = sqrt(NODE(s, a)[WEAKENING]);
     EACH_NEAR(s, a) {
         const double *node = NODE(s, a);
-        double sum = 0.0;
-        for (int r = 1; r >= 0; r--) {
+        for (int r = 0; r < 2; r++) {
             row_of(s, a, node + N + 2 * r, s->line);
             s->own[2 * a + r] = fabs(pair(s->line + 2 * a, node + N + 2 * r) + node[GIVE + r]);
             mean[r] += s->own[2 * a + r];
         }
-        EACH_NEAR(s, b) if (root[a] > 0.0) sum += fabs(root[a] * pair(s->line + 2 * b, NODE(s, b) + N)) * root[b];
-        weakens |= root[a] > 0.0, most = fmax(most, sum), k++;
-        if (s->status[a] != OPEN && !(node[MU] > 0.0 || node[COHESION] > 0.0)) s->status[a] = FORWARD;
+        weakens |= root[a] > 0.0, k++;
+        if (s->status[a] != OPEN && !RESISTS(node)) s->status[a] = FORWARD;
     }
     EACH_NEAR(s, a)
         for (int r = 0; r < 2; r++)
             s->own[2 * a + r] = fmax(s->own[2 * a + r], fmax(s->least_own * mean[r] / k, 1e-300));
+    EACH_NEAR(s, a) {
+        if (root[a] > 0.0) feedback(s, a, NODE(s, a) + N, root[a], root, up);
+        if (weakens && TURNS(NODE(s, a))) feedback(s, a, x_axis, 1.0, root, aside);
+    }
     s->attracted = weakens || s->rough;
-    return most < s->stable;
+    return !weakens || (aside[1] < 1.0 && up[0] + up[1] * aside[0] / (1.0 - aside[1]) < s->stable);
 }
 
 static void add(step *s, int node, int kind, const double *row, double own, double right, const double *force) {
@@ -89,7 +108,6 @@ static void add(step *s, int node, int kind, const double *row, double own, doub
 
 /* The unknowns of nodes with their statuses, and the forces that no unknown changes. */
 static void pose(step *s) {
-    static const double x_axis[2] = {1.0, 0.0};
     s->count = 0;
     memset(s->pushed, 0, 2 * s->c * sizeof(double));
     memset(s->force, 0, 2 * s->c * sizeof(double));
@@ -107,7 +125,7 @@ static void pose(step *s) {
         if (!opened) add(s, a, PRESSING, n, node[GIVE], -node[GAP], felt);
         else if (node[WEAKENING] > 0.0) add(s, a, DROP, n, -1.0 / node[WEAKENING], 0.0, n);
         if (s->status[a] == STICK) add(s, a, SHEAR, t, node[GIVE + 1], -node[SLIP], t);
-        if (node[RATE] != 0.0 || node[RATE + 1] != 0.0) add(s, a, ASIDE, x_axis, -1.0, 0.0, node + RATE);
+        if (TURNS(node)) add(s, a, ASIDE, x_axis, -1.0, 0.0, node + RATE);
     }
 }
 
@@ -167,7 +185,7 @@ static int projected(const step *s, int a, double *miss, double *scale) {
     int before = s->status[a], slip = z < 0.0 ? FORWARD : BACKWARD, status = OPEN;
     if (!isfinite(p) || !isfinite(z)) return -1;
     if (p > 0.0) {
-        status = fabs(z) <= limit && (node[MU] > 0.0 || node[COHESION] > 0.0) ? STICK : slip;
+        status = fabs(z) <= limit && RESISTS(node) ? STICK : slip;
         shear = status == STICK ? z : z * limit / fmax(fabs(z), fmax(limit, 1e-300));
     }
     const double sizes[] = {normal, shear, force[0], force[1], drop[0], drop[1], 1e-3 * gap / own[0]};
