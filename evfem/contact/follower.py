@@ -1,5 +1,4 @@
-r"""Candidates for contact, and the stiffness of forces that turn with the profile, in the small block of nodes
-near contact.
+r"""Candidates for contact; stiffness of forces that turn with the profile, in the block of near nodes.
 
 A node that moves along a profile, by dx[, dz], takes the direction of its contact force along, and at a
 slope of the friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body that gives
@@ -86,6 +85,8 @@ class Candidates:
         friction stays at the present coefficient.
         """
         direction = self.shear_direction
+        if self.slip_stiffness is None and not self.friction_slope.any():
+            return np.zeros((*direction.shape, direction.shape[1]))
         growth = direction[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
         along = np.any(direction, axis=1, keepdims=True)
         if self.slip_stiffness is not None:
