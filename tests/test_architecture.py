@@ -110,7 +110,7 @@ LATE = {
     "SurfaceTopography",
 }
 #: compiled from C, without imports
-BUILT = {"evfem.tissue.kernels.loops", "evfem.tissue.kernels.solids"}
+BUILT = {f"evfem.tissue.kernels.{name}" for name in ("loops", "solids", "contact")}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 #: files of a folder beside its `__init__`, and lines
 MOST_FILES, MOST_LINES = 12, 3600

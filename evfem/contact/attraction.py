@@ -150,20 +150,26 @@ class Attraction:
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
         gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1])
         gaps = gaps + self._separation(positions, pressing)
-        at = zip(gaps, voltages.tolist(), positions, strict=True)
-        pairs = [(gap, self._voltages(gap, u, position)) for gap, u, position in at]
         on = 1.0 if self.air_layer else touching.astype(float)
-        pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
+        pressure = self._of_law(self.law.traction, gaps, voltages, positions)
         weight = on * pressure * self.pad.tributary(positions)
         if self.direction == "vertical":
             forces = np.zeros_like(positions)
             forces[..., 1] = -weight
             return forces
-        potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
+        potential = on * self._of_law(self.law.potential, gaps, voltages, positions)
         forces = np.stack([self._sideways(*each) for each in zip(positions, potential, strict=True)])
         forces[..., ::2] += weight[..., None] * frame.slope.reshape(*weight.shape, -1)
         forces[..., 1] = -weight
         return forces
+
+    def _of_law(self, values: Any, gaps: Floats, voltages: Floats, positions: Floats) -> Floats:
+        """Values (W, P) of the law at W places of a way: at once where these have all in common."""
+        harmonics = np.ndim(getattr(self.layers, "reduced", 0.0)) > 1  # their axis comes before the nodes
+        if self.charging is None and not harmonics and (voltages == voltages[0]).all():
+            return np.asarray(values(gaps, float(voltages[0]), self.layers))
+        at = zip(gaps, voltages.tolist(), positions, strict=True)
+        return np.array([values(gap, self._voltages(gap, u, place), self.layers) for gap, u, place in at])
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
         """Parts of closed nodes' attraction (P,) in MPa that a core takes away, and leaves; or None."""

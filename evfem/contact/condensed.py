@@ -24,23 +24,20 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import DenseSolver, Floats, Ints, inverse
-from evfem.common.constants import ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
-from evfem.contact.follower import FollowerStiffness, local
+from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
+from evfem.common.constants import DISC_OWN, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
+from evfem.contact.follower import Candidates, FollowerStiffness, local
 from evfem.contact.signorini import (
     OPEN,
-    SLIP,
     AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
-    Roughness,
     Unstable,
-    side,
 )
 from evfem.contact.solve import solve_with_attraction
-from evfem.surface.pad import SurfaceState
+from evfem.tissue.kernels.blocks import contact_loop
 
 #: y, x and z of a vector (x, y, z), and the other way round
 COMPONENTS = np.array([1, 0, 2])
@@ -48,77 +45,9 @@ COMPONENTS = np.array([1, 0, 2])
 LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 
-@dataclass(frozen=True, eq=False)
-class Candidates:
-    """Data of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in N).
-
-    The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
-    N/mm, statuses (c,), friction coefficients (c,), their slopes (c, d) in 1/mm. `interface_compliance` (c,
-    1 + d) in mm per N/mm: 0, or 1 / (penalty x tributary length). A law of friction gives its derivative by
-    the contact force as the coefficient, `cohesion` (c,) in N/mm, and the growth with the slip,
-    `slip_stiffness` (c,) in N/mm per mm. Attraction: see `AttractionStiffness`.
-    """
-
-    surface: SurfaceState
-    slip: Floats
-    force: Floats
-    status: Ints
-    friction: Floats
-    interface_compliance: Floats
-    negative_stiffness: Floats
-    gain_on_closing: Floats
-    friction_slope: Floats
-    roughness: Roughness | None = None
-    cohesion: Floats | None = None
-    slip_stiffness: Floats | None = None
-
-    def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z], (c, 1 + d, d),
-        of the own compliances (c, d) along them.
-        """
-        turned = self.surface.turned(self.force)
-        grown = np.einsum("caj,cak->ckj", self.friction_growth(own), self.surface.axes[:, 1:])
-        return np.asarray(turned + grown)
-
-    @property
-    def shear_direction(self) -> Floats:
-        """Unit vectors (c, d) of the friction of slipping nodes, 0 of others."""
-        if self.force.shape[1] == 2:
-            return side(self.status)
-        shear = np.hypot(*self.force[:, 1:].T)
-        slips = (self.status == SLIP) & (shear > 0.0)
-        return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
-
-    def by_chords(self, near: Ints, compliance: Floats) -> Floats | None:
-        """Coefficients (k,) of `near` nodes by the chords of their friction law, not too steep, or None."""
-        if self.cohesion is None:
-            return None
-        normal, along = np.maximum(self.force[near, 0], 0.0), self.shear_direction[near]
-        n = self.force.shape[1]
-        chord = self.friction[near] + self.cohesion[near] / np.where(normal > 0.0, normal, np.inf)
-        blocks = compliance.reshape(near.size, n, near.size, n)[np.arange(near.size), 0, np.arange(near.size)]
-        pressed = -blocks[:, 1:] / blocks[:, :1]
-        on = np.where(along.any(axis=1), np.sum(pressed * along, axis=1), np.linalg.norm(pressed, axis=1))
-        return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
-
-    def friction_growth(self, own: Floats) -> Floats:
-        """That part of it which is friction: change of the shear force (a) per displacement of the node along
-        x[, z] (j), (c, d, d). Where it falls faster than the tissue stiffens, a node snaps forward: its
-        friction stays at the present coefficient.
-        """
-        direction = self.shear_direction
-        growth = direction[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
-        along = np.any(direction, axis=1, keepdims=True)
-        if self.slip_stiffness is not None:
-            # a node that slips is held along its slip, one that sticks either way
-            held = np.where(
-                along[:, :, None], direction[:, :, None] * direction[:, None, :], np.eye(direction.shape[1])
-            )
-            growth -= self.slip_stiffness[:, None, None] * (held @ self.surface.travel)
-        steep = np.trace(growth, axis1=1, axis2=2)
-        gives = np.sum(np.where(along, direction**2, 1.0 / direction.shape[1]) * own, axis=1)
-        kept: Any = (steep < 0.0) | (steep * gives < STABLE)
-        return np.asarray(np.where(kept[:, None, None], growth, 0.0))
+#: displacements, forces on the body (dim c,), contact forces (c, dim), statuses (c,), extra unknowns (p,),
+#: linear systems solved, whether the attraction was scaled down
+Settled = tuple[Floats, Floats, Floats, Ints, Floats, int, bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +101,7 @@ class CondensedTangent:
         if key not in self._last:
             rows = self.rows(near)
             self._last.clear()
-            self._last[key] = self.compliance[np.ix_(rows, rows)]
+            self._last[key] = block(self.compliance, rows, rows)
         return self._last[key]
 
     @cached_property
@@ -241,29 +170,14 @@ class LinearContactStep:
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(free[:, 0] + self.seen @ self._present)
-        status, solves = self.candidates.status.copy(), 0
+        status = self.candidates.status
         own = np.diagonal(self.seen)[1 :: self.body.dim]
         # in contact, in the surface, or attracted with a feedback on the node itself
-        near = np.flatnonzero(
-            (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
-        )
-        if not near.size:  # the dense problem has at least one node: the one with the smallest gap
-            near = np.array([np.argmin(gap)])
-        while True:  # solve on the near nodes, join those that sink in, until none does
-            found, pushed = self._solve_near(near, free, alone, status[near])
-            solves += found.solves
-            status[near] = found.status
-            whole = np.zeros(free.shape[0])
-            whole[self.body.rows(near)] = pushed
-            moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
-            gap = normal_gap + self._along_normal(moved)
-            gap[near] = 0.0  # the dense problem has settled theirs
-            penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
-            if not penetrated.size:
-                break
-            near = np.union1d(near, penetrated)
-        force = np.zeros_like(self.candidates.force)
-        force[near] = found.force.reshape(-1, self.body.dim)
+        near = (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
+        if not near.any():  # the dense problem has at least one node: the one with the smallest gap
+            near[np.argmin(gap)] = True
+        found = self._compiled(near, free, alone) if self.body.dim == 2 else None
+        moved, whole, force, status, extra, solves, reduced = found or self._settled(near, free, alone)
         # the shear of closed nodes also follows its place within the step, by the slope of their friction
         horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
@@ -272,14 +186,65 @@ class LinearContactStep:
         if self.bed is not None:
             given = self.bed.pulled + self.bed.compliance @ whole
             moved = moved - given
-        return StepSolution(moved, force, status, found.extra, solves, found.reduced, given)
+        return StepSolution(moved, force, status, extra, solves, reduced, given)
+
+    def _settled(self, near: Any, free: Floats, alone: Floats) -> Settled:
+        """Contact of the `near` nodes (c,) bool, which others join that sink in, until none does."""
+        known, status, solves, nodes = self.candidates, self.candidates.status.copy(), 0, np.flatnonzero(near)
+        while True:
+            found, pushed = self._solve_near(nodes, free, alone, status[nodes])
+            solves += found.solves
+            status[nodes] = found.status
+            whole = np.zeros(free.shape[0])
+            whole[self.body.rows(nodes)] = pushed
+            moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
+            gap = known.surface.normal_gap + self._along_normal(moved)
+            gap[nodes] = 0.0  # the dense problem has settled theirs
+            penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(known.surface.gap)))
+            if not penetrated.size:
+                break
+            nodes = np.union1d(nodes, penetrated)
+        force = np.zeros_like(known.force)
+        force[nodes] = found.force.reshape(-1, self.body.dim)
+        return moved, whole, force, status, found.extra, solves, found.reduced
+
+    def _compiled(self, near: Any, free: Floats, alone: Floats) -> Settled | None:
+        """The same in the plane in compiled code, None where that is not there, or goes round in a circle."""
+        if (settle := contact_loop()) is None:
+            return None
+        known, c, p = self.candidates, len(near), len(self.unknowns)
+        none, rough = np.zeros((c, 2)), known.roughness
+        parts = (
+            known.surface.normal_gap,
+            known.slip,
+            known.friction,
+            none[:, 0] if known.cohesion is None else known.cohesion,
+            known.interface_compliance,
+            known.surface.axes[:, :, ::-1].reshape(c, -1),
+            known.follower_rate(self._own)[:, ::-1, 0],
+            known.negative_stiffness,
+            known.gain_on_closing,
+            *(
+                (none, none, none[:, 0])
+                if rough is None
+                else (rough.gain, rough.loss_on_opening, rough.present)
+            ),
+            -ROUNDING * (1.0 + np.abs(known.surface.gap)),
+        )
+        equations = np.column_stack(self._far_balance(alone)) if p else np.zeros((0, 2 * c + 2))
+        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(6 * c + p)
+        arrays = (self.seen, free, np.column_stack(parts), equations, marks, found)
+        solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, arrays)
+        moved, whole, force, extra = np.split(found, [2 * c, 4 * c, 6 * c])
+        status = marks[0].astype(np.int64)
+        return None if solves < 0 else (moved, whole, force.reshape(c, 2), status, extra, solves, False)
 
     def among(self, near: Ints) -> Floats:
         """`seen` among these candidates, in the order of `CondensedTangent.rows`."""
         if self.bed is None:
             return self.body.among(near)
         rows = self.body.rows(near)
-        return self.body.among(near) + self.bed.compliance[np.ix_(rows, rows)]
+        return self.body.among(near) + block(self.bed.compliance, rows, rows)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
         """Force (N/mm) that the bone lacks along the first unknown's axis, were its `travel` given."""
@@ -323,17 +288,17 @@ class LinearContactStep:
         That stiffness may be steep: it multiplies what moves beyond the present forces `held`, which is small
         near the equilibrium, and not the whole free motion.
         """
-        known, rows, dim = self.candidates, self.body.rows(near), self.body.dim
-        follower = FollowerStiffness.of(known.follower_rate(self._own)[near])
+        known, rows, dim = self.candidates[near], self.body.rows(near), self.body.dim
+        follower = FollowerStiffness.of(known.follower_rate(self._own[near]))
         among, own, held = self.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
         W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
-        problem = self._problem(near, (C, W), self._bone_balance(rows, alone, (C, W), follower))
-        rough = None if known.roughness is None else known.roughness.of(near)
-        gap, gain = known.surface.normal_gap[near], known.gain_on_closing[near]
-        attraction = AttractionStiffness(known.negative_stiffness[near], gap, gain, rough)
-        touching = np.where((status != OPEN)[:, None], known.force[near], 0.0).ravel()
+        problem = self._problem(known, (C, W), self._bone_balance(rows, alone, (C, W), follower))
+        attraction = AttractionStiffness(
+            known.negative_stiffness, known.surface.normal_gap, known.gain_on_closing, known.roughness
+        )
+        touching = np.where((status != OPEN)[:, None], known.force, 0.0).ravel()
         try:
             found = solve_with_attraction(problem, attraction, status, touching)
         except ContactNotSolved as error:
@@ -341,18 +306,17 @@ class LinearContactStep:
                 raise Unstable(LOST_STABILITY) from error
             raise
         pressed = (found.force + found.attraction_drop).reshape(-1, dim)
-        force = np.einsum("ka,kab->kb", pressed, known.surface.axes[near]).ravel()
+        force = np.einsum("ka,kab->kb", pressed, known.surface.axes).ravel()
         if follower.loaded.size:
             force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
         return found, force
 
     def _problem(
-        self, near: Ints, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
+        self, known: Candidates, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
     ) -> ContactProblem:
-        """Compliance of the `near` nodes in their frames, which other forces have `moved`."""
-        known, (C, W), extra = self.candidates, moved, None
-        axes = known.surface.axes[near]
-        at_rest = np.column_stack([known.surface.normal_gap[near], known.slip[near]])
+        """Compliance of these nodes in their frames, which other forces have `moved`."""
+        (C, W), extra, axes = moved, None, known.surface.axes
+        at_rest = np.column_stack([known.surface.normal_gap, known.slip])
         if balance is not None:
             row, pivot, right = balance
             own = np.flatnonzero([unknown.condition is not None for unknown in self.unknowns])
@@ -361,28 +325,40 @@ class LinearContactStep:
         return ContactProblem(
             local(axes, W[:, :1])[:, 0] + at_rest.ravel(),
             compliance,
-            known.friction[near],
+            known.friction,
             extra,
-            chords=known.by_chords(near, compliance),
-            cohesion=None if known.cohesion is None else known.cohesion[near],
-            give=known.interface_compliance[near].ravel() if known.interface_compliance.any() else None,
+            chords=known.by_chords(compliance),
+            cohesion=known.cohesion,
+            give=known.interface_compliance.ravel() if known.interface_compliance.any() else None,
             tolerance=self.tolerance,
             dense=self.body.dense,
         )
 
+    def _far_balance(self, alone: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """The unknowns' equations without follower forces: by forces on candidates (p, dim c), by unknowns
+        (p, p), what lacks (p,), and the least pivots (p,): a body that nothing holds is to fall, not to rise.
+        """
+        (S, by_unknowns, wanted, carried), dim = self.equations, self.body.dim
+        pivot = S[:, :-dim] @ alone[:, 1:] + by_unknowns
+        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ alone[:, 0]
+        bone = np.array([unknown.condition is None for unknown in self.unknowns])
+        held = np.stack([unknown.part(self.body.schur[-dim:]) for unknown in self.unknowns])[:, :-dim]
+        floor = SMALLEST_PIVOT * np.abs(held @ alone[:, 1:]).max(initial=0.0)
+        return carried, pivot, value, np.where(bone, floor, 0.0)
+
     def _bone_balance(
-        self, rows: Ints, free: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
+        self, rows: Ints, alone: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
     ) -> tuple[Floats, Floats, Floats] | None:
-        """The bone's balance along the unknowns' axes: by forces on candidates, unknowns, and what lacks."""
+        """These equations with the follower forces of the near nodes, at `rows` (dim k,)."""
         if not self.unknowns:
             return None
-        C, W = near
-        S, by_unknowns, wanted, carried = self.equations
-        dim, row = self.body.dim, carried[:, rows]
+        (C, W), (carried, pivot, value, floor) = near, self._far_balance(alone)
+        row = carried[:, rows]
         through = follower.transposed(row)
-        pivot = S[:, :-dim] @ free[:, 1:] + by_unknowns + through @ W[:, 1:]
-        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0] - through @ W[:, 0]
-        return row + through @ C, self._held(pivot, free), value
+        pivot = pivot + through @ W[:, 1:]
+        own = np.diagonal(pivot)
+        held = np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
+        return row + through @ C, pivot + held, value - through @ W[:, 0]
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -399,11 +375,3 @@ class LinearContactStep:
                 S[i], by_unknowns[i], wanted[i] = condition.row, condition.by_unknowns, condition.wanted
                 carried[i] = condition.row[:-dim] @ self.body.compliance
         return S, by_unknowns, wanted, carried
-
-    def _held(self, pivot: Floats, free: Floats) -> Floats:
-        """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
-        dim = self.body.dim
-        S = np.stack([unknown.part(self.body.schur[-dim:]) for unknown in self.unknowns])
-        floor = SMALLEST_PIVOT * np.abs(S[:, :-dim] @ free[:, 1:]).max(initial=0.0)
-        own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
-        return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))

@@ -1,4 +1,4 @@
-r"""Stiffness of contact forces that turn with the profile, in the small block of the nodes near contact.
+r"""Candidates for contact; stiffness of forces that turn with the profile, in the block of near nodes.
 
 A node that moves along a profile, by dx[, dz], takes the direction of its contact force along, and at a
 slope of the friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body that gives
@@ -11,10 +11,94 @@ Components are ordered per node, (y, x[, z]); axes (k, 1 + d, 1 + d) are rows n,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import STABLE
+from evfem.contact.signorini import SLIP, Roughness, side
+from evfem.surface.pad import SurfaceState
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Data of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in N).
+
+    The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
+    N/mm, statuses (c,), friction coefficients (c,), their slopes (c, d) in 1/mm. `interface_compliance` (c,
+    1 + d) in mm per N/mm: 0, or 1 / (penalty x tributary length). A law of friction gives its derivative by
+    the contact force as the coefficient, `cohesion` (c,) in N/mm, and the growth with the slip,
+    `slip_stiffness` (c,) in N/mm per mm. Attraction: see `AttractionStiffness`.
+    """
+
+    surface: SurfaceState
+    slip: Floats
+    force: Floats
+    status: Ints
+    friction: Floats
+    interface_compliance: Floats
+    negative_stiffness: Floats
+    gain_on_closing: Floats
+    friction_slope: Floats
+    roughness: Roughness | None = None
+    cohesion: Floats | None = None
+    slip_stiffness: Floats | None = None
+
+    def __getitem__(self, nodes: Ints) -> Candidates:
+        """These of the candidates alone."""
+        parts: Any = (None if part is None else part[nodes] for part in vars(self).values())
+        return Candidates(*parts)
+
+    def follower_rate(self, own: Floats) -> Floats:
+        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z], (c, 1 + d, d),
+        of the own compliances (c, d) along them.
+        """
+        turned = self.surface.turned(self.force)
+        grown = np.einsum("caj,cak->ckj", self.friction_growth(own), self.surface.axes[:, 1:])
+        return np.asarray(turned + grown)
+
+    @property
+    def shear_direction(self) -> Floats:
+        """Unit vectors (c, d) of the friction of slipping nodes, 0 of others."""
+        if self.force.shape[1] == 2:
+            return side(self.status)
+        shear = np.hypot(*self.force[:, 1:].T)
+        slips = (self.status == SLIP) & (shear > 0.0)
+        return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
+
+    def by_chords(self, compliance: Floats) -> Floats | None:
+        """Coefficients (c,) by the chords of their friction law, not too steep, or None."""
+        if self.cohesion is None:
+            return None
+        normal, along = np.maximum(self.force[:, 0], 0.0), self.shear_direction
+        (c, n), every = self.force.shape, np.arange(len(normal))
+        chord = self.friction + self.cohesion / np.where(normal > 0.0, normal, np.inf)
+        blocks = compliance.reshape(c, n, c, n)[every, 0, every]
+        pressed = -blocks[:, 1:] / blocks[:, :1]
+        on = np.where(along.any(axis=1), np.sum(pressed * along, axis=1), np.linalg.norm(pressed, axis=1))
+        return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
+
+    def friction_growth(self, own: Floats) -> Floats:
+        """That part of it which is friction: change of the shear force (a) per displacement of the node along
+        x[, z] (j), (c, d, d). Where it falls faster than the tissue stiffens, a node snaps forward: its
+        friction stays at the present coefficient.
+        """
+        direction = self.shear_direction
+        if self.slip_stiffness is None and not self.friction_slope.any():
+            return np.zeros((*direction.shape, direction.shape[1]))
+        growth = direction[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
+        along = np.any(direction, axis=1, keepdims=True)
+        if self.slip_stiffness is not None:
+            # a node that slips is held along its slip, one that sticks either way
+            held = np.where(
+                along[:, :, None], direction[:, :, None] * direction[:, None, :], np.eye(direction.shape[1])
+            )
+            growth -= self.slip_stiffness[:, None, None] * (held @ self.surface.travel)
+        steep = np.trace(growth, axis1=1, axis2=2)
+        gives = np.sum(np.where(along, direction**2, 1.0 / direction.shape[1]) * own, axis=1)
+        kept: Any = (steep < 0.0) | (steep * gives < STABLE)
+        return np.asarray(np.where(kept[:, None, None], growth, 0.0))
 
 
 @dataclass(frozen=True, eq=False)

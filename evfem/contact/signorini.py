@@ -44,7 +44,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import DenseSolver, Floats, Ints
+from evfem.common.arrays import DenseSolver, Floats, Ints, block
 from evfem.common.constants import DISC_OWN, ROUNDING
 
 
@@ -58,7 +58,7 @@ class Roughness:
     loss_on_opening: Floats
     present: Floats
 
-    def of(self, nodes: Ints) -> Roughness:
+    def __getitem__(self, nodes: Ints) -> Roughness:
         """The same of these nodes alone."""
         return Roughness(self.gain[nodes], self.loss_on_opening[nodes], self.present[nodes])
 
@@ -342,7 +342,7 @@ def solve_statuses(
     steady = (system.drop + system.shear).ravel()
     start = problem.start + problem.compliance @ steady if steady.any() else problem.start
     right = -system.rows(start[whole, None])
-    matrix = system.rows(system.columns(problem.compliance[np.ix_(whole, whole)]))
+    matrix = system.rows(system.columns(block(problem.compliance, whole, whole)))
     pressed, own = np.split(np.arange(place.size), [place.size - attracted.size])
     last = np.arange(place.size, len(right))
     matrix[last, last] += system.kept

@@ -27,7 +27,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, block
 from evfem.common.constants import ACTIVE_SET_LIMIT, STABLE
 from evfem.contact.signorini import (
     BACKWARD,
@@ -173,14 +173,14 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
     if problem.extra_unknowns is not None:
         left, right = problem.extra_unknowns.followed
 
-    def block(compliance: Floats, rows: Ints, columns: Ints) -> Floats:
-        return np.asarray(compliance[np.ix_(rows, columns)] - left[rows] @ right[:, columns])
+    def coupled(compliance: Floats, rows: Ints, columns: Ints) -> Floats:
+        return block(compliance, rows, columns) - left[rows] @ right[:, columns]
 
     C, under_forces = problem.compliance, problem.under_forces
-    free = block(C, gaps, gaps)
+    free = coupled(C, gaps, gaps)
     if held.size:
-        back = np.linalg.solve(block(under_forces, held, held), block(C, held, gaps))
-        free = free - block(C, gaps, held) @ back
+        back = np.linalg.solve(coupled(under_forces, held, held), coupled(C, held, gaps))
+        free = free - coupled(C, gaps, held) @ back
     root = np.sqrt(stiffness[pulled])
     gain = root[:, None] * free * root
     return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])

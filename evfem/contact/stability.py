@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, block
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.follower import local
 from evfem.contact.signorini import FORWARD, OPEN, STICK, ExtraUnknowns
@@ -43,9 +43,11 @@ class StabilityRatio:
     cause: str
 
 
-def stability_ratio(step: LinearContactStep) -> StabilityRatio:
-    """Stability of the equilibrium that `step` begins at."""
-    known, surface = step.candidates, step.candidates.surface
+def stability_ratio(step: LinearContactStep, least: float = 0.0) -> StabilityRatio:
+    """Stability of the equilibrium that `step` begins at; 0 stands for a ratio below `least`."""
+    held = (step.candidates.status != OPEN) | (step.candidates.negative_stiffness > 0.0)
+    known = step.candidates[(nodes := np.flatnonzero(held))]
+    surface = known.surface
     slipping = np.flatnonzero(known.status >= FORWARD)
     opened = np.flatnonzero((known.status == OPEN) & (known.negative_stiffness > 0.0))
     ratio = (known.friction * known.shear_direction[:, 0])[slipping]
@@ -61,22 +63,22 @@ def stability_ratio(step: LinearContactStep) -> StabilityRatio:
         ATTRACTION: np.concatenate([none, known.negative_stiffness[opened]]),
     }
     stiffness = sum(grows.values(), np.zeros(none.size + far.size))
-    largest, motion = _fastest(_freed(step, slipping, opened), stiffness)
+    largest, motion = _fastest(_freed(step, nodes, slipping, opened), stiffness, least)
     return StabilityRatio(largest, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
 
 
-def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
-    """Compliance (f, f) of these slips and gaps, contact held, the bone free where it is loaded."""
-    known, bone, axes = step.candidates, _bone(step), step.candidates.surface.axes
-    C = local(axes, local(axes, step.among(np.arange(known.status.size))).T).T
-    C = C + np.diag(_yielding(known).ravel())
-    closed, stick = np.flatnonzero(known.status != OPEN), np.flatnonzero(known.status == STICK)
-    held, free = np.append(2 * closed, 2 * stick + 1), np.append(2 * slipping + 1, 2 * opened)
-    pushes, ratio = np.vstack([C, bone.rows])[:, held], (known.friction * known.shear_direction[:, 0])[closed]
-    pushes[:, : closed.size] += np.vstack([C, bone.rows])[:, 2 * closed + 1] * ratio
+def _freed(step: LinearContactStep, nodes: Ints, slipping: Ints, opened: Ints) -> Floats:
+    """Compliance (f, f) of slips and gaps of these nodes, contact held, the bone free where it is loaded."""
+    known, bone = step.candidates[nodes], _bone(step, nodes)
+    axes, closed, stick = known.surface.axes, np.flatnonzero(known.status != OPEN), known.status == STICK
+    C = local(axes, local(axes, step.among(nodes)).T).T + np.diag(_yielding(known).ravel())
+    held, free = np.append(2 * closed, 2 * np.flatnonzero(stick) + 1), np.append(2 * slipping + 1, 2 * opened)
+    ratio, moving = (known.friction * known.shear_direction[:, 0])[closed], np.vstack([C, bone.rows])
+    pushes = moving[:, held]
+    pushes[:, : closed.size] += moving[:, 2 * closed + 1] * ratio
     matrix = np.block([[pushes[held], bone.columns[held]], [pushes[len(C) :], bone.pivot]])
-    moved = np.linalg.solve(matrix, np.vstack([C[np.ix_(held, free)], bone.rows[:, free]]))
-    return C[np.ix_(free, free)] - np.hstack([pushes[free], bone.columns[free]]) @ moved
+    moved = np.linalg.solve(matrix, np.vstack([block(C, held, free), bone.rows[:, free]]))
+    return block(C, free, free) - np.hstack([pushes[free], bone.columns[free]]) @ moved
 
 
 def _yielding(known: Candidates) -> Floats:
@@ -90,9 +92,9 @@ def _yielding(known: Candidates) -> Floats:
     return give
 
 
-def _bone(step: LinearContactStep) -> ExtraUnknowns:
-    """The bone's travel under a prescribed force as an extra unknown, with its equation."""
-    rows, axes = step.body.rows(np.arange(step.candidates.status.size)), step.candidates.surface.axes
+def _bone(step: LinearContactStep, nodes: Ints) -> ExtraUnknowns:
+    """The bone's travel under a prescribed force as an extra unknown, with its equation, for these nodes."""
+    rows, axes = step.body.rows(nodes), step.candidates.surface.axes[nodes]
     if not step.unknowns:
         none = np.zeros((0, rows.size))
         return ExtraUnknowns(none.T, none, np.zeros((0, 0)), np.zeros(0))
@@ -103,9 +105,9 @@ def _bone(step: LinearContactStep) -> ExtraUnknowns:
     return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(wanted.size))
 
 
-def _fastest(A: Floats, stiffness: Floats) -> tuple[float, Floats]:
-    """Largest real eigenvalue of A times a diagonal stiffness, at least 0, and its vector."""
-    if not stiffness.any():
+def _fastest(A: Floats, stiffness: Floats, least: float) -> tuple[float, Floats]:
+    """Largest real eigenvalue of A times a diagonal stiffness, 0 if below `least` >= 0, and its vector."""
+    if not stiffness.any() or (np.abs(A) @ np.abs(stiffness)).max() < least:  # no eigenvalue is above
         return 0.0, np.zeros_like(stiffness)
     values, vectors = np.linalg.eig(A * stiffness)
     fastest = int(np.argmax(values.real))

@@ -186,7 +186,7 @@ class Pardiso:
         """Solution (n,) once the kept unknowns (m,) are known."""
         given = state.astype(self.real)
         given[self.kept] = kept
-        x = self._solve(333, given).astype(float)
+        x = self._solve(333, given).astype(float, copy=False)
         x[self.kept] = kept
         return x
 

@@ -234,7 +234,7 @@ class FactorisedBody:
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
-        known = known if rough is None else replace(known, roughness=rough.of(c))
+        known = known if rough is None else replace(known, roughness=rough[c])
         # as exact as the iterate is worth, where contact takes many solves
         inner = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
         return LinearContactStep(
@@ -254,7 +254,7 @@ class FactorisedBody:
         return found
 
     def _pad_state(self, state: State) -> PadState:
-        return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
+        return PadState(self.attraction, self.interface, state, self.linearisation.touching)
 
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
         """Data for a voltage control; `saved` is the residual's state for the backward solve."""
@@ -354,7 +354,7 @@ class FactorisedBody:
         step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
         unattracted = replace(step.candidates, negative_stiffness=np.zeros(step.candidates.status.size))
         try:
-            found = stability_ratio(replace(step, candidates=unattracted))
+            found = stability_ratio(replace(step, candidates=unattracted), least=1.0)
         except np.linalg.LinAlgError:
             return None
         return found if found.cause == SLOPES and found.ratio > 1.0 else None

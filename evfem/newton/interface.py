@@ -220,7 +220,7 @@ class Interface:
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
         """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
-        place, surface = self.on_display(state), self.surface_at(state).of(c)
+        place, surface = self.on_display(state), self.surface_at(state)[c]
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
         friction = self.friction(old, c, self.jumps.at(place)[c])

@@ -259,7 +259,7 @@ class SurfaceState:
     slope: Floats
     curvature: Floats
 
-    def of(self, nodes: Ints) -> SurfaceState:
+    def __getitem__(self, nodes: Ints) -> SurfaceState:
         """At these of the nodes alone."""
         return SurfaceState(self.gap[nodes], self.slope[nodes], self.curvature[nodes])
 
@@ -307,6 +307,8 @@ class SurfaceState:
         per displacement along x[, z], (P, 1 + d, d).
         """
         (p, q, first, r), d = self._sizes, self.slope.shape[1]
+        if not self.curvature.any():
+            return np.zeros((p.size, 1 + d, d))
         # rates at which n turns towards t1 and t2, and t1 towards t2, by p and by q
         a, b, c = (np.zeros((p.size, d)) for _ in range(3))
         a[:, 0] = -1.0 / (first * r)

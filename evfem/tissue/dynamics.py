@@ -195,7 +195,7 @@ class Dynamics:
             total += self._damping.forces(u)
         if self._inertia is not None:
             share = self.difference.share
-            total += self._inertia @ (share * (share * (u - self._u0) / self.step**2 - self._start))
+            total += self._momentum(share * (share * (u - self._u0) / self.step**2 - self._start))
         if self.branches is not None:
             total += self.branches.forces(u)
         return total
@@ -275,7 +275,11 @@ class Dynamics:
         """Kinetic energy of nodal velocities (N, dim): N mm, in the plane per mm of depth."""
         if self._inertia is None:
             return 0.0
-        return float(0.5 * np.sum(velocity * (self._inertia @ velocity)))
+        return float(0.5 * np.sum(velocity * self._momentum(velocity)))
+
+    def _momentum(self, velocity: Floats) -> Floats:
+        """Mass times velocities (N, dim), axis by axis: faster than over short rows."""
+        return np.stack([self._inertia @ each for each in velocity.T], axis=1)
 
     def _strain(self, u: Floats) -> Floats:
         """Green strain of damped points: (dim, dim, 1, C, Q) for the form, in blocks for compiled loops."""

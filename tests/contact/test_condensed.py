@@ -1,16 +1,37 @@
 """A linear contact step against the equations it solves, written out for a random condensed tangent."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
-from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, Unstable
+from evfem.contact import condensed
+from evfem.contact.condensed import (
+    Candidates,
+    CandidatesBed,
+    CondensedTangent,
+    ExtraUnknown,
+    LinearContactStep,
+)
+from evfem.contact.signorini import (
+    BACKWARD,
+    FORWARD,
+    OPEN,
+    STICK,
+    ContactNotSolved,
+    Roughness,
+    Unstable,
+)
 from evfem.surface.pad import SurfaceState
 
 K = 5
+
+
+@pytest.fixture(autouse=True, params=["compiled", "numpy"])
+def twin(request, monkeypatch):
+    """Everything here holds of both."""
+    if request.param == "numpy":
+        monkeypatch.setattr(condensed, "contact_loop", lambda: None)
 
 
 def tangent(rng, coupling=0.0):
@@ -252,13 +273,73 @@ def test_crests_that_push_harder_than_the_body_holds_have_no_solution(seed):
         lost[0].solve()
 
 
-@pytest.mark.parametrize("rounding", [1e-18, 0.0, -1e-18])
+@pytest.mark.parametrize("rounding", [1e-15, 0.0, -1e-15])
 def test_a_body_that_nothing_holds_falls_under_its_load_whatever_the_rounding(rounding):
-    """Its row of the balance is zero in exact numbers; one that is held keeps its own."""
-    body = CondensedTangent.make(np.eye(4), None)
-    step = SimpleNamespace(body=body, unknowns=[ExtraUnknown(np.zeros(4), 1, 0.0)])
-    free = np.ones((2, 2))
-    body.schur[-1, :2] = 0.5
-    (loose,), (held,) = (LinearContactStep._held(step, np.array([[own]]), free)[0] for own in (rounding, 2.0))
-    assert 0.0 < loose < 1e-6
-    assert held == 2.0
+    """A node on a spring to the bone, above the surface: its row of the balance is zero in exact numbers."""
+    spring = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.diag([1.0, 2.0]))
+    known, push = candidates(np.random.default_rng(0), 0.0)[np.array([4])], -spring[:, -1]
+    push[-1] += rounding
+    body, load = CondensedTangent.make(spring, None), (ExtraUnknown(push, 1, -0.2),)
+    found = LinearContactStep(body, known, np.zeros(4), np.zeros(2), load).solve()
+    np.testing.assert_allclose(found.force, [[0.2, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(found.extra, -known.surface.gap - 0.1, rtol=1e-9)
+
+
+def rough(rng):
+    """Gains, losses and present forces of the attraction between rough faces."""
+    return Roughness(rng.uniform(0.0, 0.4, (K, 2)), rng.uniform(0.0, 0.1, (K, 2)), rng.uniform(1.0, 2.0, K))
+
+
+#: what may act on the candidates, random numbers of it
+ACTS = {
+    "nothing": lambda rng: {},
+    "attraction": lambda rng: {
+        "negative_stiffness": rng.uniform(0.0, [0.5, 0.5, 0.5, 0.5, 9.0]),  # an open node may snap
+        "gain_on_closing": rng.uniform(0.0, 1.0, K),
+    },
+    "rough faces": lambda rng: {"negative_stiffness": rng.uniform(0.0, 0.5, K), "roughness": rough(rng)},
+    "cohesion": lambda rng: {
+        "cohesion": rng.uniform(0.0, 0.5, K),
+        "slip_stiffness": rng.uniform(0.0, 0.5, K),
+    },
+    "penalties": lambda rng: {"interface_compliance": rng.uniform(0.01, 0.1, (K, 2))},
+    "no friction": lambda rng: {"friction": np.zeros(K)},
+    "ramp": lambda rng: {"friction_slope": rng.uniform(-0.5, 0.5, (K, 1))},
+}
+
+
+def solved(step, monkeypatch, name, put):
+    """The solution with a part of the module or class replaced; None where there is none."""
+    with monkeypatch.context() as patch:
+        patch.setattr(name, put)
+        try:
+            return step.solve()
+        except ContactNotSolved:
+            return None
+
+
+def undecided(*_):
+    raise ContactNotSolved("the other twin was to decide")
+
+
+@pytest.mark.parametrize("twin", ["compiled"], indirect=True)
+@pytest.mark.parametrize("unknowns", [(), ("force",), ("force", "voltage")])
+@pytest.mark.parametrize("acts", ACTS)
+def test_compiled_contact_is_the_twin_of_the_other(monkeypatch, twin, acts, unknowns):
+    """The same statuses by as many solves, forces and motions to rounding, or none in both."""
+    decided, here = 0, "evfem.contact.condensed."
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        step, *_ = step_of(rng, 1.0, 0.1, unknowns, **ACTS[acts](rng))
+        if seed % 2:
+            yields = np.diag(rng.uniform(0.0, 0.1, 2 * K))
+            step = replace(step, bed=CandidatesBed(yields, 0.01 * rng.normal(size=2 * K)))
+        slow = solved(step, monkeypatch, here + "contact_loop", lambda: None)
+        fast = solved(step, monkeypatch, here + "LinearContactStep._settled", undecided)
+        if fast is None:
+            continue
+        decided += 1
+        assert (fast.solves, fast.status.tolist()) == (slow.solves, slow.status.tolist())
+        for name in ("moved", "force", "extra"):
+            np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-9, atol=1e-11)
+    assert decided > 3

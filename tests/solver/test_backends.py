@@ -25,7 +25,7 @@ NAMES = (
 #: runs in a process of its own, in which they cannot be imported
 WITHOUT = """
 import json, sys
-for name in ("pypardiso", "evfem.tissue.kernels.loops"):
+for name in ("pypardiso", "evfem.tissue.kernels.loops", "evfem.tissue.kernels.contact"):
     sys.modules[name] = None
 sys.path[:0] = json.loads(sys.argv[1])
 import test_backends

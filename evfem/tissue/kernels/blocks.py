@@ -7,7 +7,7 @@ cell, Q quadrature points, S samples of ln J, M modes of theta, L lanes.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -48,6 +48,18 @@ def loops(dim: int = 2) -> Any:
         return import_module("evfem.tissue.kernels.loops")
     except ImportError:
         return None
+
+
+@cache
+def contact_loop() -> Any:
+    """The compiled contact in the plane, with the dense algebra of scipy; None where it was not built."""
+    try:
+        settle = import_module("evfem.tissue.kernels.contact").settle
+    except ImportError:
+        return None
+    from scipy.linalg import cython_lapack
+
+    return partial(settle, cython_lapack.__pyx_capi__["dgesv"])
 
 
 def blocked(values: Any) -> Any:

@@ -1,0 +1,268 @@
+/* Contact in the plane on a dense compliance: the twin of `LinearContactStep._settled` (evfem.contact.condensed),
+   where, in `signorini` and in `solve`, names and equations are told. All vectors here are along (x, y). LAPACK's
+   solver is that of scipy. */
+
+#define PY_SSIZE_T_CLEAN
+#define Py_LIMITED_API 0x030b0000
+#include <Python.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+#include "arrays.h"
+
+#define TRIES 20 /* solves of an active set: what takes more goes round in a circle */
+
+/* The table of nodes, `LinearContactStep._compiled`; N and T begin vectors, the others pairs are (n, t). */
+enum { GAP, SLIP, MU, COHESION, GIVE, N = GIVE + 2, T = N + 2, RATE = T + 2, WEAKENING = RATE + 2, CLOSING, GAIN,
+       LOSS = GAIN + 2, PRESENT = LOSS + 2, SUNK, COLUMNS };
+enum { OPEN, STICK, FORWARD, BACKWARD };
+enum { PRESSING, SHEAR, DROP, ASIDE }; /* kinds of unknowns; the last moves a node whose force turns */
+
+typedef void (*lu)(int *, int *, double *, int *, int *, double *, int *, int *);
+
+/* An unknown of a node: the force by one of it, and its equation, how far the node has moved along `row` plus
+   `own` times the unknown less `right`. */
+typedef struct {
+    int node, kind;
+    double row[2], force[2], own, right;
+} unknown;
+
+typedef struct {
+    lu solve;
+    int c, p, rough, attracted, count;
+    double tolerance, stable, least_own;
+    const double *C, *free, *nodes, *equations; /* of p unknowns: by forces (2 c), by them (p), right, least pivot */
+    int32_t *status, *near;
+    double *moved, *pushed, *force, *extra; /* found */
+    double *G, *x, *line, *drop, *own;
+    unknown *unknowns;
+    int *pivots;
+} step;
+
+#define NODE(s, a) ((s)->nodes + (Py_ssize_t)COLUMNS * (a))
+#define EACH_NEAR(s, a) for (int a = 0; a < (s)->c; a++) if ((s)->near[a])
+
+#define RESISTS(node) ((node)[MU] > 0.0 || (node)[COHESION] > 0.0)
+#define TURNS(node) ((node)[RATE] != 0.0 || (node)[RATE + 1] != 0.0)
+
+static const double x_axis[2] = {1.0, 0.0};
+
+static double dot(const double *a, const double *b, int n) {
+    double sums[8] = {0}, total = 0.0;
+    for (; n >= 8; n -= 8, a += 8, b += 8)
+        for (int i = 0; i < 8; i++) sums[i] += a[i] * b[i];
+    for (int i = 0; i < n; i++) total += a[i] * b[i];
+    for (int i = 0; i < 8; i++) total += sums[i];
+    return total;
+}
+
+static double pair(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1]; }
+
+/* How far forces on all candidates move a node along a vector: its row (2 c,) of the compliance. */
+static void row_of(const step *s, int node, const double *along, double *row) {
+    const double *x = s->C + (Py_ssize_t)4 * s->c * node, *y = x + 2 * s->c;
+    for (int i = 0; i < 2 * s->c; i++) row[i] = along[0] * x[i] + along[1] * y[i];
+}
+
+/* By how much, at most, attraction (its stiffness by roots) and forces that turn move a node along a vector, if all
+   near nodes move by 1: the larger of these and of what was known. */
+static void feedback(step *s, int a, const double *along, double by, const double *root, double *most) {
+    double sums[2] = {0};
+    row_of(s, a, along, s->line);
+    EACH_NEAR(s, b) {
+        sums[0] += fabs(pair(s->line + 2 * b, NODE(s, b) + N)) * root[b];
+        sums[1] += fabs(pair(s->line + 2 * b, NODE(s, b) + RATE));
+    }
+    for (int i = 0; i < 2; i++) most[i] = fmax(most[i], by * sums[i]);
+}
+
+/* Own compliances of the near nodes; whether the attraction, forces turning, surely does not return to itself. */
+static int begin(step *s) {
+    double mean[2] = {0}, up[2] = {0}, aside[2] = {0}, *root = s->x;
+    int k = 0, weakens = 0;
+    EACH_NEAR(s, a) root[a] = sqrt(NODE(s, a)[WEAKENING]);
+    EACH_NEAR(s, a) {
+        const double *node = NODE(s, a);
+        for (int r = 0; r < 2; r++) {
+            row_of(s, a, node + N + 2 * r, s->line);
+            s->own[2 * a + r] = fabs(pair(s->line + 2 * a, node + N + 2 * r) + node[GIVE + r]);
+            mean[r] += s->own[2 * a + r];
+        }
+        weakens |= root[a] > 0.0, k++;
+        if (s->status[a] != OPEN && !RESISTS(node)) s->status[a] = FORWARD;
+    }
+    EACH_NEAR(s, a)
+        for (int r = 0; r < 2; r++)
+            s->own[2 * a + r] = fmax(s->own[2 * a + r], fmax(s->least_own * mean[r] / k, 1e-300));
+    EACH_NEAR(s, a) {
+        if (root[a] > 0.0) feedback(s, a, NODE(s, a) + N, root[a], root, up);
+        if (weakens && TURNS(NODE(s, a))) feedback(s, a, x_axis, 1.0, root, aside);
+    }
+    s->attracted = weakens || s->rough;
+    return !weakens || (aside[1] < 1.0 && up[0] + up[1] * aside[0] / (1.0 - aside[1]) < s->stable);
+}
+
+static void add(step *s, int node, int kind, const double *row, double own, double right, const double *force) {
+    s->unknowns[s->count++] = (unknown){node, kind, {row[0], row[1]}, {force[0], force[1]}, own, right};
+}
+
+/* The unknowns of nodes with their statuses, and the forces that no unknown changes. */
+static void pose(step *s) {
+    s->count = 0;
+    memset(s->pushed, 0, 2 * s->c * sizeof(double));
+    memset(s->force, 0, 2 * s->c * sizeof(double));
+    EACH_NEAR(s, a) {
+        const double *node = NODE(s, a), *n = node + N, *t = node + T;
+        int opened = s->status[a] == OPEN;
+        double along = (s->status[a] == BACKWARD) - (s->status[a] == FORWARD), *drop = s->drop + 2 * a, felt[2];
+        s->force[2 * a + 1] = node[COHESION] * along;
+        for (int r = 0; r < 2; r++) drop[r] = opened ? node[LOSS + r] : node[GAIN + r] * node[PRESENT];
+        if (s->attracted && !opened) drop[0] -= node[CLOSING];
+        for (int i = 0; i < 2; i++) {
+            s->pushed[2 * a + i] = drop[0] * n[i] + (drop[1] + s->force[2 * a + 1]) * t[i];
+            felt[i] = (1.0 - node[GAIN]) * n[i] + (node[MU] * along - node[GAIN + 1]) * t[i];
+        }
+        if (!opened) add(s, a, PRESSING, n, node[GIVE], -node[GAP], felt);
+        else if (node[WEAKENING] > 0.0) add(s, a, DROP, n, -1.0 / node[WEAKENING], 0.0, n);
+        if (s->status[a] == STICK) add(s, a, SHEAR, t, node[GIVE + 1], -node[SLIP], t);
+        if (TURNS(node)) add(s, a, ASIDE, x_axis, -1.0, 0.0, node + RATE);
+    }
+}
+
+/* The equation of an unknown, or of one of the p further ones: a row of G, which has its columns together. */
+static void equation(step *s, int i) {
+    int c = s->c, p = s->p, u = s->count, t = u + p;
+    double *row = s->line, *at = row + 2 * c, *G = s->G + i;
+    const unknown *it = s->unknowns + i;
+    if (i < u) {
+        const double *x = s->free + (Py_ssize_t)2 * (1 + p) * it->node, *y = x + 1 + p;
+        row_of(s, it->node, it->row, row);
+        for (int q = 0; q < p; q++) at[q] = it->row[0] * x[1 + q] + it->row[1] * y[1 + q];
+        at[p] = it->right - it->row[0] * x[0] - it->row[1] * y[0];
+    } else
+        memcpy(row, s->equations + (Py_ssize_t)(2 * c + p + 2) * (i - u), (2 * c + p + 2) * sizeof(double));
+    for (int j = 0; j < u; j++) G[(Py_ssize_t)t * j] = pair(row + 2 * s->unknowns[j].node, s->unknowns[j].force);
+    for (int q = 0; q < p; q++) G[(Py_ssize_t)t * (u + q)] = at[q];
+    s->x[i] = at[p] - dot(row, s->pushed, 2 * c);
+    double *own = G + (Py_ssize_t)t * i;
+    if (i < u) *own += it->own;
+    else if (fabs(*own) < at[p + 1]) *own = at[p + 1];
+}
+
+/* Forces of nodes that have their statuses, and where they move the candidates; 0 where there are none. */
+static int solve_statuses(step *s) {
+    int c = s->c, p = s->p, u = s->count, t = u + p, one = 1, failed = 0;
+    for (int i = 0; i < t; i++) equation(s, i);
+    if (t) s->solve(&t, &one, s->G, &t, s->pivots, s->x, &t, &failed);
+    if (failed) return 0;
+    for (int i = 0; i < u; i++) {
+        const unknown *it = s->unknowns + i;
+        const double *node = NODE(s, it->node);
+        double x = s->x[i], *force = s->force + 2 * it->node, *drop = s->drop + 2 * it->node;
+        double along = (s->status[it->node] == BACKWARD) - (s->status[it->node] == FORWARD);
+        for (int r = 0; r < 2; r++) s->pushed[2 * it->node + r] += it->force[r] * x;
+        if (it->kind == PRESSING) {
+            force[0] = x, force[1] += node[MU] * along * x;
+            for (int r = 0; r < 2; r++) drop[r] -= node[GAIN + r] * x;
+        } else if (it->kind == SHEAR) force[1] = x;
+        else if (it->kind == DROP) drop[0] += x;
+    }
+    memcpy(s->extra, s->x + u, p * sizeof(double));
+    for (Py_ssize_t i = 0; i < 2 * c; i++) {
+        const double *free = s->free + (1 + p) * i;
+        s->moved[i] = free[0] + dot(free + 1, s->extra, p) + dot(s->C + 2 * c * i, s->pushed, 2 * c);
+    }
+    return 1;
+}
+
+/* The status that the laws make of a node's forces, gap and slip, and by how much they miss; -1 not finite. */
+static int projected(const step *s, int a, double *miss, double *scale) {
+    const double *node = NODE(s, a), *force = s->force + 2 * a, *drop = s->drop + 2 * a, *own = s->own + 2 * a;
+    double gap = node[GAP] + pair(node + N, s->moved + 2 * a) + node[GIVE] * force[0];
+    double p = force[0] - gap / own[0];
+    double z = force[1] - (node[SLIP] + pair(node + T, s->moved + 2 * a) + node[GIVE + 1] * force[1]) / own[1];
+    double limit = p > 0.0 ? node[MU] * p + node[COHESION] : 0.0, normal = fmax(p, 0.0), shear = 0.0;
+    int before = s->status[a], slip = z < 0.0 ? FORWARD : BACKWARD, status = OPEN;
+    if (!isfinite(p) || !isfinite(z)) return -1;
+    if (p > 0.0) {
+        status = fabs(z) <= limit && RESISTS(node) ? STICK : slip;
+        shear = status == STICK ? z : z * limit / fmax(fabs(z), fmax(limit, 1e-300));
+    }
+    const double sizes[] = {normal, shear, force[0], force[1], drop[0], drop[1], 1e-3 * gap / own[0]};
+    for (int i = 0; i < 7; i++) *scale = fmax(*scale, fabs(sizes[i]));
+    *miss = fmax(fabs(normal - force[0]), fabs(shear - force[1]));
+    if (before == OPEN && status == STICK && z != 0.0) return slip; /* changes pass through slip, or stick */
+    return before >= FORWARD && status >= FORWARD && before != status ? STICK : status;
+}
+
+/* Whether the statuses are those that the laws make of the forces, which they become if not; -1: give up. */
+static int obeyed(step *s) {
+    double scale = 1e-300, *miss = s->x;
+    int *wanted = s->pivots, found = 1;
+    EACH_NEAR(s, a) if ((wanted[a] = projected(s, a, miss + a, &scale)) < 0) return -1;
+    EACH_NEAR(s, a) found &= wanted[a] == s->status[a] || miss[a] <= s->tolerance * scale;
+    EACH_NEAR(s, a) if (!found) s->status[a] = wanted[a];
+    return found;
+}
+
+/* How many linear systems were solved, -1 where the other twin is to decide. */
+static int settle(step *s) {
+    for (int solves = 0, sunk = 1; sunk;) {
+        int found = 0, tries = 0;
+        if (!begin(s)) return -1;
+        for (; !found; solves++) {
+            pose(s);
+            if (tries++ == TRIES || !solve_statuses(s) || (found = obeyed(s)) < 0) return -1;
+        }
+        sunk = 0;
+        for (int a = 0; a < s->c; a++) {
+            const double *node = NODE(s, a);
+            if (s->near[a] || !(node[GAP] + pair(node + N, s->moved + 2 * a) < node[SUNK])) continue;
+            s->near[a] = sunk = 1;
+        }
+        if (!sunk) return solves;
+    }
+    return -1;
+}
+
+static PyObject *call_settle(PyObject *self, PyObject *args) {
+    held all;
+    step s = {0};
+    PyObject *lapack, *given[6];
+    int solves = 0;
+    all.count = 0;
+    if (!PyArg_ParseTuple(args, "Oiipddd(OOOOOO)", &lapack, &s.c, &s.p, &s.rough, &s.tolerance, &s.stable,
+                          &s.least_own, &given[0], &given[1], &given[2], &given[3], &given[4], &given[5]))
+        return NULL;
+    Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p, room = (t * t + t + 3 * m + p + 2) * sizeof(double);
+    if (c < 1 || c > INT16_MAX || p < 0 || p > INT16_MAX) return PyErr_Format(PyExc_ValueError, "%zd nodes", c);
+    s.C = hold(&all, given[0], 'd', m * m, 0);
+    s.free = hold(&all, given[1], 'd', m * (1 + p), 0);
+    s.nodes = hold(&all, given[2], 'd', COLUMNS * c, 0);
+    s.equations = hold(&all, given[3], 'd', p * (m + p + 2), 0);
+    s.status = hold(&all, given[4], 'i', 2 * c, 1);
+    s.moved = hold(&all, given[5], 'd', 3 * m + p, 1);
+    if (s.moved) s.solve = (lu)PyCapsule_GetPointer(lapack, PyCapsule_GetName(lapack));
+    if (s.solve && !(s.G = PyMem_Malloc(room + t * (sizeof(unknown) + sizeof(int))))) PyErr_NoMemory();
+    if (s.G) {
+        s.near = s.status + c, s.pushed = s.moved + m, s.force = s.pushed + m, s.extra = s.force + m;
+        s.x = s.G + t * t, s.line = s.x + t, s.drop = s.line + m + p + 2, s.own = s.drop + m;
+        s.unknowns = (unknown *)(s.own + m), s.pivots = (int *)(s.unknowns + t);
+        Py_BEGIN_ALLOW_THREADS
+        solves = settle(&s);
+        Py_END_ALLOW_THREADS
+        PyMem_Free(s.G);
+    }
+    release(&all);
+    return PyErr_Occurred() ? NULL : PyLong_FromLong(solves);
+}
+
+static PyMethodDef methods[] = {
+    {"settle", call_settle, METH_VARARGS,
+     "settle(dgesv, c, p, rough, tolerance, stable, least_own, (compliance, free, nodes, equations, marks,\n"
+     "found)): contact among c candidates with p more unknowns; number of solves, -1 if nothing was found."},
+    {NULL, NULL, 0, NULL}};
+
+static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "contact", "Compiled contact in the plane.", -1, methods};
+
+PyMODINIT_FUNC PyInit_contact(void) { return PyModule_Create(&module); }
