@@ -19,8 +19,8 @@ apart; of attraction and friction so far that no gap changes by more than 1/1000
 attraction does, or passes a kink of it, and that no node goes on by more than 1e-5 mm along a profile. For a
 function that varies over a scale L of its argument the error is :math:`12 (\epsilon/L)^4`, about 1e-11, and
 by rounding :math:`10^{-16}/\epsilon` of what is summed up: below 1e-9 of the forces with a nail 5000 times as
-stiff as the tissue below. So every law, form, surface and mesh is differentiated as it is, whether it knows
-complex numbers or not.
+stiff as the tissue below, and below 1e-7 of them by the sizes of that finger, which move its nail. So every
+law, form, surface and mesh is differentiated as it is, whether it knows complex numbers or not.
 
 w' is found by refinement, :math:`w' \leftarrow w' - K^{-1} R'`, with K of `evfem.response.tangent`,
 until R', the derivative of R along all of z', w' and p, is rounding. So K decides only how fast, and that of
