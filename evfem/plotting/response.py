@@ -50,7 +50,9 @@ def tornado(found: Any, column: str = "tangential_force", step: int = -1, ax: Ax
     order = sorted(known, key=lambda key: abs(known[key]))
     ax = axes_or_new(ax, REST + BAR * len(order))
     colours = [BLUE if known[key] >= 0.0 else VERMILION for key in order]
-    ax.barh(range(len(order)), [known[key] for key in order], color=colours)
+    bars = ax.barh(range(len(order)), [known[key] for key in order], color=colours)
+    ax.bar_label(bars, fmt="%.2g", padding=3, fontsize="small")
+    ax.margins(x=0.2)
     ax.set_yticks(range(len(order)), order)
     ax.axvline(0.0, color="black", linewidth=0.8)
     ax.set_xlabel(label)

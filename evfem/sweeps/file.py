@@ -15,6 +15,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import product
 from math import prod
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,7 +24,7 @@ import tomli_w
 from evfem.common.checks import instance, real, set_frozen
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene import schema as scenes
-from evfem.scene.file import read_text, tables_of
+from evfem.scene.file import read_text, scene_at, tables_of
 from evfem.scene.format import SceneTable
 from evfem.scene.keys import VERSION, names, read, shown
 from evfem.scene.scene import Scene
@@ -98,8 +99,8 @@ class Point:
 class Sweep:
     """A scene and what is varied in it: every combination of the grid, each with every sample.
 
-    `scene` is a `Scene` that a file can hold, or the tables of a scene file, in which paths are
-    relative to `folder`. An entry of `grid` is a dotted key with a list of its values, or a name
+    `scene` is a `Scene` that a file can hold, the path of a scene file, or its tables, in which paths
+    are relative to `folder`. An entry of `grid` is a dotted key with a list of its values, or a name
     of your own with rows {row: {key: value, ...}} of keys that change together. `outputs` are
     `COLUMN.STATISTIC`: a column of the history and last, mean, min or max over its steps,
     `COLUMN.STATISTIC.N` over those of motion N alone; over the depth where the scene has one.
@@ -110,7 +111,7 @@ class Sweep:
     (4, {'surface.friction': 0.2, 'motion.0.force': 0.2})
     """
 
-    scene: Scene | Mapping[str, Any]
+    scene: Scene | str | PathLike[str] | Mapping[str, Any]
     grid: Mapping[str, Sequence[Any] | Mapping[str, Row]] = field(default_factory=dict)
     samples: Samples | None = None
     outputs: Sequence[str] = OUTPUTS
@@ -119,6 +120,8 @@ class Sweep:
     axes: list[list[tuple[dict[str, str], Row]]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.scene, Mapping):
+            set_frozen(self, scene=scene_at(self.scene))
         axes, grid = {name: _axis(name, entry) for name, entry in self.grid.items()}, {}
         for name, rows in axes.items():  # in Python's own types
             named = {label[name]: row for label, row in rows if label}
@@ -179,8 +182,8 @@ class Sweep:
         return points
 
 
-def scene_tables(scene: Scene | Mapping[str, Any]) -> dict[str, Any]:
-    """A scene as the tables of a scene file, to be changed."""
+def scene_tables(scene: Any) -> dict[str, Any]:
+    """A scene, or the tables of one, as the tables of a scene file, to be changed."""
     return tomllib.loads(dump(scene)) if isinstance(scene, Scene) else deepcopy(dict(scene))
 
 

@@ -73,6 +73,10 @@ def test_the_file_of_the_scene_is_found_beside_the_sweep(tmp_path):
     sweep = sweepfile.load(tmp_path / "many.toml")
     assert (sweep.name, sweep.folder) == ("many", (tmp_path / "deep").resolve())
     assert tomllib.loads(sweep.points()[0].text)["surface"]["friction"] == 0.1
+    same = ev.Sweep(str(tmp_path / "deep" / "scene.toml"), grid={"surface.friction": [0.1]})
+    assert tomllib.loads(same.points()[0].text)["surface"]["friction"] == 0.1
+    with pytest.raises(InputError, match="scene: given 3; allowed: a Scene, or the path"):
+        ev.Sweep(3, grid={"surface.friction": [0.1]})
 
 
 def test_a_latin_hypercube_has_one_value_in_every_stratum_of_every_parameter():
