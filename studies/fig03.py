@@ -70,6 +70,8 @@ def _draw(mesh: Mesh) -> Figure:
     for ax in (whole, near):
         plotting.regions(mesh, ax)
         ax.get_legend().remove()
+    for layer in whole.collections:  # lines as wide as cells would hide their colour
+        layer.set_linewidth(0.03)
     near.set(xlim=(-1.4, 1.4), ylim=(-6.6, -4.2), ylabel="")
     handles, labels = whole.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small", frameon=False)

@@ -69,7 +69,7 @@ def _draw(
     _draw_surfaces(figure, eps_sc, eps_i, force)
     ax = figure.add_subplot(1, 2, 2)
     ax.axhspan(*band, color=COLOURS["measured"], alpha=0.3, linewidth=0)
-    ax.text(1.05e3, 0.245, "measured range", fontsize="small", color=COLOURS["measured"])
+    ax.text(1.05e3, 1.15 * band[1], "measured range", fontsize="small", color=COLOURS["measured"])
     for (law, e), y in lines.items():
         law_line(ax, law, eps_sc, y, linewidth={1.0: 1.0, 3.0: 1.6, 10.0: 2.4}[e])
         name = f"{LABELS[law]}, " if e == LINES[-1] else ""
