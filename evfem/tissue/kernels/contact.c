@@ -84,9 +84,9 @@ static int begin(step *s) {
     EACH_NEAR(s, a) {
         const double *node = NODE(s, a);
         for (int r = 0; r < 2; r++) {
-            row_of(s, a, node + N + 2 * r, s->line);
-            s->own[2 * a + r] = fabs(pair(s->line + 2 * a, node + N + 2 * r) + node[GIVE + r]);
-            mean[r] += s->own[2 * a + r];
+            const double *x = s->C + (Py_ssize_t)4 * s->c * a + 2 * a, *along = node + N + 2 * r;
+            double own = along[0] * pair(x, along) + along[1] * pair(x + 2 * s->c, along);
+            mean[r] += s->own[2 * a + r] = fabs(own + node[GIVE + r]);
         }
         weakens |= root[a] > 0.0, k++;
         if (s->status[a] != OPEN && !RESISTS(node)) s->status[a] = FORWARD;
