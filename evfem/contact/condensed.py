@@ -232,12 +232,12 @@ class LinearContactStep:
             -ROUNDING * (1.0 + np.abs(known.surface.gap)),
         )
         equations = np.column_stack(self._far_balance(alone)) if p else np.zeros((0, 2 * c + 2))
-        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(6 * c + p)
+        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(8 * c + p)
         arrays = (self.seen, free, np.column_stack(parts), equations, marks, found)
         solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, arrays)
-        moved, whole, force, extra = np.split(found, [2 * c, 4 * c, 6 * c])
+        moved, whole, acts, extra = np.split(found, [2 * c, 4 * c, 8 * c])
         status = marks[0].astype(np.int64)
-        return None if solves < 0 else (moved, whole, force.reshape(c, 2), status, extra, solves, False)
+        return None if solves < 0 else (moved, whole, acts.reshape(c, 4)[:, :2], status, extra, solves, False)
 
     def among(self, near: Ints) -> Floats:
         """`seen` among these candidates, in the order of `CondensedTangent.rows`."""
