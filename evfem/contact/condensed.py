@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
-from evfem.common.constants import DISC_OWN, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
+from evfem.common.constants import DISC_OWN, LARGE_SYSTEM, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import Candidates, FollowerStiffness, local
 from evfem.contact.signorini import (
     OPEN,
@@ -209,8 +209,10 @@ class LinearContactStep:
         return moved, whole, force, status, found.extra, solves, found.reduced
 
     def _compiled(self, near: Any, free: Floats, alone: Floats) -> Settled | None:
-        """The same in the plane in compiled code, None where that is not there, or goes round in a circle."""
-        if (settle := contact_loop()) is None:
+        """The same in the plane in compiled code; None without it, where large systems are solved sooner than
+        there, where statuses go round in a circle, and where a pad may snap.
+        """
+        if (settle := contact_loop()) is None or near.sum() > LARGE_SYSTEM:
             return None
         known, c, p = self.candidates, len(near), len(self.unknowns)
         none, rough = np.zeros((c, 2)), known.roughness
