@@ -14,6 +14,7 @@ TEMPLATES: dict[str, dict[str, str]] = {
     "texture": {},
     "mesh": {"pad.vtu": "benchmark-L0.vtu"},
     "hover": {},
+    "fingertip": {},
 }
 
 

@@ -23,6 +23,7 @@ from evfem import cli
 from evfem.mesh import file as meshfile
 from evfem.runfolder import RunFolder
 from evfem.simulation.result import COLUMNS
+from evfem.templates import TEMPLATES
 
 pytestmark = pytest.mark.solver
 
@@ -274,7 +275,7 @@ def test_a_file_of_others_in_the_way_stops_the_run_before_it_starts(place, name)
     assert (place / "here" / name).read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", ["display", "texture", "mesh", "hover"])
+@pytest.mark.parametrize("name", TEMPLATES)
 def test_each_template_runs(tmp_path, name):
     """A new folder, three commands: a scene, its plan, its results; a second time nothing is lost."""
     written = {"mesh": ["mesh.toml", "pad.vtu"]}.get(name, [f"{name}.toml"])

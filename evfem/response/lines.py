@@ -156,15 +156,17 @@ class Beside:
 
 @dataclass
 class Line:
-    """One parameter: `beside`, runs of changed scenes at the `PLACES` in steps of `step`, and `centre`, one
-    of the scene itself, for places along the states at most `longest` apart; derivatives of state, books and
-    sums so far, and what was found step by step. Books are kept if it `works`.
+    """One parameter: `beside`, runs of changed scenes at the `PLACES` in steps of `step`; `wide`, the same
+    for what is smooth, where a shape may change by more there; and `centre`, a run of the scene itself, for
+    places along the states at most `longest` apart; derivatives of state, books and sums so far, and what was
+    found step by step. Books are kept if it `works`.
     """
 
     name: str
     step: float
     longest: float
     beside: list[Beside]
+    wide: list[Beside]
     centre: Beside
     lengths: Lengths
     works: bool
@@ -180,15 +182,22 @@ class Line:
     @classmethod
     def of(cls, scene: Scene, parameter: Parameter, centre: Beside, lengths: Lengths, works: bool) -> Line:
         """At the beginning of a run; `lengths` says how far (mm) nodes of a state (P,) may move."""
-        step = longest = STEP * parameter.size
-        last = Beside.of(scene, parameter, PLACES[-1] * step)
-        share = _shift(last, centre.run.model) / PLACES[-1]
-        if share > 1.0:
-            step /= share
-            last = Beside.of(scene, parameter, PLACES[-1] * step)
-        beside = [*(Beside.of(scene, parameter, place * step) for place in PLACES[:-1]), last]
+        longest = STEP * parameter.size
+        last = Beside.of(scene, parameter, PLACES[-1] * longest)
+        inside, below = (max(1.0, share / PLACES[-1]) for share in _shifts(last, centre.run.model))
+        step = longest / max(inside, below)
+        beside, wide = (
+            [Beside.of(scene, parameter, place * way) for place in PLACES] for way in (step, longest / inside)
+        )
+        if below <= inside:
+            wide = beside
         state = changes([one.run.state for one in beside], step)
-        return cls(parameter.name, step, longest, beside, centre, lengths, works, state)
+        return cls(parameter.name, step, longest, beside, wide, centre, lengths, works, state)
+
+    @property
+    def runs(self) -> list[Beside]:
+        """All runs of changed scenes."""
+        return self.beside if self.wide is self.beside else [*self.beside, *self.wide]
 
     # -- a part
 
@@ -198,8 +207,7 @@ class Line:
         voltage = difference([one.target.voltage.voltage for one in equations], self.step)
         change: Change = {name: np.zeros_like(getattr(part.new, name)) for name in UNKNOWN}
         change["voltage"] = float(voltage)
-        parts = [(one.smooth(part.new), one.kinked(part.new)) for one in equations]
-        by_parameter, reaction = (difference([a[i] + b[i] for a, b in parts], self.step) for i in (0, 1))
+        by_parameter, reaction = self._partial(part, equations, jumps)
         rate, before, rounds = 1.0, 1.0, 0
         while rounds < ROUNDS:
             rounds += 1
@@ -217,6 +225,17 @@ class Line:
             return True
         self.reason = LOST if patient else ""
         return False
+
+    def _partial(self, part: Accepted, equations: list[Equations], jumps: Jumps) -> tuple[Floats, Floats]:
+        """Derivatives (m,) of the part's equations and (dim,) of the reaction by the parameter alone."""
+        wide = equations
+        if self.wide is not self.beside:
+            wide = [one.begin(part, jumps, part.old) for one in self.wide]
+        smooth, kinked = [one.smooth(part.new) for one in wide], [one.kinked(part.new) for one in equations]
+        far = self.wide[-1].way / PLACES[-1]
+        both = zip(zip(*smooth, strict=True), zip(*kinked, strict=True), strict=True)
+        equation, reaction = (difference(a, far) + difference(b, self.step) for a, b in both)
+        return equation, reaction
 
     def _add(self, change: Change, more: Floats) -> None:
         """Add a solution (m,) of a part's equations to a derivative."""
@@ -319,18 +338,20 @@ class Line:
         self.rows.append(found)
         self.valid_to.append(self.reach)
         self.reach = np.inf
-        for one in self.beside:
+        for one in self.runs:
             assert one.request is not None
             one.run.time += one.request.duration
             one.run.rows.append({**row, **{n: row[n] + one.way * value for n, value in found.items()}})
 
 
-def _shift(one: Beside, model: Model) -> float:
-    """How far nodes of a finger are from those of `model`, over how far they may; 0 for other meshes."""
+def _shifts(one: Beside, model: Model) -> tuple[float, float]:
+    """How far nodes of a finger are from those of `model`, over how far they may: all of them, and those of
+    the pad below an attraction or a profile; 0 for other meshes.
+    """
     own, points = one.run.model.mesh.points, model.mesh.points
     if own.shape != points.shape:
-        return 0.0
-    most = np.full(len(points), INSIDE * model.equilibrium.interface.length)
-    if model.attraction is not None or not model.surface.is_flat:
-        most[model.pad.nodes] = SHIFT
-    return float((np.abs(own - points).max(axis=1) / most).max())
+        return 0.0, 0.0
+    moves = np.abs(own - points).max(axis=1)
+    plain = model.attraction is None and model.surface.is_flat
+    below = 0.0 if plain else float(moves[model.pad.nodes].max()) / SHIFT
+    return float(moves.max()) / (INSIDE * model.equilibrium.interface.length), below

@@ -13,14 +13,14 @@ of w, z, p. With :math:`' = d/dp`
 what a part leaves behind, of works and rows, by the run's own code, with no equilibrium solved
 (`evfem.response.lines`). By the parameter, states fixed, over models of changed scenes
 :math:`\epsilon = 10^{-3}` of the parameter apart (of Poisson's ratio of its distance to 1/2; of shapes so
-that no node moves by more than 1/250 of the distance of pad nodes, and these, where there is an attraction or
-a profile, by 5e-6 mm). Along the derivative of the states: of tissue, bone and gaps 4e-3
+that no node moves by more than 1/250 of the distance of pad nodes, and where attraction, friction or a
+profile are asked, pad nodes by 5e-6 mm). Along the derivative of the states: of tissue, bone and gaps 4e-3
 apart; of attraction and friction so far that no gap changes by more than 1/1000 of the length over which the
 attraction does, or passes a kink of it, and that no node goes on by more than 1e-5 mm along a profile. For a
 function that varies over a scale L of its argument the error is :math:`12 (\epsilon/L)^4`, about 1e-11, and
 by rounding :math:`10^{-16}/\epsilon` of what is summed up: below 1e-9 of the forces with a nail 5000 times as
-stiff as the tissue below. So every law, form, surface and mesh is differentiated as it is, whether it knows
-complex numbers or not.
+stiff as the tissue below, and below 1e-7 of them by the sizes of that finger, which move its nail. So every
+law, form, surface and mesh is differentiated as it is, whether it knows complex numbers or not.
 
 w' is found by refinement, :math:`w' \leftarrow w' - K^{-1} R'`, with K of `evfem.response.tangent`,
 until R', the derivative of R along all of z', w' and p, is rounding. So K decides only how fast, and that of
@@ -109,7 +109,7 @@ class _Differentiated:
 
     def _check(self, line: Line) -> None:
         """Refuse a parameter that changes which unknowns or laws there are."""
-        models = [self.run.model, *(one.run.model for one in line.beside)]
+        models = [self.run.model, *(one.run.model for one in line.runs)]
         if len({(each.mesh.cells.tobytes(), each.closing.core is None) for each in models}) > 1:
             given = "a small change of it changes the cells of the mesh, or whether the attraction has a core"
             raise InputError(f"parameters.{line.name}", given, "a parameter that leaves both as they are")
@@ -138,7 +138,7 @@ class _Differentiated:
             return request.path(done, fraction)
 
         self.centre.request = request
-        for each in (one for line in self._followed for one in line.beside):
+        for each in (one for line in self._followed for one in line.runs):
             each.request = next(each.requests)
         self._request, self._calls = request, []
         self.run.advance(replace(request, path=path))
@@ -322,7 +322,7 @@ class Elasticity:
 def sensitivities(
     scene: Scene | Result | str | PathLike[str],
     parameters: Any,
-    columns: Sequence[str] | None = None,
+    columns: str | Sequence[str] | None = None,
     progress: bool = False,
 ) -> Sensitivities:
     """Derivatives of the history of a scene by its parameters, exact but for rounding.
@@ -336,7 +336,7 @@ def sensitivities(
     parameters
         A dotted key of the scene, a `ShapeChange`, or several of them.
     columns
-        Columns of the history; None: all. Columns that count nodes, steps or seconds are nan.
+        A column of the history, or several; None: all. Columns that count nodes, steps or seconds are nan.
     progress
         Show a progress bar.
 
@@ -389,8 +389,9 @@ def _check(scene: Scene) -> None:
         raise InputError("electrostatics.coupling", given, "monolithic or staggered, to be differentiated")
 
 
-def _columns(dim: int, columns: Sequence[str] | None) -> tuple[str, ...]:
+def _columns(dim: int, columns: str | Sequence[str] | None) -> tuple[str, ...]:
     """The columns asked for."""
+    columns = [columns] if isinstance(columns, str) else columns
     names = COLUMNS if dim == 2 else (*COLUMNS, *SPATIAL)
     numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
     for name in columns or ():

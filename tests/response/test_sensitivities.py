@@ -432,3 +432,18 @@ def test_the_ridged_finger_is_homogeneous_in_all_its_moduli_and_the_squared_volt
         total += 250.0 * found[name, "electrostatics.voltage"]
         value = found.result[name]
         assert total == pytest.approx(value, abs=2e-9 * np.abs(value).max())
+
+
+def test_where_a_force_is_held_shapes_change_normal_force_and_attraction_alike():
+    """What rounds are the nail's forces, which are large: with as small changes of the whole shape as the
+    attraction needs, the difference would be 6e-9.
+    """
+    press, solver = ev.Press(force=0.03, steps=1), ev.Solver(tolerance=1e-11)
+    pad = ev.FingerPad(resolution="coarse")
+    scene = ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 500.0, press, solver=solver)
+    keys = ("finger.ridge_width", "finger.width")
+    found = ev.sensitivities(scene, keys, ("normal_force", "electrostatic_force"))
+    for key in keys:
+        normal, pull = (found[name, key][0] for name in ("normal_force", "electrostatic_force"))
+        assert abs(pull) > 1e-6
+        assert normal == pytest.approx(pull, abs=3e-10)

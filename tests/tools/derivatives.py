@@ -6,7 +6,8 @@ Scenes of `evfem study campaign`, each motion in at most two steps and solved to
 numbers of its file are drawn. Compared are normal, tangential and electrostatic force, before the first
 step whose nodes have other statuses, or which has other parts, in a run beside. Central differences
 are over 2e-4 of a parameter; where they disagree, those over 1e-4 bring them to fourth order, and where both
-are apart by more than 1e-5 the difference itself is not known that well.
+are apart by more than 1e-5 the difference itself is not known that well. Errors are shares of the derivative,
+or of a hundredth of the largest force over the parameter where that is more: 1e-7 of forces is rounding.
 """
 
 import argparse
@@ -35,7 +36,7 @@ from evfem.simulation.run import simulate
 FORCES = ("normal_force", "tangential_force", "electrostatic_force")
 TABLES = ("finger", "surface", "electrostatics", "adhesion", "hand", "motion")
 #: shares of a parameter between the runs, agreement asked for, and CPU seconds of a scene
-SHARES, AGREE, LIMIT = (2e-4, 1e-4), 1e-5, 40.0
+SHARES, AGREE, LIMIT = (2e-4, 1e-4), 1e-5, 120.0
 STEPS, PARAMETERS = 2, 3
 COLUMNS = ("seed", "scene", "key", "found", "steps", "of", "difference", "known_to")
 
@@ -87,7 +88,7 @@ def compared(scene, key, found):
     one, kept, slopes = parameter_of(scene, key), np.ones(len(found.result.step), dtype=bool), []
     exact = np.array([found[name, key] for name in FORCES])
     kept &= np.isfinite(exact).all(axis=0)
-    usual = max(1e-3 * max(np.abs(found.result[name]).max() for name in FORCES) / one.size, 1e-300)
+    usual = max(1e-2 * max(np.abs(found.result[name]).max() for name in FORCES) / one.size, 1e-300)
     for share in SHARES:
         way = share * one.size
         ends = [simulate(one.applied(scene, sign * way)) for sign in (1.0, -1.0)]
