@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
-from evfem.common.constants import DISC_OWN, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
+from evfem.common.constants import DISC_OWN, LARGE_SYSTEM, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.follower import Candidates, FollowerStiffness, local
 from evfem.contact.signorini import (
     OPEN,
@@ -209,8 +209,10 @@ class LinearContactStep:
         return moved, whole, force, status, found.extra, solves, found.reduced
 
     def _compiled(self, near: Any, free: Floats, alone: Floats) -> Settled | None:
-        """The same in the plane in compiled code, None where that is not there, or goes round in a circle."""
-        if (settle := contact_loop()) is None:
+        """The same in the plane in compiled code; None without it, where large systems are solved sooner than
+        there, where statuses go round in a circle, and where a pad may snap.
+        """
+        if (settle := contact_loop()) is None or near.sum() > LARGE_SYSTEM:
             return None
         known, c, p = self.candidates, len(near), len(self.unknowns)
         none, rough = np.zeros((c, 2)), known.roughness
@@ -232,12 +234,12 @@ class LinearContactStep:
             -ROUNDING * (1.0 + np.abs(known.surface.gap)),
         )
         equations = np.column_stack(self._far_balance(alone)) if p else np.zeros((0, 2 * c + 2))
-        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(6 * c + p)
+        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(8 * c + p)
         arrays = (self.seen, free, np.column_stack(parts), equations, marks, found)
         solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, arrays)
-        moved, whole, force, extra = np.split(found, [2 * c, 4 * c, 6 * c])
+        moved, whole, acts, extra = np.split(found, [2 * c, 4 * c, 8 * c])
         status = marks[0].astype(np.int64)
-        return None if solves < 0 else (moved, whole, force.reshape(c, 2), status, extra, solves, False)
+        return None if solves < 0 else (moved, whole, acts.reshape(c, 4)[:, :2], status, extra, solves, False)
 
     def among(self, near: Ints) -> Floats:
         """`seen` among these candidates, in the order of `CondensedTangent.rows`."""

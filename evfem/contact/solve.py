@@ -139,7 +139,8 @@ def solve_with_attraction(
         try:
             found = solve_contact(replace(law, attraction=pulled), status, force)
             softest = found.status
-            if _feedback(problem, pulled, softest) < 1.0:
+            same = most < 1.0 and np.array_equal(softest, status)
+            if same or _feedback(problem, pulled, softest) < 1.0:
                 return replace(found, reduced=most >= 1.0)
         except ContactNotSolved as error:
             softest = error.softest

@@ -44,9 +44,8 @@ def rise(part: SubstepWork, target: Target) -> float:
     """The highest climb of the potential on the straight way of a part, as a share of the stored energy."""
     body, old, new = part.model.body, part.old, part.new
     way = new.u - old.u
-    tissue = np.array([body.energy(old.u + s * way) for s in PLACES])
     springs = [float(0.5 * np.sum(part.compliance * state.contact_force**2)) for state in (old, new)]
-    stored = tissue + springs[0] + (springs[1] - springs[0]) * PLACES**2
+    stored = body.energies(old.u, way, PLACES) + springs[0] + (springs[1] - springs[0]) * PLACES**2
     before, between, after = part.yielded
     stored = stored + (1.0 - PLACES) ** 2 * before + (1.0 - PLACES) * PLACES * between + PLACES**2 * after
     carried = _carried(part, target)

@@ -123,6 +123,11 @@ class LinearBody(Body):
         mean = self._at_base.ravel() + 0.5 * self.matrix @ strain
         return self.energy_at_base + float(mean @ strain)
 
+    def energies(self, u: Floats, way: Floats, places: Floats) -> Floats:
+        strain, more = self._strain(u), (way[self.pad] - way[self._bone]).ravel()
+        pulled = self._at_base.ravel() + self.matrix @ strain
+        return self.energy(u) + places * (pulled @ more) + 0.5 * places**2 * (more @ self.matrix @ more)
+
     @cached_property
     def _drag(self) -> Floats:
         """Tangent of the drag at rate 1, condensed (2 P, 2 P)."""

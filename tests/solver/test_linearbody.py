@@ -61,6 +61,8 @@ def test_its_energy_tangent_and_forces_are_one(pressed):
     at, h = u + way, 1e-3
     slope = (body.energy(at + h * way) - body.energy(at - h * way)) / (2.0 * h)
     assert slope == pytest.approx(float(np.sum(body.forces(at) * way)), rel=1e-9)
+    along = [body.energy(at + s * way) for s in (0.0, 0.3, 1.0)]
+    np.testing.assert_allclose(body.energies(at, way, np.array([0.0, 0.3, 1.0])), along, rtol=1e-13)
     matrix = body.pattern.full(body.tangent(at))
     reduced = np.zeros(body.size)
     reduced[body.unknowns[model.pad.nodes]] = way[model.pad.nodes]

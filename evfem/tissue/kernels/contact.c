@@ -16,15 +16,14 @@
 enum { GAP, SLIP, MU, COHESION, GIVE, N = GIVE + 2, T = N + 2, RATE = T + 2, WEAKENING = RATE + 2, CLOSING, GAIN,
        LOSS = GAIN + 2, PRESENT = LOSS + 2, SUNK, COLUMNS };
 enum { OPEN, STICK, FORWARD, BACKWARD };
-enum { PRESSING, SHEAR, DROP, ASIDE }; /* kinds of unknowns; the last moves a node whose force turns */
 
 typedef void (*lu)(int *, int *, double *, int *, int *, double *, int *, int *);
 
-/* An unknown of a node: the force by one of it, and its equation, how far the node has moved along `row` plus
-   `own` times the unknown less `right`. */
+/* An unknown of a node: by one of it the node's contact force and drop of attraction (n, t, n, t) and the force on
+   the body; and its equation, how far the node has moved along `row` plus `own` times the unknown less `right`. */
 typedef struct {
-    int node, kind;
-    double row[2], force[2], own, right;
+    int node;
+    double gives[4], force[2], row[2], own, right;
 } unknown;
 
 typedef struct {
@@ -33,8 +32,8 @@ typedef struct {
     double tolerance, stable, least_own;
     const double *C, *free, *nodes, *equations; /* of p unknowns: by forces (2 c), by them (p), right, least pivot */
     int32_t *status, *near;
-    double *moved, *pushed, *force, *extra; /* found */
-    double *G, *x, *line, *drop, *own;
+    double *moved, *pushed, *acts, *extra; /* found; contact forces and drops of attraction act, (c, 4) */
+    double *G, *x, *line, *own;
     unknown *unknowns;
     int *pivots;
 } step;
@@ -44,8 +43,6 @@ typedef struct {
 
 #define RESISTS(node) ((node)[MU] > 0.0 || (node)[COHESION] > 0.0)
 #define TURNS(node) ((node)[RATE] != 0.0 || (node)[RATE + 1] != 0.0)
-
-static const double x_axis[2] = {1.0, 0.0};
 
 static double dot(const double *a, const double *b, int n) {
     double sums[8] = {0}, total = 0.0;
@@ -84,9 +81,9 @@ static int begin(step *s) {
     EACH_NEAR(s, a) {
         const double *node = NODE(s, a);
         for (int r = 0; r < 2; r++) {
-            row_of(s, a, node + N + 2 * r, s->line);
-            s->own[2 * a + r] = fabs(pair(s->line + 2 * a, node + N + 2 * r) + node[GIVE + r]);
-            mean[r] += s->own[2 * a + r];
+            const double *x = s->C + (Py_ssize_t)4 * s->c * a + 2 * a, *along = node + N + 2 * r;
+            double own = along[0] * pair(x, along) + along[1] * pair(x + 2 * s->c, along);
+            mean[r] += s->own[2 * a + r] = fabs(own + node[GIVE + r]);
         }
         weakens |= root[a] > 0.0, k++;
         if (s->status[a] != OPEN && !RESISTS(node)) s->status[a] = FORWARD;
@@ -96,36 +93,44 @@ static int begin(step *s) {
             s->own[2 * a + r] = fmax(s->own[2 * a + r], fmax(s->least_own * mean[r] / k, 1e-300));
     EACH_NEAR(s, a) {
         if (root[a] > 0.0) feedback(s, a, NODE(s, a) + N, root[a], root, up);
-        if (weakens && TURNS(NODE(s, a))) feedback(s, a, x_axis, 1.0, root, aside);
+        if (weakens && TURNS(NODE(s, a))) feedback(s, a, (double[]){1.0, 0.0}, 1.0, root, aside);
     }
     s->attracted = weakens || s->rough;
     return !weakens || (aside[1] < 1.0 && up[0] + up[1] * aside[0] / (1.0 - aside[1]) < s->stable);
 }
 
-static void add(step *s, int node, int kind, const double *row, double own, double right, const double *force) {
-    s->unknowns[s->count++] = (unknown){node, kind, {row[0], row[1]}, {force[0], force[1]}, own, right};
+/* The force along (x, y) of what acts on a node along (n, t, n, t). */
+static void force_of(const double *node, const double *acts, double *force) {
+    for (int i = 0; i < 2; i++) force[i] = (acts[0] + acts[2]) * node[N + i] + (acts[1] + acts[3]) * node[T + i];
 }
 
-/* The unknowns of nodes with their statuses, and the forces that no unknown changes. */
+/* One more unknown, whose force is given or that of what it gives. */
+static void add(step *s, int a, const double *gives, const double *force, const double *row, double own, double right) {
+    unknown it = {a, {gives[0], gives[1], gives[2], gives[3]}, {0}, {row[0], row[1]}, own, right};
+    force_of(NODE(s, a), gives, it.force);
+    if (force) memcpy(it.force, force, sizeof it.force);
+    s->unknowns[s->count++] = it;
+}
+
+/* The unknowns of nodes with their statuses, and what acts that no unknown changes. */
 static void pose(step *s) {
+    static const double none[4] = {0}, shear[4] = {0, 1}, drop[4] = {0, 0, 1}, x_axis[2] = {1.0, 0.0};
     s->count = 0;
     memset(s->pushed, 0, 2 * s->c * sizeof(double));
-    memset(s->force, 0, 2 * s->c * sizeof(double));
+    memset(s->acts, 0, 4 * s->c * sizeof(double));
     EACH_NEAR(s, a) {
         const double *node = NODE(s, a), *n = node + N, *t = node + T;
-        int opened = s->status[a] == OPEN;
-        double along = (s->status[a] == BACKWARD) - (s->status[a] == FORWARD), *drop = s->drop + 2 * a, felt[2];
-        s->force[2 * a + 1] = node[COHESION] * along;
-        for (int r = 0; r < 2; r++) drop[r] = opened ? node[LOSS + r] : node[GAIN + r] * node[PRESENT];
-        if (s->attracted && !opened) drop[0] -= node[CLOSING];
-        for (int i = 0; i < 2; i++) {
-            s->pushed[2 * a + i] = drop[0] * n[i] + (drop[1] + s->force[2 * a + 1]) * t[i];
-            felt[i] = (1.0 - node[GAIN]) * n[i] + (node[MU] * along - node[GAIN + 1]) * t[i];
-        }
-        if (!opened) add(s, a, PRESSING, n, node[GIVE], -node[GAP], felt);
-        else if (node[WEAKENING] > 0.0) add(s, a, DROP, n, -1.0 / node[WEAKENING], 0.0, n);
-        if (s->status[a] == STICK) add(s, a, SHEAR, t, node[GIVE + 1], -node[SLIP], t);
-        if (TURNS(node)) add(s, a, ASIDE, x_axis, -1.0, 0.0, node + RATE);
+        int status = s->status[a], opened = status == OPEN;
+        double along = (status == BACKWARD) - (status == FORWARD), *acts = s->acts + 4 * a;
+        acts[1] = node[COHESION] * along;
+        for (int r = 0; r < 2; r++) acts[2 + r] = opened ? node[LOSS + r] : node[GAIN + r] * node[PRESENT];
+        if (s->attracted && !opened) acts[2] -= node[CLOSING];
+        force_of(node, acts, s->pushed + 2 * a);
+        const double presses[] = {1.0, node[MU] * along, -node[GAIN], -node[GAIN + 1]};
+        if (!opened) add(s, a, presses, NULL, n, node[GIVE], -node[GAP]);
+        else if (node[WEAKENING] > 0.0) add(s, a, drop, NULL, n, -1.0 / node[WEAKENING], 0.0);
+        if (status == STICK) add(s, a, shear, NULL, t, node[GIVE + 1], -node[SLIP]);
+        if (TURNS(node)) add(s, a, none, node + RATE, x_axis, -1.0, 0.0); /* how far the node goes aside */
     }
 }
 
@@ -157,15 +162,8 @@ static int solve_statuses(step *s) {
     if (failed) return 0;
     for (int i = 0; i < u; i++) {
         const unknown *it = s->unknowns + i;
-        const double *node = NODE(s, it->node);
-        double x = s->x[i], *force = s->force + 2 * it->node, *drop = s->drop + 2 * it->node;
-        double along = (s->status[it->node] == BACKWARD) - (s->status[it->node] == FORWARD);
-        for (int r = 0; r < 2; r++) s->pushed[2 * it->node + r] += it->force[r] * x;
-        if (it->kind == PRESSING) {
-            force[0] = x, force[1] += node[MU] * along * x;
-            for (int r = 0; r < 2; r++) drop[r] -= node[GAIN + r] * x;
-        } else if (it->kind == SHEAR) force[1] = x;
-        else if (it->kind == DROP) drop[0] += x;
+        for (int r = 0; r < 4; r++) s->acts[4 * it->node + r] += it->gives[r] * s->x[i];
+        for (int r = 0; r < 2; r++) s->pushed[2 * it->node + r] += it->force[r] * s->x[i];
     }
     memcpy(s->extra, s->x + u, p * sizeof(double));
     for (Py_ssize_t i = 0; i < 2 * c; i++) {
@@ -177,7 +175,7 @@ static int solve_statuses(step *s) {
 
 /* The status that the laws make of a node's forces, gap and slip, and by how much they miss; -1 not finite. */
 static int projected(const step *s, int a, double *miss, double *scale) {
-    const double *node = NODE(s, a), *force = s->force + 2 * a, *drop = s->drop + 2 * a, *own = s->own + 2 * a;
+    const double *node = NODE(s, a), *force = s->acts + 4 * a, *own = s->own + 2 * a;
     double gap = node[GAP] + pair(node + N, s->moved + 2 * a) + node[GIVE] * force[0];
     double p = force[0] - gap / own[0];
     double z = force[1] - (node[SLIP] + pair(node + T, s->moved + 2 * a) + node[GIVE + 1] * force[1]) / own[1];
@@ -188,7 +186,7 @@ static int projected(const step *s, int a, double *miss, double *scale) {
         status = fabs(z) <= limit && RESISTS(node) ? STICK : slip;
         shear = status == STICK ? z : z * limit / fmax(fabs(z), fmax(limit, 1e-300));
     }
-    const double sizes[] = {normal, shear, force[0], force[1], drop[0], drop[1], 1e-3 * gap / own[0]};
+    const double sizes[] = {normal, shear, force[0], force[1], force[2], force[3], 1e-3 * gap / own[0]};
     for (int i = 0; i < 7; i++) *scale = fmax(*scale, fabs(sizes[i]));
     *miss = fmax(fabs(normal - force[0]), fabs(shear - force[1]));
     if (before == OPEN && status == STICK && z != 0.0) return slip; /* changes pass through slip, or stick */
@@ -234,19 +232,19 @@ static PyObject *call_settle(PyObject *self, PyObject *args) {
     if (!PyArg_ParseTuple(args, "Oiipddd(OOOOOO)", &lapack, &s.c, &s.p, &s.rough, &s.tolerance, &s.stable,
                           &s.least_own, &given[0], &given[1], &given[2], &given[3], &given[4], &given[5]))
         return NULL;
-    Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p, room = (t * t + t + 3 * m + p + 2) * sizeof(double);
+    Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p, room = (t * t + t + 2 * m + p + 2) * sizeof(double);
     if (c < 1 || c > INT16_MAX || p < 0 || p > INT16_MAX) return PyErr_Format(PyExc_ValueError, "%zd nodes", c);
     s.C = hold(&all, given[0], 'd', m * m, 0);
     s.free = hold(&all, given[1], 'd', m * (1 + p), 0);
     s.nodes = hold(&all, given[2], 'd', COLUMNS * c, 0);
     s.equations = hold(&all, given[3], 'd', p * (m + p + 2), 0);
     s.status = hold(&all, given[4], 'i', 2 * c, 1);
-    s.moved = hold(&all, given[5], 'd', 3 * m + p, 1);
+    s.moved = hold(&all, given[5], 'd', 4 * m + p, 1);
     if (s.moved) s.solve = (lu)PyCapsule_GetPointer(lapack, PyCapsule_GetName(lapack));
     if (s.solve && !(s.G = PyMem_Malloc(room + t * (sizeof(unknown) + sizeof(int))))) PyErr_NoMemory();
     if (s.G) {
-        s.near = s.status + c, s.pushed = s.moved + m, s.force = s.pushed + m, s.extra = s.force + m;
-        s.x = s.G + t * t, s.line = s.x + t, s.drop = s.line + m + p + 2, s.own = s.drop + m;
+        s.near = s.status + c, s.pushed = s.moved + m, s.acts = s.pushed + m, s.extra = s.acts + 2 * m;
+        s.x = s.G + t * t, s.line = s.x + t, s.own = s.line + m + p + 2;
         s.unknowns = (unknown *)(s.own + m), s.pivots = (int *)(s.unknowns + t);
         Py_BEGIN_ALLOW_THREADS
         solves = settle(&s);
