@@ -24,6 +24,8 @@ from evfem.surface.pad import surface_state
 DISSIPATED = 0.05
 #: share of the energy of a run that a row may have from nowhere
 GAINED = 0.01
+#: share of the works that an equilibrium's tolerance leaves open
+OPEN_WORK = 1e-7
 #: share of the energy of a run that is lost in one row where other states are stable too
 SNAPPED = 0.1
 #: strain to which an elastic surface is taken as linear
@@ -146,8 +148,8 @@ def _energy(rows: Sequence[Row]) -> float:
 
 
 def _gained(rows: Sequence[Row]) -> Iterator[str]:
-    own = _lost(rows, "integrator")
-    if own.min() < -GAINED * _energy(rows):
+    own, works = _lost(rows, "integrator"), np.abs(_column(rows, "external_work")).max()
+    if own.min() < -GAINED * _energy(rows) - OPEN_WORK * works:
         worst = int(own.argmin())
         yield (
             f"step {rows[worst]['step']} has {-own[worst] / _energy(rows):.1%} of the energy of the run from "
