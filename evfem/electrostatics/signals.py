@@ -9,7 +9,6 @@ of the voltage (`evfem.newton.control.ConstrainedVoltage`).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -211,34 +210,22 @@ CLOSED = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class PadState:
-    """Pad nodes under the attraction in a `state` on its `interface`, in a step that began with these nodes
-    `touching` (P,).
+    """Pad nodes under the attraction: positions (P, dim), surface, voltage (V), contact forces (P,), and
+    which `touching` (P,) when the step began.
     """
 
     attraction: Any
-    interface: Any
-    state: Any
+    position: Floats
+    surface: Any
+    voltage: float
+    pressing: Floats
     touching: Any
 
-    @property
-    def voltage(self) -> float:
-        """The voltage in V."""
-        return float(self.state.voltage)
-
-    @property
-    def pressing(self) -> Floats:
-        """Contact forces (P,)."""
-        return np.asarray(self.state.contact_force[:, 0])
-
-    @cached_property
-    def position(self) -> Floats:
-        """Positions of the nodes (P, dim)."""
-        return np.asarray(self.interface.resting(self.state))
-
-    @property
-    def surface(self) -> Any:
-        """The surface below them."""
-        return self.interface.surface_at(self.state)
+    @classmethod
+    def of(cls, attraction: Any, interface: Any, state: Any, touching: Any) -> PadState:
+        """From a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
+        at = interface.resting(state), interface.surface_at(state)
+        return cls(attraction, *at, state.voltage, state.contact_force[:, 0], touching)
 
     def forces(self, voltage: float) -> Floats:
         """Attraction (P, dim) of the pad nodes under a voltage (V)."""

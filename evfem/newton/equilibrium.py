@@ -82,7 +82,7 @@ class Equilibrium:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        found = PadState(self.attraction, self.interface, state, old.touching).forces(voltage)
+        found = PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
         return self.interface.tilted(state, found)
 
     def adhesion_at(self, state: State, strength: float = ON) -> Floats:
@@ -90,7 +90,7 @@ class Equilibrium:
         adhesive = None if self.attraction is None else self.attraction.adhesive
         if adhesive is None:
             return np.zeros_like(state.contact_force)
-        return PadState(adhesive, self.interface, state, state.touching).forces(strength)
+        return PadState.of(adhesive, self.interface, state, state.touching).forces(strength)
 
     def charged(self, state: State, *, kept: bool = True) -> Charged:
         """The electric state in `state`: with its charges, or with those that flow up to the step's end."""
@@ -100,7 +100,7 @@ class Equilibrium:
 
     def held(self, old: State, state: State, target: Target) -> GivenVoltage:
         """The voltage that the target's control takes while the pad stays in `state`."""
-        pad = PadState(self.attraction, self.interface, state, old.touching)
+        pad = PadState.of(self.attraction, self.interface, state, old.touching)
         return GivenVoltage(target.voltage.held(pad))
 
     def step(

@@ -254,7 +254,7 @@ class FactorisedBody:
         return found
 
     def _pad_state(self, state: State) -> PadState:
-        return PadState(self.attraction, self.interface, state, self.linearisation.touching)
+        return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
 
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
         """Data for a voltage control; `saved` is the residual's state for the backward solve."""

@@ -5,7 +5,6 @@ Under a given voltage the plate snaps at a third of its gap; under a charge, or 
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -177,10 +176,10 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
     attraction.charging.begin(attraction.charged(rest, 90.0, None, charges), seconds)
 
     def seen(place, voltage=120.0):
-        below, none = surface_state(attraction.surface, place), np.zeros((len(rest), 2))
-        interface = SimpleNamespace(resting=lambda state: place, surface_at=lambda state: below)
-        state = SimpleNamespace(voltage=voltage, contact_force=none)
-        return PadState(attraction, interface, state, none[:, 0] > 0.0)
+        below = surface_state(attraction.surface, place)
+        return PadState(
+            attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool)
+        )
 
     for measure in (electrode_charge, smallest_gap):
         reading, step = measure(seen(position)), 1e-6
