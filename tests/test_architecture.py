@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray"},
+        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray", "pypardiso"},
         "constants arrays quadrature notices checks views pools digest storage manifest tables pictures",
     ),
     "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces solids quality groups file"),
@@ -52,7 +52,7 @@ ROOMS = {
         "stability",
     ),
     "newton": (
-        {"numpy", "scipy", "pypardiso"},
+        {"numpy", "scipy"},
         "strategy state hand control condensation interface linearisation pressure anderson travel "
         "factorised equilibrium",
     ),

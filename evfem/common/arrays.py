@@ -7,9 +7,14 @@ solution is that of double precision. Source: N. J. Higham, Accuracy and Stabili
 
 from __future__ import annotations
 
+import ctypes
+import os
 from collections.abc import Hashable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -111,6 +116,8 @@ def inverse(matrix: Any, symmetric: bool) -> Floats:
     return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])
 
 
+#: environment variable that says where MKL is, here and to pypardiso
+MKL = "PYPARDISO_MKL_RT"
 #: the limits of the BLAS that hold, each with its number of threads
 _LIMITS: list[tuple[ExitStack, int]] = []
 
@@ -143,3 +150,32 @@ def loaded_blas() -> ThreadpoolController:
     """Every BLAS, scipy's too; to find them takes milliseconds, its `limit` microseconds."""
     linalg()
     return ThreadpoolController()
+
+
+@cache
+def mkl() -> Any:
+    """MKL, or None without pypardiso; that loads scipy.sparse, and is asked only if `mkl` is no package."""
+    if find_spec("pypardiso") is None:
+        return None
+    if MKL not in os.environ and (place := mkl_library()) is not None:
+        os.environ[MKL] = place
+    if MKL in os.environ:
+        library = ctypes.CDLL(os.environ[MKL])
+    else:
+        try:
+            from pypardiso.pardiso_wrapper import PyPardisoSolver
+        except ImportError:
+            return None
+        library = PyPardisoSolver().libmkl
+    library.pardiso.argtypes, library.pardiso.restype = [ctypes.c_void_p] * 16, None
+    return library
+
+
+def mkl_library() -> str | None:
+    """Path of the runtime library of the package `mkl`, or None."""
+    try:
+        files = metadata.files("mkl") or []
+    except metadata.PackageNotFoundError:
+        return None
+    found = (str(file.locate()) for file in files if "mkl_rt" in file.name and ".lib" not in file.name)
+    return next((place for place in found if Path(place).exists()), None)

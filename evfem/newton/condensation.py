@@ -15,60 +15,24 @@ trailing blocks of L and U. Only i must be positive definite: the bone may be fr
 from __future__ import annotations
 
 import ctypes
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
-from importlib import metadata
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints, linalg
+from evfem.common.arrays import Floats, Ints, linalg, mkl
 from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
 
-#: environment variable that says where the library is, here and to pypardiso
-PLACE = "PYPARDISO_MKL_RT"
 #: place of PARDISO's count of perturbed pivots among its parameters
 PERTURBED = 13
 
 
 class Singular(ArithmeticError):
     """The matrix of the interior unknowns cannot be factorised."""
-
-
-@cache
-def pardiso_library() -> Any:
-    """MKL, or None without pypardiso; that loads scipy.sparse, and is asked only if `mkl` is no package."""
-    if find_spec("pypardiso") is None:
-        return None
-    if PLACE not in os.environ and (place := mkl_library()) is not None:
-        os.environ[PLACE] = place
-    if PLACE in os.environ:
-        library = ctypes.CDLL(os.environ[PLACE])
-    else:
-        try:
-            from pypardiso.pardiso_wrapper import PyPardisoSolver
-        except ImportError:
-            return None
-        library = PyPardisoSolver().libmkl
-    library.pardiso.argtypes, library.pardiso.restype = [ctypes.c_void_p] * 16, None
-    return library
-
-
-def mkl_library() -> str | None:
-    """Path of the runtime library of the package `mkl`, or None."""
-    try:
-        files = metadata.files("mkl") or []
-    except metadata.PackageNotFoundError:
-        return None
-    found = (str(file.locate()) for file in files if "mkl_rt" in file.name and ".lib" not in file.name)
-    return next((place for place in found if Path(place).exists()), None)
 
 
 def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> Floats:
@@ -84,7 +48,7 @@ class Pardiso:
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         self.pattern, self.kept = pattern, kept
         self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
-        library = pardiso_library()
+        library = mkl()
         library.MKL_Set_Num_Threads(threads)
         self._call_pardiso = library.pardiso
         self._mark = np.zeros(pattern.size, dtype=np.int32)
@@ -277,12 +241,12 @@ def other_solver() -> Iterator[str]:
     """Within, SuperLU is taken in PARDISO's place; its name, "" where it is the only one."""
     token = _OTHER.set(True)
     try:
-        yield "SuperLU" if pardiso_library() else ""
+        yield "SuperLU" if mkl() else ""
     finally:
         _OTHER.reset(token)
 
 
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
     """PARDISO where evfem[fast] is installed, else SuperLU, whose factors are never of `single` precision."""
-    kind = Pardiso if pardiso_library() and not _OTHER.get() else SuperLU
+    kind = Pardiso if mkl() and not _OTHER.get() else SuperLU
     return kind(pattern, kept, threads, single)

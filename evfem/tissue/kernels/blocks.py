@@ -7,13 +7,14 @@ cell, Q quadrature points, S samples of ln J, M modes of theta, L lanes.
 
 from __future__ import annotations
 
+import ctypes
 from functools import cache, partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, linalg, mkl
 
 LANES = 8
 
@@ -52,14 +53,22 @@ def loops(dim: int = 2) -> Any:
 
 @cache
 def contact_loop() -> Any:
-    """The compiled contact in the plane, with the dense algebra of scipy; None where it was not built."""
+    """The compiled contact in the plane, with the dense algebra of MKL, else of scipy; None where it was not
+    built.
+    """
     try:
         settle = import_module("evfem.tissue.kernels.contact").settle
     except ImportError:
         return None
+    if (library := mkl()) is not None:
+        return partial(settle, ctypes.cast(library.dgesv, ctypes.c_void_p).value)
+    linalg()
     from scipy.linalg import cython_lapack
 
-    return partial(settle, cython_lapack.__pyx_capi__["dgesv"])
+    capsule, python = cython_lapack.__pyx_capi__["dgesv"], ctypes.pythonapi
+    python.PyCapsule_GetName.restype, python.PyCapsule_GetPointer.restype = ctypes.c_char_p, ctypes.c_void_p
+    own = ctypes.py_object(capsule)
+    return partial(settle, python.PyCapsule_GetPointer(own, python.PyCapsule_GetName(own)))
 
 
 def blocked(values: Any) -> Any:

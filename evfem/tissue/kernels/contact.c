@@ -226,10 +226,11 @@ static int settle(step *s) {
 static PyObject *call_settle(PyObject *self, PyObject *args) {
     held all;
     step s = {0};
-    PyObject *lapack, *given[6];
+    PyObject *given[6];
+    unsigned long long lapack;
     int solves = 0;
     all.count = 0;
-    if (!PyArg_ParseTuple(args, "Oiipddd(OOOOOO)", &lapack, &s.c, &s.p, &s.rough, &s.tolerance, &s.stable,
+    if (!PyArg_ParseTuple(args, "Kiipddd(OOOOOO)", &lapack, &s.c, &s.p, &s.rough, &s.tolerance, &s.stable,
                           &s.least_own, &given[0], &given[1], &given[2], &given[3], &given[4], &given[5]))
         return NULL;
     Py_ssize_t c = s.c, p = s.p, m = 2 * c, t = 3 * c + p, room = (t * t + t + 2 * m + p + 2) * sizeof(double);
@@ -240,7 +241,7 @@ static PyObject *call_settle(PyObject *self, PyObject *args) {
     s.equations = hold(&all, given[3], 'd', p * (m + p + 2), 0);
     s.status = hold(&all, given[4], 'i', 2 * c, 1);
     s.moved = hold(&all, given[5], 'd', 4 * m + p, 1);
-    if (s.moved) s.solve = (lu)PyCapsule_GetPointer(lapack, PyCapsule_GetName(lapack));
+    if (s.moved) s.solve = (lu)(uintptr_t)lapack;
     if (s.solve && !(s.G = PyMem_Malloc(room + t * (sizeof(unknown) + sizeof(int))))) PyErr_NoMemory();
     if (s.G) {
         s.near = s.status + c, s.pushed = s.moved + m, s.acts = s.pushed + m, s.extra = s.acts + 2 * m;
@@ -257,8 +258,8 @@ static PyObject *call_settle(PyObject *self, PyObject *args) {
 
 static PyMethodDef methods[] = {
     {"settle", call_settle, METH_VARARGS,
-     "settle(dgesv, c, p, rough, tolerance, stable, least_own, (compliance, free, nodes, equations, marks,\n"
-     "found)): contact among c candidates with p more unknowns; number of solves, -1 if nothing was found."},
+     "settle(address of dgesv, c, p, rough, tolerance, stable, least_own, (compliance, free, nodes, equations,\n"
+     "marks, found)): contact among c candidates with p more unknowns; number of solves, -1 if nothing was found."},
     {NULL, NULL, 0, NULL}};
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "contact", "Compiled contact in the plane.", -1, methods};
