@@ -23,6 +23,7 @@ from evfem.contact.signorini import (
     Unstable,
 )
 from evfem.surface.pad import SurfaceState
+from evfem.tissue.kernels.blocks import contact_loop
 
 K = 5
 
@@ -343,3 +344,15 @@ def test_compiled_contact_is_the_twin_of_the_other(monkeypatch, twin, acts, unkn
         for name in ("moved", "force", "extra"):
             np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-9, atol=1e-11)
     assert decided > 3
+
+
+@pytest.mark.parametrize("wrong", range(6))
+@pytest.mark.parametrize("twin", ["compiled"], indirect=True)
+def test_compiled_contact_refuses_arrays_of_other_sizes(wrong, twin):
+    sizes, marks = [(4, 4), (4, 1), (2, 20), (0, 6), (2, 2), (16,)], 4
+    arrays = [np.zeros(size, np.int32 if i == marks else float) for i, size in enumerate(sizes)]
+    settle = contact_loop()
+    assert settle(2, 0, False, 1e-12, 0.9, 0.1, tuple(arrays)) == 1  # of no node, as none is near
+    arrays[wrong] = np.zeros(arrays[wrong].size + 1, arrays[wrong].dtype)
+    with pytest.raises(ValueError, match="an array of"):
+        settle(2, 0, False, 1e-12, 0.9, 0.1, tuple(arrays))
