@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evfem.newton.condensation import Pardiso, Singular, SuperLU, mkl_library
+from evfem.common.arrays import mkl_library
+from evfem.newton.condensation import Pardiso, Singular, SuperLU
 from evfem.tissue.pattern import Pattern
 
 #: PARDISO is part of evfem[fast]; without it there is one back end to test
