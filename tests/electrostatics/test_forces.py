@@ -106,6 +106,8 @@ def test_plates_follow_equations_2_to_7():
     assert plate_force(Kaczmarek(), 100.0, 0.0, 140.0, one) == pytest.approx(capacitor, rel=1e-14)
     # (4): Strong-Troxel exceeds (2) by the factor eps
     assert plate_force(StrongTroxel(), 100.0, 0.0, 140.0, one) == pytest.approx(5.0 * capacitor, rel=1e-14)
+    # (6) with a gap as thick as the layer counts in it
+    assert plate_force(StrongTroxel(), 100.0, 0.04, 140.0, one) == pytest.approx(1.25 * capacitor, rel=1e-14)
 
 
 @pytest.mark.parametrize("friction", [(1.0, 1.0), (0.3, 0.45)])
