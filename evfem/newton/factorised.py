@@ -69,7 +69,7 @@ class FactorisedBody:
         self.linearisation = Linearisation(body, interface, attraction, limits)
         self.pressure, self.record = Pressure(body.tissue, self.linearisation), self.linearisation.record
         longest = constants.LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
-        self.travel = Travel(interface, self._solve, longest)
+        self.travel = Travel(interface, longest)
         self._anderson = Anderson()
         self._renewed = self._scaled_down = False
 
@@ -216,7 +216,7 @@ class FactorisedBody:
         saved, residual = factor.forward(-balance.of_tangent(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
         driven = target.voltage.solve(step, self._problem(saved, state))
-        found, bone = self.travel.limited(step, driven.solution, state, target)
+        found, bone = self.travel.limited(step, driven.solution, state, target, self._solve)
         if driven.change:
             saved = saved + driven.change * driven.unit
         delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))

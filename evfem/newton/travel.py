@@ -15,19 +15,22 @@ from evfem.newton.control import Target
 from evfem.newton.interface import Interface
 from evfem.newton.state import State
 
+Solve = Callable[[LinearContactStep], StepSolution]
+
 
 @dataclass(frozen=True)
 class Travel:
-    """The bone's increment (dim,) and its contact solution by `solve`; `longest` (mm) of a linear step."""
+    """The bone's increment (dim,) and its contact solution; `longest` (mm) of a linear step."""
 
     interface: Interface
-    solve: Callable[[LinearContactStep], StepSolution]
     longest: float
 
     def limited(
-        self, step: LinearContactStep, found: StepSolution, state: State, target: Target
+        self, step: LinearContactStep, found: StepSolution, state: State, target: Target, solve: Solve
     ) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (dim,), shortened where it is too long for a linear step."""
+        """The solution and the bone's increment (dim,), shortened where it is too long for a linear step, and
+        contact solved again by `solve`.
+        """
         if not step.unknowns:
             return found, step.bone
         bone = step.bone.copy()
@@ -45,7 +48,7 @@ class Travel:
                 gap = float(self.interface.surface_at(state).gap.min())
                 longest = float(np.clip(2.0 * gap, SHORTEST_FLIGHT * longest, longest))
             bone[1] = np.copysign(longest, missing if flies else bone[1])
-            found = self.solve(replace(step, bone=bone, unknowns=()))
+            found = solve(replace(step, bone=bone, unknowns=()))
         return found, bone
 
     def _drawn(self, step: LinearContactStep, travel: float) -> bool:

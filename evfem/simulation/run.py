@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -156,6 +157,11 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
     return result
 
 
+def climb(model: Model, old: State, new: State, target: Target) -> float:
+    """The climb between two states; of no run, which would hold itself and its factors by it."""
+    return rise(SubstepWork(model, old, new), target)
+
+
 class Run:
     """A scene on its way: the model, the present state, the rows and frames so far."""
 
@@ -165,7 +171,9 @@ class Run:
         self.ledger = Ledger(self.model)
         allowed, body = allowed_error(scene), self.model.body
         equilibrium = self.model.equilibrium
-        self.stepper = Stepper(equilibrium, scene.coupling, body=body, allowed=allowed, rise=self._rise)
+        self.stepper = Stepper(
+            equilibrium, scene.coupling, body=body, allowed=allowed, rise=partial(climb, self.model)
+        )
         if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
@@ -184,16 +192,14 @@ class Run:
         if resume is not None:
             self._restore(resume)
 
-    def _rise(self, old: State, new: State, target: Target) -> float:
-        """The climb between two states."""
-        return rise(SubstepWork(self.model, old, new), target)
-
     def linearised(self) -> Run:
         """Another run that goes on from here with tissue that is linear about the present state."""
         run = copy(self)
         run.model = model = linearised(self.model, self.state)
         run.ledger = replace(self.ledger, model=model, sums=self.ledger.sums.copy())
-        run.stepper = replace(self.stepper, equilibrium=model.equilibrium, body=model.body, rise=run._rise)
+        run.stepper = replace(
+            self.stepper, equilibrium=model.equilibrium, body=model.body, rise=partial(climb, model)
+        )
         run.rows, run.frames, run.probed = self.rows.copy(), self.frames.copy(), self.probed.copy()
         return run
 

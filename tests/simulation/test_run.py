@@ -1,5 +1,6 @@
 """Whole scenes: the benchmark, symmetry, balances of forces and energies, history and checkpoints."""
 
+import gc
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from evfem import Dugdale, ElasticLayer, Hand
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.finger.fingerpad import MeshedFinger
+from evfem.newton.condensation import Pardiso, SuperLU
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import COLUMNS
@@ -287,3 +289,16 @@ def test_a_voltage_profile_follows_the_bone():
     assert result.electrostatic_force[:3].tolist() == [0.0, 0.0, 0.0]
     constant = run(Display(), law=Kaczmarek(), voltage=2000.0)
     assert result.electrostatic_force[-1] == pytest.approx(constant.electrostatic_force[-1], rel=0.05)
+
+
+def test_a_finished_run_leaves_no_factors_to_the_garbage_collector():
+    """They may take most of a run's memory, and many runs follow each other in a sweep or a notebook."""
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    scene = ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 100.0, ev.Press(force=0.02, steps=1))
+    gc.collect()
+    gc.disable()
+    try:
+        ev.simulate(scene)
+        assert not [one for one in gc.get_objects() if isinstance(one, (Pardiso, SuperLU))]
+    finally:
+        gc.enable()
