@@ -8,6 +8,7 @@ import pytest
 from tools.builders import INSULATOR, balance, benchmark_finger, benchmark_scene, coarse_pad, finger, resumed
 from tools.meshes import block
 
+import evfem as ev
 from evfem import Dugdale, ElasticLayer, Hand
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
