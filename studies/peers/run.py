@@ -24,12 +24,12 @@ LATE, LARGE = ("evfem.simulation.run", "numpy.ma", "email.parser"), 2
 def _evfem() -> Callable[..., dict[str, Any]]:
     for name in LATE:
         import_module(name)
-    from evfem.newton.condensation import pardiso_library
+    from evfem.common.arrays import mkl
     from evfem.simulation.run import simulate
 
     from ..precision.scenes import Case, build
 
-    pardiso_library()
+    mkl()
 
     def solve(scene: str, element: str, level: int, way: Way) -> dict[str, Any]:
         case = Case(scene, level, element, press=way.press, steps=way.slide, tolerance=way.tolerance)
@@ -43,9 +43,9 @@ def _evfem() -> Callable[..., dict[str, Any]]:
 
 
 def _felupe() -> Callable[..., dict[str, Any]]:
-    from evfem.newton.condensation import pardiso_library
+    from evfem.common.arrays import mkl
 
-    pardiso_library()  # tells pypardiso where the library is
+    mkl()  # tells pypardiso where the library is
     from .with_felupe import solve
 
     return solve
