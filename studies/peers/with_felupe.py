@@ -96,9 +96,9 @@ class Pull:
 
     def matrix(self, **_: Any) -> Any:
         """The derivative of what `vector` computed last."""
-        local = self.law.stiffness(self.position, self.voltage, np.array(True)).tocoo()
-        places = (self.dofs[local.row], self.dofs[local.col])
-        return sparse.csr_matrix((-local.data, places), (self.size, self.size))
+        local = self.law.stiffness(self.position, self.voltage, np.array(True))
+        places = (self.dofs[local.row], self.dofs[local.column])
+        return sparse.csr_matrix((-local.value, places), (self.size, self.size))
 
 
 class Peer:
