@@ -349,7 +349,7 @@ def test_a_process_ends_at_its_limit_and_another_takes_its_place():
 
 #: the normal suite's scenes, none of which takes more than a few seconds
 FEW = (3, 4, 5, 6, 7, 10, 11, 15, 16, 17)
-#: ends, or does not, by the rounding of one dense solve in thousands of iterations: the study counts such scenes
+#: ends or not by the rounding of one dense solve in thousands of iterations: the study counts such scenes
 BY_ROUNDING = 20
 REST = [pytest.param(number, marks=pytest.mark.slow) for number in sorted({*range(40)} - {*FEW, BY_ROUNDING})]
 
