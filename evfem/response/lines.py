@@ -35,6 +35,9 @@ NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
 #: how far nodes of the undeformed finger move between places, as a share of the distance of pad nodes; in mm
 #: pad nodes below which there is an attraction or a profile, and nodes along a profile
 INSIDE, SHIFT, ALONG = 4e-3, 5e-6, 1e-5
+#: relative change of the slope of the first touch that one node has, what a step falls by with several, and
+#: rounding of that height
+ONE_NODE, NEARER, ROUNDED = 1e-4, 0.1, 1e-14
 #: how many times as far apart places are for what is smooth
 FAR = 4.0
 #: refinements at most; the relative change that is still to come when they are done, that from which on it is
@@ -45,6 +48,7 @@ ROUNDS, DONE, ROUNDING, NOISE, WRONG, SLOW = 30, 1e-13, 1e-7, 0.5, 1e-6, 0.01
 UNKNOWN = ("u", "bone", "contact_force")
 #: what of a state knows the kinks of the attraction
 NEARBY = ("attraction", "charges")
+TIED = "several nodes touch the surface first, and which one is next depends on the sign of the change"
 LOST = "the linear equations of step {} were not solved"
 #: how columns with units end that are counted all the same
 WHOLE = ("contact_width", "contact_area", "mean_contact_pressure")
@@ -186,13 +190,14 @@ class Line:
         last = Beside.of(scene, parameter, PLACES[-1] * longest)
         inside, below = (max(1.0, share / PLACES[-1]) for share in _shifts(last, centre.run.model))
         step = longest / max(inside, below)
-        beside, wide = (
-            [Beside.of(scene, parameter, place * way) for place in PLACES] for way in (step, longest / inside)
-        )
-        if below <= inside:
-            wide = beside
+        beside = wide = _neighbours(scene, parameter, step)
+        if below > inside:
+            wide = _neighbours(scene, parameter, longest / inside)
+        step = beside[-1].way / PLACES[-1]
         state = changes([one.run.state for one in beside], step)
-        return cls(parameter.name, step, longest, beside, wide, centre, lengths, works, state)
+        line = cls(parameter.name, step, longest, beside, wide, centre, lengths, works, state)
+        line.reason = "" if _one_touches(beside) else TIED
+        return line
 
     @property
     def runs(self) -> list[Beside]:
@@ -342,6 +347,22 @@ class Line:
             assert one.request is not None
             one.run.time += one.request.duration
             one.run.rows.append({**row, **{n: row[n] + one.way * value for n, value in found.items()}})
+
+
+def _neighbours(scene: Scene, parameter: Parameter, step: float) -> list[Beside]:
+    """Runs of changed scenes at the places, so near that all touch the surface first at one node, if any."""
+    found = [Beside.of(scene, parameter, place * step) for place in PLACES]
+    if _one_touches(found) or step < LEAST * STEP * parameter.size:
+        return found
+    return _neighbours(scene, parameter, NEARER * step)
+
+
+def _one_touches(runs: Sequence[Beside]) -> bool:
+    """Whether the height of the first touch has one slope: with several nodes it would have a kink."""
+    models = [one.run.model for one in runs]
+    touched = [float(model.surface.y) + model.first_gap for model in models]
+    far, near = (touched[3] - touched[0]) / 4.0, (touched[2] - touched[1]) / 2.0
+    return abs(far - near) <= ONE_NODE * max(abs(far), abs(near)) + ROUNDED * abs(touched[0])
 
 
 def _shifts(one: Beside, model: Model) -> tuple[float, float]:

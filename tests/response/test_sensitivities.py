@@ -335,3 +335,15 @@ def test_where_a_force_is_held_shapes_change_normal_force_and_attraction_alike()
         normal, pull = (found[name, key][0] for name in ("normal_force", "electrostatic_force"))
         assert abs(pull) > 1e-6
         assert normal == pytest.approx(pull, abs=3e-10)
+
+
+def test_a_shape_whose_first_touch_passes_to_another_node_is_differentiated_before_that():
+    """Two low nodes of the tip: .04 degrees on, the other one is the lowest."""
+    tip = ev.Fingertip(resolution="coarse", ridges="none", width=16.4521, height=12.7766, length=23.8991)
+    tip = replace(tip, bone_length=17.9243, posture=21.9299)
+    press, key = ev.Press(indentation=0.05, steps=1), "finger.posture"
+    scene = ev.Scene(tip, ev.Flat(friction=0.0), motion=press, solver=ev.Solver(tolerance=1e-11))
+    found = ev.sensitivities(scene, key, "normal_force")
+    one, way = parameter_of(scene, key), 2e-3
+    ends = [ev.simulate(one.applied(scene, sign * way)).normal_force[0] for sign in (1.0, -1.0)]
+    assert found["normal_force", key][0] == pytest.approx((ends[0] - ends[1]) / (2.0 * way), rel=1e-4)
