@@ -1,6 +1,7 @@
 """Condensing factorisations against dense algebra; both back ends on the same problems."""
 
 import importlib.util
+import os
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -248,3 +249,22 @@ def test_a_call_to_the_library_asks_nothing_in_python(back_end):
     for given in called:
         assert not [one for one in given if hasattr(one, "_as_parameter_")]
         assert {type(one) for one in given[6:7] + given[13:15]} == {int}
+
+
+def test_where_all_unknowns_are_kept_memory_that_nobody_wrote_is_not_read():
+    """PARDISO ends the process, if its memory is not 0 by chance."""
+    program = """
+import numpy as np
+from evfem.newton.condensation import make_condensation
+from evfem.tissue.pattern import Pattern
+
+pattern = Pattern(np.arange(6)[None], 2)
+upper = np.zeros(pattern.indices.size)
+upper[pattern.diagonal] = 2.0
+factor = make_condensation(pattern, np.arange(12))
+factor.factorise(upper)
+assert np.allclose(factor.schur, 2.0 * np.eye(12))
+"""
+    environment = os.environ | {"MALLOC_PERTURB_": "165"}
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
