@@ -247,7 +247,7 @@ def other_solver() -> Iterator[str]:
 
 
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
-    """PARDISO where evfem[fast] is installed; else SuperLU, whose factors are never of `single` precision, and
+    """PARDISO where evfem[fast] is installed; else SuperLU, never with factors of `single` precision, and
     where all unknowns are kept: PARDISO then reads memory that nobody has written.
     """
     kind = Pardiso if kept.size < pattern.size and mkl() and not _OTHER.get() else SuperLU
