@@ -1,6 +1,6 @@
 /* Contact in the plane on a dense compliance: the twin of `LinearContactStep._settled` (evfem.contact.condensed),
-   where, in `signorini` and in `solve`, names and equations are told. All vectors here are along (x, y). LAPACK's
-   solver is that of scipy. */
+   where, in `signorini` and in `solve`, names and equations are told. All vectors here are along (x, y). The
+   dense solver is LAPACK's dgesv, of MKL or scipy. */
 
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030b0000
