@@ -190,13 +190,13 @@ class Line:
         last = Beside.of(scene, parameter, PLACES[-1] * longest)
         inside, below = (max(1.0, share / PLACES[-1]) for share in _shifts(last, centre.run.model))
         step = longest / max(inside, below)
-        beside = wide = _neighbours(scene, parameter, step)
+        beside = wide = _neighbours(scene, parameter, step, centre)
         if below > inside:
-            wide = _neighbours(scene, parameter, longest / inside)
+            wide = _neighbours(scene, parameter, longest / inside, centre)
         step = beside[-1].way / PLACES[-1]
         state = changes([one.run.state for one in beside], step)
         line = cls(parameter.name, step, longest, beside, wide, centre, lengths, works, state)
-        line.reason = "" if _one_touches(beside) else TIED
+        line.reason = "" if _one_touches(beside, centre) else TIED
         return line
 
     @property
@@ -349,20 +349,21 @@ class Line:
             one.run.rows.append({**row, **{n: row[n] + one.way * value for n, value in found.items()}})
 
 
-def _neighbours(scene: Scene, parameter: Parameter, step: float) -> list[Beside]:
+def _neighbours(scene: Scene, parameter: Parameter, step: float, centre: Beside) -> list[Beside]:
     """Runs of changed scenes at the places, so near that all touch the surface first at one node, if any."""
     found = [Beside.of(scene, parameter, place * step) for place in PLACES]
-    if _one_touches(found) or step < LEAST * STEP * parameter.size:
+    if _one_touches(found, centre) or step < LEAST * STEP * parameter.size:
         return found
-    return _neighbours(scene, parameter, NEARER * step)
+    return _neighbours(scene, parameter, NEARER * step, centre)
 
 
-def _one_touches(runs: Sequence[Beside]) -> bool:
-    """Whether the height of the first touch has one slope: with several nodes it would have a kink."""
-    models = [one.run.model for one in runs]
-    touched = [float(model.surface.y) + model.first_gap for model in models]
-    far, near = (touched[3] - touched[0]) / 4.0, (touched[2] - touched[1]) / 2.0
-    return abs(far - near) <= ONE_NODE * max(abs(far), abs(near)) + ROUNDED * abs(touched[0])
+def _one_touches(runs: Sequence[Beside], centre: Beside) -> bool:
+    """Whether the height of the first touch is smooth over the places: with several nodes it has a kink."""
+    models = [one.run.model for one in (*runs[:2], centre, *runs[2:])]
+    y = np.array([float(model.surface.y) + model.first_gap for model in models])
+    odd, even = 0.5 * (y[::-1] - y)[:2] / (2.0, 1.0), (y[::-1] + y - 2.0 * y[2])[:2] / (4.0, 1.0)
+    allowed = ONE_NODE * np.abs([odd, even]).max() + ROUNDED * abs(y[2])
+    return bool(abs(odd[0] - odd[1]) <= allowed and abs(even[0] - even[1]) <= allowed)
 
 
 def _shifts(one: Beside, model: Model) -> tuple[float, float]:

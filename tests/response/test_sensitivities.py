@@ -347,3 +347,12 @@ def test_a_shape_whose_first_touch_passes_to_another_node_is_differentiated_befo
     one, way = parameter_of(scene, key), 2e-3
     ends = [ev.simulate(one.applied(scene, sign * way)).normal_force[0] for sign in (1.0, -1.0)]
     assert found["normal_force", key][0] == pytest.approx((ends[0] - ends[1]) / (2.0 * way), rel=1e-4)
+
+
+def test_where_two_crests_touch_first_together_the_phase_has_no_derivative_and_the_others_have():
+    pad, solver = ev.FingerPad(resolution="coarse", ridge_phase=0.5), ev.Solver(tolerance=1e-11)
+    scene = ev.Scene(pad, ev.Flat(friction=0.0), motion=ev.Press(indentation=0.1, steps=1), solver=solver)
+    found = ev.sensitivities(scene, ("finger.ridge_phase", "finger.height"), "normal_force")
+    assert np.isnan(found["normal_force", "finger.ridge_phase"]).all()
+    assert "touch the surface first" in found.reasons["finger.ridge_phase"]
+    assert np.isfinite(found["normal_force", "finger.height"]).all()
