@@ -90,3 +90,19 @@ def test_scipy_comes_under_the_limits_that_hold_when_it_is_loaded(tmp_path):
         "print({*blas_threads(None)} == {os.cpu_count()})"
     )
     assert fresh(code, tmp_path).splitlines() == ["[1, 1] [2, 2]", "True"]
+
+
+def test_a_limit_that_begins_within_a_run_leaves_the_threads_of_its_factorisations(tmp_path):
+    """PARDISO ends the process where a phase has fewer threads than the analysis had."""
+    code = (
+        "import evfem as ev, threadpoolctl\n"
+        "class Limits:\n"
+        "    def step(self, *said):\n"
+        "        self.kept = threadpoolctl.threadpool_limits(1)\n"
+        "motion = [ev.Press(force=0.05, steps=5), ev.Slide(0.1, steps=5)]\n"
+        "waves = ev.Sinusoid(terms=[[0.005, 12.0, 0.0]], friction=0.3)\n"
+        "pad, solver = ev.FingerPad(resolution='coarse', ridges=False), ev.Solver(threads=2)\n"
+        "ev.simulate(ev.Scene(pad, waves, motion=motion, solver=solver), observers=[Limits()])\n"
+        "print('done')"
+    )
+    assert fresh(code, tmp_path) == "done"

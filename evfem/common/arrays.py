@@ -168,6 +168,7 @@ def mkl() -> Any:
             return None
         library = PyPardisoSolver().libmkl
     library.pardiso.argtypes, library.pardiso.restype = [ctypes.c_void_p] * 16, None
+    library.MKL_Set_Num_Threads(1)  # small dense systems lose by sharing; PARDISO has a number of its own
     return library
 
 

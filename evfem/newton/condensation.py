@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -48,9 +48,8 @@ class Pardiso:
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         self.pattern, self.kept = pattern, kept
         self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
-        library = mkl()
-        library.MKL_Set_Num_Threads(threads)
-        self._call_pardiso = library.pardiso
+        library, self._threads = mkl(), ctypes.c_int32(threads)
+        self._limit, self._call_pardiso = library.MKL_Set_Num_Threads_Local, library.pardiso
         self._mark = np.zeros(pattern.size, dtype=np.int32)
         # PARDISO numbers the Schur complement in ascending order of the unknowns
         self._order = np.argsort(kept)
@@ -79,7 +78,10 @@ class Pardiso:
         # addresses, not `array.ctypes`: ctypes would ask that in Python, and turns a Ctrl-C that comes just
         # then into an error of its own
         values, b, x = self._values.ctypes.data, b.ctypes.data, x.ctypes.data
+        # all phases with as many threads, whatever limit holds: with fewer than the analysis had, one crashes
+        others = self._limit(self._threads)
         self._call_pardiso(handle, *before, values, *after, b, x, ctypes.byref(self._error))
+        self._limit(others)
         return self._error.value
 
     def _arguments(self) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
@@ -170,8 +172,8 @@ class Pardiso:
             ctypes.memset(self._handle.ctypes.data, 0, self._handle.nbytes)
             self._open = False
 
-    def __del__(self) -> None:
-        if hasattr(self, "_fixed") and not sys.is_finalizing():
+    def __del__(self, ends: Callable[[], bool] = sys.is_finalizing) -> None:
+        if hasattr(self, "_fixed") and not ends():  # the names of this module may be gone by then
             self.close()
 
 
