@@ -58,7 +58,7 @@ class DenseSolver:
         self._unknowns = self._factors = None  # their memory is free before that of new ones is taken
         own = np.abs(np.diagonal(matrix))
         scale = 1.0 / np.sqrt(np.maximum(own, 1e-30 * (own.max() or 1.0)))  # within single precision
-        single = (matrix * scale).astype(np.float32)
+        single = np.multiply(matrix, scale, out=np.empty(matrix.shape, np.float32), casting="same_kind")
         single *= scale.astype(np.float32)[:, None]
         # the transposed is in LAPACK's order: nothing is copied
         factors, pivots, failed = lapack.sgetrf(single.T, overwrite_a=True)

@@ -70,7 +70,7 @@ OLD_FACTORS = 0.2
 #: refined is what leaves this fraction of the right-hand side, in at most so many rounds
 REFINED, REFINEMENTS = 1e-14, 14
 #: rows of a matrix that are copied at once
-BLOCK = 256
+BLOCK = 64
 #: a tangent with so many kept unknowns is factorised in single precision, as few are in the plane, where that
 #: gains nothing [space]
 LARGE_SCHUR = 1000

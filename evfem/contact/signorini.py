@@ -44,8 +44,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import DenseSolver, Floats, Ints, block
-from evfem.common.constants import DISC_OWN, ROUNDING
+from evfem.common.arrays import DenseSolver, Floats, Ints
+from evfem.common.constants import BLOCK, DISC_OWN, ROUNDING
 
 
 @dataclass(frozen=True)
@@ -302,6 +302,14 @@ class _Equations:
         self.index = np.zeros(n * status.size, dtype=np.int64)
         self.index[self.whole] = np.arange(self.whole.size)
 
+    def matrix(self, compliance: Floats) -> Floats:
+        """The equations (u, u) but for their diagonal, made of blocks of rows that the cache holds."""
+        columns = np.empty((self.whole.size, self.place.size + self.turned.size))
+        for begin in range(0, self.whole.size, BLOCK):
+            rows = compliance.take(self.whole[begin : begin + BLOCK], axis=0)
+            columns[begin : begin + BLOCK] = self.columns(rows.take(self.whole, axis=1))
+        return self.rows(columns)
+
     def columns(self, C: Floats) -> Floats:
         """Effect of the unknowns (q, u) from that of the `whole` (q, w), which is overwritten."""
         n, first = self.felt.shape[1], C[:, : self.closed.size]
@@ -342,7 +350,7 @@ def solve_statuses(
     steady = (system.drop + system.shear).ravel()
     start = problem.start + problem.compliance @ steady if steady.any() else problem.start
     right = -system.rows(start[whole, None])
-    matrix = system.rows(system.columns(block(problem.compliance, whole, whole)))
+    matrix = system.matrix(problem.compliance)
     pressed, own = np.split(np.arange(place.size), [place.size - attracted.size])
     last = np.arange(place.size, len(right))
     matrix[last, last] += system.kept
