@@ -28,7 +28,7 @@ from tempfile import TemporaryDirectory
 
 from mistakes import CHECKOUT, Copy, replaced
 
-ROOMS = ("tissue", "electrostatics", "contact", "solver", "simulation")
+ROOMS = ("tissue", "electrostatics", "contact", "newton", "solver", "simulation")
 #: pytest's status where all tests of a file have other marks
 NO_TESTS = 5
 #: seconds of tests after which an edit counts as not seen
