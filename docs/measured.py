@@ -6,8 +6,8 @@ the page on the paper, the pictures, and the times that the command says beforeh
     python docs/runs.py
 
 The first two keep the files of the studies in docs/results and their pictures in docs/pictures, the third
-measures the default run and single steps. A page has what these files have: a test compares.
-`docs/results/long.csv` has what the tests do in hours, line by line, with date and commit.
+measures the default run, single steps and ridged fingertips. A page has what these files have: a test
+compares. `docs/results/long.csv` has what the tests do in hours, line by line, with date and commit.
 `python docs/measured.py` alone writes the pages anew, `python docs/measured.py --times FOLDER` takes
 the times of the studies alone, also of those with --quick.
 """
@@ -189,6 +189,15 @@ def default_run(runs: Found) -> str:
     )
 
 
+def tips(runs: Found) -> str:
+    """What ridged fingertips take."""
+    n, rows = runs["numbers"], []
+    for name, title in {"along": "along the finger", "whorl": "whorl"}.items():
+        nodes, steps, spent, memory = (n[f"tip.{name}.{key}"] for key in ("nodes", "steps", "cpu_s", "GB"))
+        rows.append([title, f"{nodes:,.0f}", f"{steps:.0f}", short(spent), short(memory)])
+    return table(["ridges", "nodes", "steps", "CPU s", "GB"], rows)
+
+
 def loop_times(runs: Found) -> str:
     """What a step of a loop takes."""
     n, rows = runs["numbers"], []
@@ -343,6 +352,7 @@ BLOCKS: dict[str, tuple[Callable[..., str], list[str]]] = {
     "precision-questions": (questions, ["work_precision.json"]),
     "default-run": (default_run, ["runs.json"]),
     "loop-times": (loop_times, ["runs.json"]),
+    "tips": (tips, ["runs.json"]),
     "robustness": (robustness, ["stability.json", "campaigns.csv", "long.csv", MISTAKES]),
     "campaigns": (campaigns, ["campaigns.csv"]),
     "fringe": (fringe, ["fringe.json"]),

@@ -1,6 +1,6 @@
 """Measures what no study does, in CPU seconds on one thread: the built-in scene by the command, with and
-without PARDISO, and single steps of a loop. `python docs/runs.py` writes docs/results/runs.json and the
-pages; it takes about a minute.
+without PARDISO, single steps of a loop, and ridged fingertips with their memory. `python docs/runs.py`
+writes docs/results/runs.json and the pages; it takes about four minutes.
 """
 
 from __future__ import annotations
@@ -30,6 +30,11 @@ LOOPS = {
     "coarse": (ev.FingerPad(resolution="coarse", ridges=False), 0.05, 100),
     "medium": (ev.FingerPad(resolution="medium", ridges=False), 0.05, 60),
     "fingertip": (ev.Fingertip(resolution="coarse", ridges=False), 0.2, 12),
+}
+#: a fingertip's ridges -> pressing force (N) and the slides at 1000 V
+TIPS: dict[str, tuple[float, list[ev.Motion]]] = {
+    "along": (1.0, [ev.Slide(3.0, steps=15, hold="force")]),
+    "whorl": (0.5, [ev.Slide(1.0, steps=5, hold="force", angle=angle) for angle in (0.0, 90.0)]),
 }
 
 
@@ -65,6 +70,21 @@ def loop_times(finger: ev.FingerPad | ev.Fingertip, force: float, steps: int) ->
     return {"begin_s": taken[0], "median_s": half, "ninth_s": most, "unknowns": unknowns}
 
 
+def tip_run(ridges: str) -> None:
+    """Press a ridged fingertip and slide it; print its nodes, steps, CPU seconds and GB of this process."""
+    begin, (force, slides) = time.process_time(), TIPS[ridges]
+    finger = ev.Fingertip(resolution="coarse", ridges=ridges)
+    motion = [ev.Press(force=force, steps=8), *slides]
+    result = ev.simulate(ev.Scene(finger, ev.Display(friction=0.3), ev.Kaczmarek(), 1000.0, motion))
+    found = {
+        "nodes": len(result.mesh.points),
+        "steps": len(result.normal_force),
+        "cpu_s": time.process_time() - begin,
+    }
+    found["GB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0 / 1e9
+    print(json.dumps(found))
+
+
 def main() -> None:
     """Measure, keep, and write the pages."""
     import measured
@@ -75,6 +95,9 @@ def main() -> None:
     numbers |= {"default.fast.cpu_s": fast["cpu_s"], "default.plain.cpu_s": plain["cpu_s"]}
     for name, (finger, force, steps) in LOOPS.items():
         numbers |= {f"loop.{name}.{k}": float(v) for k, v in loop_times(finger, force, steps).items()}
+    for name in TIPS:
+        child = subprocess.run([sys.executable, __file__, name], check=True, capture_output=True)
+        numbers |= {f"tip.{name}.{k}": float(v) for k, v in json.loads(child.stdout).items()}
     made = {"quick": False, "seconds": round(time.perf_counter() - begin, 1)}
     made |= {"commit": commit(), "processor": processor()}
     found = {"study": "runs", "numbers": numbers, "paper": {}, "provenance": origin() | made}
@@ -83,4 +106,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tip_run(*sys.argv[1:]) if sys.argv[1:] else main()
