@@ -65,6 +65,7 @@ class History:
     electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards", "shown"))
     electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
     adhesive_force: Floats = field(metadata=column("N/mm", "adhesion, downwards"))
+    adhesive_force_x: Floats = field(metadata=column("N/mm", "x component of adhesion"))
     contact_width: Floats = field(
         metadata=column("mm", "from the first to the last edge of contact", "shown", whole="mm2")
     )
@@ -140,6 +141,7 @@ SPATIAL: Mapping[str, Mapping[str, Any]] = {
     "tangential_force_x": column("N", "sum of contact forces, against +x"),
     "tangential_force_z": column("N", "sum of contact forces, against +z", "shown"),
     "electrostatic_force_z": column("N", "z component of the attraction"),
+    "adhesive_force_z": column("N", "z component of adhesion"),
     "contact_area": column("mm2", "of the convex hull of what touches", "shown"),
     "real_contact_area": column("mm2", "of all that touches", "shown"),
 }

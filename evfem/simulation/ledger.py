@@ -99,8 +99,9 @@ class Ledger:
             "normal_force": float(contact[1] + withheld.sum()),
             "tangential_force": float(0.0 - contact[along] @ forward),
             "electrostatic_force": float((withheld - kept).sum() - attraction[1] + adhesion[1]),
-            "electrostatic_force_x": float(attraction[0] - adhesion[0]),
             "adhesive_force": float(kept.sum() - adhesion[1]),
+            **_components("electrostatic_force", attraction - adhesion),
+            **_components("adhesive_force", adhesion),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
             "surface_sink": max(0.0, float(state.given[:, 1].max(initial=0.0))),
@@ -134,6 +135,11 @@ class Ledger:
         return [0, 2], np.array(slides[-1] if slides else (1.0, 0.0))
 
 
+def _components(name: str, force: Floats) -> dict[str, float]:
+    """Columns of a force's components (dim,) along x, in space along z too."""
+    return {f"{name}_{axis}": float(force[i]) for axis, i in zip("xz", range(0, force.size, 2), strict=False)}
+
+
 def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
     """Columns of the widths or areas of contact, mm or mm2, in space those along z too."""
     pressure = state.contact_force[:, 0] / shares(model, position)
@@ -150,7 +156,6 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
         "applied_tangential_force_z": float(state.reaction[2]),
         "tangential_force_x": float(0.0 - contact[0]),
         "tangential_force_z": float(0.0 - contact[2]),
-        "electrostatic_force_z": float(state.attraction[:, 2].sum()),
         "contact_area": area,
         "real_contact_area": real,
     }

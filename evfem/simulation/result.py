@@ -163,6 +163,7 @@ class Result(History):
     applied_tangential_force_x = _component("applied_tangential_force_x")
     applied_tangential_force_z = _component("applied_tangential_force_z")
     electrostatic_force_z = _component("electrostatic_force_z")
+    adhesive_force_z = _component("adhesive_force_z")
 
     @property
     def units(self) -> Mapping[str, str]:

@@ -105,13 +105,13 @@ def forces(scene: ev.Scene, result: ev.Result) -> Found:
     force, energy, step = _largest_force(result), largest_energy(result), result.step
     level = scene.ground.is_flat and scene.ground.elastic is None
     if scene.solver.dynamics != "inertial":  # as a vector
-        x = result.applied_tangential_force_x - result.tangential_force_x + result.electrostatic_force_x
-        z = result.applied_tangential_force_z - result.tangential_force_z + result.electrostatic_force_z
+        x = result.applied_tangential_force_x - result.tangential_force_x
+        x += result.electrostatic_force_x + result.adhesive_force_x
+        z = result.applied_tangential_force_z - result.tangential_force_z
+        z += result.electrostatic_force_z + result.adhesive_force_z
         y = -result.applied_force + result.normal_force - result.electrostatic_force - result.adhesive_force
-        # of adhesion, columns have the downward part alone
-        along = np.hypot(x, z) if level or scene.adhesion is None else 0.0
         allowed = max(TOLERANCE, 1e2 * scene.solver.tolerance)
-        yield _worst("balance", np.hypot(along, y) / force, allowed, step)
+        yield _worst("balance", np.linalg.norm([x, y, z], axis=0) / force, allowed, step)
     if level and isinstance(scene.friction_law, ev.Coulomb):
         # on a level surface the sums lie within the cone of the largest coefficient
         friction = scene.surface.friction  # type: ignore[attr-defined]

@@ -24,8 +24,7 @@ def add_parts(random: Draw, tables: Tables) -> None:
     if random.chance(0.06) and not _sought(tables):
         layer = {"E": random.spread(0.2, 100.0), "nu": random.between(0.2, 0.49)}
         tables["surface"]["elastic"] = layer | {"thickness": random.spread(0.2, 5.0)}
-    # along the normal of a slope adhesion has an x part, which no column has
-    if random.chance(0.06) and electric.get("direction", "vertical") == "vertical":
+    if random.chance(0.06):
         tables["adhesion"] = _adhesion(random)
 
 

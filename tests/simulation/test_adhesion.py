@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulation.test_core import SCALE, WORK, block
 from simulation.test_spheres import paraboloid
-from tools.builders import left_over
+from tools.builders import left_over, unbalanced
 from tools.domes import Dome, dome_scene
 
 import evfem as ev
@@ -154,10 +154,27 @@ def test_forces_and_works_balance(name):
     more = {"surface": ev.Display(friction=0.3), "adhesion": MOIST} | SCENES[name]
     motion = [ev.Press(force=0.03, steps=3), ev.Slide(0.4, steps=3)]
     result = ev.simulate(ev.Scene(PAD, motion=motion, **more))
-    pulled = result.electrostatic_force + result.adhesive_force
-    np.testing.assert_allclose(result.applied_force, result.normal_force - pulled, atol=1e-8)
+    np.testing.assert_allclose(unbalanced(result), 0.0, atol=1e-8)
     assert left_over(result) < 1e-7
     assert (result.adhesive_force > 0.0).all()
+
+
+@pytest.mark.parametrize("axes", ["x", "xz"])
+def test_adhesion_normal_to_the_outline_pulls_aside(axes):
+    """On waves along x in the plane, at 40 degrees in space: without its columns forces do not balance."""
+    surface, motion = (
+        ev.Sinusoid(terms=[[0.02, 2.0, 0.3]], friction=0.2),
+        [ev.Press(indentation=0.3, steps=2)],
+    )
+    given = {"law": None, "voltage": 0.0, "adhesion": ev.Dugdale(0.005, 0.05), "direction": "normal"}
+    if axes == "x":
+        result = ev.simulate(ev.Scene(PAD, surface, motion=motion, **given))
+    else:
+        result = ev.simulate(dome_scene(*motion, surface=replace(surface, angle=40.0), **given))
+    np.testing.assert_allclose(unbalanced(result), 0.0, atol=1e-8)
+    for axis in axes:
+        assert np.abs(result[f"adhesive_force_{axis}"][-1]) > 1e-3 * result.adhesive_force[-1]
+        assert result[f"electrostatic_force_{axis}"][-1] == 0.0
 
 
 def test_friction_sees_adhesion_as_a_load():

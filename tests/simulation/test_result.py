@@ -19,11 +19,11 @@ from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, Result, lo
 CONTRACT = (
     "step, motion_index, motion, time, position, indentation, voltage, applied_force, "
     "applied_tangential_force, normal_force, tangential_force, electrostatic_force, "
-    "electrostatic_force_x, adhesive_force, contact_width, real_contact_width, min_gap, surface_sink, "
-    "peak_contact_pressure, mean_contact_pressure, external_work, electrostatic_work, adhesive_work, "
-    "stored_energy, friction_dissipation, viscous_dissipation, kinetic_energy, integrator_dissipation, "
-    "snap_dissipation, source_work, leakage_dissipation, stretch_work, field_energy, substeps, "
-    "newton_iterations, relaxations, jumps, seconds"
+    "electrostatic_force_x, adhesive_force, adhesive_force_x, contact_width, real_contact_width, "
+    "min_gap, surface_sink, peak_contact_pressure, mean_contact_pressure, external_work, "
+    "electrostatic_work, adhesive_work, stored_energy, friction_dissipation, viscous_dissipation, "
+    "kinetic_energy, integrator_dissipation, snap_dissipation, source_work, leakage_dissipation, "
+    "stretch_work, field_energy, substeps, newton_iterations, relaxations, jumps, seconds"
 )
 
 
@@ -182,7 +182,7 @@ def test_a_total_has_the_same_names_over_the_depth(tmp_path):
     total = result.total
     per_depth = {name for name in COLUMNS if name.endswith(("_force", "_force_x", "_width"))}
     per_depth |= {name for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))}
-    assert len(per_depth) == 22
+    assert len(per_depth) == 23
     for name in COLUMNS:
         factor = 8.0 if name in per_depth else 1.0
         assert total.rows[2][name] == (

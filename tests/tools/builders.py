@@ -32,6 +32,20 @@ def left_over(result):
     return (left / np.maximum(np.abs(given + kept).max(axis=0), 1e-12)).max()
 
 
+def unbalanced(result):
+    """Sum of the forces on a finger at rest, x, y, z (3, steps)."""
+    pulled = result.electrostatic_force + result.adhesive_force
+    y = result.normal_force - pulled - result.applied_force
+    x, z = (
+        getattr(result, f"applied_tangential_force_{axis}")
+        - getattr(result, f"tangential_force_{axis}")
+        + getattr(result, f"electrostatic_force_{axis}")
+        + getattr(result, f"adhesive_force_{axis}")
+        for axis in "xz"
+    )
+    return np.array([x, y, z])
+
+
 def resumed(scene, after, folder=None):
     """The result of a scene, and that of a run that goes on from its checkpoint after a step, by way of a
     file where a folder is given.
