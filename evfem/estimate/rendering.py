@@ -19,7 +19,7 @@ from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import Encoding, share_not_renderable
 from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.protocols import ForceLaw, Observer, Surface
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
@@ -170,6 +170,8 @@ def voltage_for(
     >>> limited.largest, round(limited.share_limited, 3), round(limited.error_of_amplifier, 3)
     (1000.0, 0.859, 0.098)
     """
+    if not isinstance(reference, ApparentFriction):
+        raise InputError("reference", quoted(reference), "an ApparentFriction, as apparent_friction makes it")
     x = reference.position
     force = depth * reference.normal_force
     voltage = display.voltage_for_friction(np.maximum(reference.friction, 0.0), force)

@@ -88,6 +88,11 @@ class State:
         return Past(self.seconds, self.rates)
 
     @property
+    def unit(self) -> str:
+        """Unit of its forces."""
+        return "N/mm" if self.bone.size == 2 else "N"
+
+    @property
     def touching(self) -> Any:
         """Pad nodes in contact, (P,) bool."""
         return self.status != OPEN
@@ -179,9 +184,10 @@ def findings(body: Body, state: State, balance: Balance) -> str:
     nodal = np.linalg.norm(np.where(np.isnan(forces), np.inf, forces), axis=1)
     worst = np.argsort(nodal)[::-1][:NAMED]
     places = (body.space.mesh.points + state.u)[worst]
-    unit = "N/mm" if state.bone.size == 2 else "N"
     at = [", ".join(f"{coordinate:.4g}" for coordinate in place) for place in places]
-    named = ", ".join(f"{nodal[node]:.1e} {unit} at ({place})" for node, place in zip(worst, at, strict=True))
+    named = ", ".join(
+        f"{nodal[node]:.1e} {state.unit} at ({place})" for node, place in zip(worst, at, strict=True)
+    )
     opened, sticking = int((state.status == OPEN).sum()), int((state.status == STICK).sum())
     slipping = state.status.size - opened - sticking
     smallest = body.tissue.smallest_J(state.u)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import CRITICAL, SOFTENED
+from evfem.common.constants import CRITICAL, SMALLEST_FORCE, SOFTENED
 from evfem.errors import InputError
 from evfem.newton.control import Target
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
@@ -24,7 +24,7 @@ from evfem.surface.pad import surface_state
 DISSIPATED = 0.05
 #: share of the energy of a run that a row may have from nowhere
 GAINED = 0.01
-#: share of the works that an equilibrium's tolerance leaves open
+#: share of the works that an equilibrium's tolerance leaves open, of those of no force too
 OPEN_WORK = 1e-7
 #: share of the energy of a run that is lost in one row where other states are stable too
 SNAPPED = 0.1
@@ -149,6 +149,7 @@ def _energy(rows: Sequence[Row]) -> float:
 
 def _gained(rows: Sequence[Row]) -> Iterator[str]:
     own, works = _lost(rows, "integrator"), np.abs(_column(rows, "external_work")).max()
+    works += SMALLEST_FORCE * np.abs(_column(rows, "indentation")).max()
     if own.min() < -GAINED * _energy(rows) - OPEN_WORK * works:
         worst = int(own.argmin())
         yield (
@@ -244,10 +245,8 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
 
 def _place(model: Model, state: State) -> str:
     position, indentation = state.bone[0] + 0.0, model.indentation(state.bone) + 0.0
-    load, voltage = -state.reaction[1] + 0.0, state.voltage + 0.0
-    return (
-        f"position {position:.4g} mm, indentation {indentation:.4g} mm, {load:.3g} N/mm and {voltage:.4g} V"
-    )
+    load, voltage = f"{-state.reaction[1] + 0.0:.3g} {state.unit}", state.voltage + 0.0
+    return f"position {position:.4g} mm, indentation {indentation:.4g} mm, {load} and {voltage:.4g} V"
 
 
 def _may_have_an_energy(scene: Scene) -> bool:

@@ -57,8 +57,8 @@ from evfem.tissue.body import Body
 TINY = 1e-300
 #: why a release ends in the air
 LIFTED = (
-    "there is no equilibrium near here: the finger is pulled with {:.3g} N/mm and lifts off, where the "
-    "attraction holds {:.3g} N/mm"
+    "there is no equilibrium near here: the finger is pulled with {:.3g} {unit} and lifts off, where the "
+    "attraction holds {:.3g} {unit}"
 )
 
 
@@ -159,7 +159,7 @@ def _refuse_flight(state: State, target: Target) -> None:
     """Raise `LiftedOff` if contact is lost and the attraction is smaller than the pull."""
     held, force = -float(state.attraction[:, 1].sum()), pull(state, target)
     if force > max(held, 0.0) and not state.touching.any():
-        raise LiftedOff(LIFTED.format(force, held), [])
+        raise LiftedOff(LIFTED.format(force, held, unit=state.unit), [])
 
 
 def pull(state: State, target: Target) -> float:

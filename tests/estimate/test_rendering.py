@@ -212,3 +212,5 @@ def test_slides_that_cannot_be_rendered_are_refused(jump):
         compare(jump.result, back.result)
     with pytest.raises(ev.InputError, match="position up to 2 mm"):
         felt([0.1, 0.2, 0.3]).minimum(after=3.0)
+    with pytest.raises(ev.InputError, match="an ApparentFriction, as apparent_friction makes it"):
+        voltage_for([0.1, 0.2, 0.3], encoding(0.2))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import finger, resumed
+from tools.builders import coarse_pad, finger, resumed
 from tools.domes import dome_scene
 from tools.meshes import block
 
@@ -52,6 +52,11 @@ def test_a_resumed_run_knows_what_passed_before(tmp_path):
     whole, again = resumed(scene, 1, tmp_path)
     assert any("passed through the surface" in said for said in whole.warnings)
     assert again.warnings == whole.warnings
+
+
+def test_a_finger_that_hovers_without_any_force_has_nothing_from_nowhere():
+    held = ev.Scene(coarse_pad(), ev.Flat(), motion=[ev.Hover(gap=0.5)])
+    assert ev.simulate(held).warnings == []
 
 
 def test_a_slide_that_touches_nothing_is_told():

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from tools.builders import SKIN, finger, left_over
+from tools.domes import dome_scene
 from tools.meshes import between, block, held
 
 import evfem as ev
@@ -175,16 +176,23 @@ def test_a_prescribed_load_is_kept(point):
     assert left_over(result) < 1e-6
 
 
-def test_a_finger_pulled_harder_than_the_attraction_holds_lifts_off():
-    """A block whose ends the attraction pulls down keeps that pull while the voltage falls."""
-    motion = [ev.Press(indentation=1e-4, steps=1), ev.VoltageRamp(voltage=0.0, steps=1, hold="force")]
-    held_by_voltage = ev.Scene(
-        finger(block(8, 2, sag=0.01), E=0.02), ev.Display(), ev.Kaczmarek(), 1500.0, motion
-    )
-    with pytest.raises(ev.NotConverged, match=r"near here: the finger is pulled with 0\.0002") as lost:
-        ev.simulate(held_by_voltage)
+LET_GO = [ev.Press(indentation=1e-4, steps=1), ev.VoltageRamp(voltage=0.0, steps=1, hold="force")]
+SAGGING = finger(block(8, 2, sag=0.01), E=0.02)
+
+
+@pytest.mark.parametrize(
+    ("scene", "unit"),
+    [(ev.Scene(SAGGING, ev.Display(), ev.Kaczmarek(), 1500.0, LET_GO), "N/mm"), (dome_scene(*LET_GO), "N")],
+)
+def test_a_finger_pulled_harder_than_the_attraction_holds_lifts_off(scene, unit):
+    """A block whose ends the attraction pulls down, and a dome, keep that pull while the voltage falls."""
+    with pytest.raises(ev.NotConverged, match="there is no equilibrium near here") as lost:
+        ev.simulate(scene)
     assert lost.value.step == 2
+    pull = f"{lost.value.result.applied_force[0]:.3g}".removeprefix("-")
+    assert f"the finger is pulled with {pull} {unit} and lifts off" in str(lost.value)
     assert "it was lost at position 0 mm" in str(lost.value)
+    assert f", -{pull} {unit} and " in str(lost.value)
 
 
 def test_a_viscous_finger_without_mass_is_pulled_off_at_once():
