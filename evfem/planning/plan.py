@@ -30,7 +30,7 @@ from evfem.protocols import TimeSignal
 from evfem.scene.file import scene_at
 from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Scene
-from evfem.scene.spatial import check_space, memory
+from evfem.scene.spatial import check_space, needs
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
 from evfem.tissue.branches import KEPT_BYTES, branches_in
@@ -352,7 +352,7 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
     yield f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}"
     yield f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set"
     if mesh.dim == 3:
-        yield f"direct solver: {memory(mesh)}"
+        yield f"direct solver: {needs(scene, mesh)}"
     laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
     if stiff := [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]:
         yield f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume"
