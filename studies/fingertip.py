@@ -41,8 +41,8 @@ LOAD = 0.5
 WAY = (0.1, 0.25, LOAD)
 ASSUMPTIONS = {
     "pad": "Table 2's axes and moduli; 22.5 mm long (26 mm seen at 30 degrees); the bone's axes are assumed",
-    "areas": "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that is "
-    "larger than the hull of the touching nodes; ridge (and smooth pads): all that touches",
+    "areas": "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that "
+    "differs from the hull of the touching nodes; ridge (and smooth pads): all that touches",
     "press": "no friction, no voltage, rim held by the nail; one variant has friction 0.3",
     "hover": "rigid, local thickness of the stratum corneum; fingers of Table 1 as Fingertip.participant",
     "ridges": "twelve cells across each; the error of the mesh is that of six",
@@ -103,7 +103,7 @@ def gross_area(result: ev.Result, frame: int) -> tuple[float, float]:
     position = (result.mesh.points + shown.displacement)[skin.nodes]
     inner = float(ConvexHull(position[shown.contact_status[skin.nodes] > 0][:, ::2]).volume)
     gross = float(result.contact_area[frame])
-    return gross, gross - inner
+    return gross, abs(gross - inner)
 
 
 def pressed(name: str, result: ev.Result, loads: Sequence[float]) -> dict[str, list[float]]:
