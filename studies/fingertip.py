@@ -96,7 +96,7 @@ def press(finger: Any, loads: Sequence[float], friction: float = 0.0, steps: int
 
 
 def gross_area(result: ev.Result, frame: int) -> tuple[float, float]:
-    """Gross contact area (mm2), and by how much it is larger than the hull of the touching nodes."""
+    """Gross contact area (mm2), and by how much it differs from the hull of the touching nodes."""
     from scipy.spatial import ConvexHull
 
     skin, shown = make_skin(result.mesh), result.frames[frame]
