@@ -11,7 +11,7 @@ from random import Random
 import numpy as np
 import pytest
 from tools import kills
-from tools.commands import called, run_process
+from tools.commands import called, contents, run_process
 
 import evfem
 from evfem import runfolder
@@ -23,10 +23,6 @@ from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
 
 pytestmark = pytest.mark.solver
-
-
-def contents(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.mark.parametrize(

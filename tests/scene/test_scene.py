@@ -1,11 +1,10 @@
 """Scenes hold what they were given, refuse what does not fit together, and have a stable fingerprint."""
 
-import subprocess
-import sys
 from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
+from tools.commands import printed
 from tools.refusals import refuses
 
 import evfem as ev
@@ -155,18 +154,8 @@ def test_the_fingerprint_of_user_code_follows_the_code():
 
 
 def test_the_fingerprint_is_the_same_in_another_process():
-    code = f"import sys; sys.path[:0] = {sys.path!r}\nimport evfem; print(evfem.default_scene().digest())"
-    seeds = [
-        subprocess.run(
-            [sys.executable, "-c", code],
-            capture_output=True,
-            text=True,
-            check=True,
-            env={"PYTHONHASHSEED": s},
-        )
-        for s in "12"
-    ]
-    assert {done.stdout.strip() for done in seeds} == {ev.default_scene().digest()}
+    code = "import evfem; print(evfem.default_scene().digest())"
+    assert {printed(code, PYTHONHASHSEED=seed) for seed in "12"} == {ev.default_scene().digest()}
 
 
 def test_the_fingerprint_of_a_path_is_that_of_the_file(tmp_path):

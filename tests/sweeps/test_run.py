@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from tools.commands import contents
 from tools.meshes import block
 from tools.refusals import refuses
 from tools.workers import work_or_die
@@ -160,14 +161,14 @@ def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
 def test_points_of_another_sweep_are_kept_unless_told_otherwise(plan, tmp_path, capsys):
     out = tmp_path / "out"
     ev.sweep(plan, out, workers=1)
-    before = {p: p.read_bytes() for p in out.rglob("*") if p.is_file()}
+    before = contents(out)
     plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.1, 0.15]\n"))
     assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1"]) == 2
     assert capsys.readouterr().err == (
         f"evfem: --out: given {out}, with 2 points of another sweep; "
         "allowed: another folder, --resume to keep them, --overwrite to remove them\n"
     )
-    assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
+    assert contents(out) == before
     now = ev.__version__
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ev, "__version__", "9.9.9")
@@ -250,10 +251,10 @@ def test_a_file_of_others_that_a_sweep_never_wrote_stops_it(plan, tmp_path, monk
     ev.sweep(plan, out, workers=1)
     monkeypatch.undo()
     (out / name).write_text("mine")
-    before = {p: p.read_bytes() for p in out.rglob("*") if p.is_file()}
+    before = contents(out)
     with pytest.raises(InputError, match=rf"where {Path(name).name} was not written by a sweep; allowed"):
         ev.sweep(plan, out, workers=1, **more)
-    assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
+    assert contents(out) == before
 
 
 def test_a_process_that_dies_costs_its_own_point_alone(tmp_path):
