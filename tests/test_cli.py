@@ -14,12 +14,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from evfem.studies.campaign import study
 from tools.commands import called, contents, printed, process_of, run_process
 from tools.fakes import SQUARE_SCENE
 from tools.meshes import square_mesh
 
 import evfem
-from evfem import cli
+from evfem import cli, studies
 from evfem.mesh import file as meshfile
 from evfem.runfolder import RunFolder
 from evfem.simulation.result import COLUMNS
@@ -514,8 +515,6 @@ def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path
 
 
 def test_all_means_every_study_but_those_that_stand_apart(monkeypatch, tmp_path):
-    from evfem import studies
-
     ran = []
     monkeypatch.setattr(studies, "NAMES", ("laws", "peers", "fig05", "campaign"))
     monkeypatch.setattr(studies, "run", lambda *words: ran.append(words) or {"assumptions": {}})
@@ -524,10 +523,6 @@ def test_all_means_every_study_but_those_that_stand_apart(monkeypatch, tmp_path)
 
 
 def test_scenes_of_a_campaign_are_chosen_by_options_that_others_refuse(monkeypatch, tmp_path):
-    from evfem.studies.campaign import study
-
-    from evfem import studies
-
     ran, found = [], SimpleNamespace(finish=lambda out, quick: {"assumptions": {}})
     monkeypatch.setattr(study, "main", lambda quick, out, sample: ran.append(sample) or found)
     assert cli.main(["study", "campaign", "--scenes", "7", "--seed", "3", "--out", str(tmp_path)]) == 0

@@ -20,6 +20,8 @@ from tools.refusals import refuses
 import evfem as ev
 from evfem.common import tables
 from evfem.mesh import file as meshfile
+from evfem.mesh.mesh import Mesh
+from evfem.mesh.quality import check
 from evfem.scene.file import load, loads
 
 SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
@@ -183,9 +185,6 @@ def test_hostile_meshes_get_a_sentence(name, tmp_path):
 
 
 def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
-    from evfem.mesh.mesh import Mesh
-    from evfem.mesh.quality import check
-
     n = 60_000
     points = np.zeros((n, 2))
     points[1] = 10.0, 0.0
@@ -197,9 +196,6 @@ def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
 
 
 def test_an_outline_of_many_short_and_many_long_edges_is_refused():
-    from evfem.mesh.mesh import Mesh
-    from evfem.mesh.quality import check
-
     n = 6000  # a fan of needles: edges as long as the finger beside each other
     angle = np.linspace(0.0, 1.0, n)
     rim = 10.0 * np.column_stack([np.cos(angle), np.sin(angle)])

@@ -39,11 +39,6 @@ def test_hertz_load_is_the_integral_of_its_pressure():
     assert HERTZ.pressure(np.array([0.0, a, 2.0 * a])).tolist() == [HERTZ.peak_pressure, 0.0, 0.0]
 
 
-def test_hertz_from_its_half_width():
-    again = HertzLine.from_half_width(HERTZ.half_width, HERTZ.radius, HERTZ.modulus)
-    assert again.load == pytest.approx(HERTZ.load, rel=1e-14)
-
-
 def test_stick_zone_carries_the_tangential_load_within_the_cone():
     contact = CattaneoMindlin(HERTZ, friction_coefficient=0.4, tangential=0.015)
     a, c = HERTZ.half_width, contact.stick_half_width

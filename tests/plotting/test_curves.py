@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.fakes import fake_result, fake_row
+from tools.fakes import fake_result, fake_row, lines_of
 from tools.meshes import square_mesh
 from tools.refusals import refuses
 
@@ -26,10 +26,6 @@ from evfem.plotting.curves import ENERGIES, abscissa
 from evfem.plotting.labels import kind_of
 from evfem.scene.probes import Probe, columns, histories
 from evfem.simulation.result import COLUMNS, Result
-
-
-def lines_of(ax):
-    return {line.get_label(): line for line in ax.get_lines()}
 
 
 def assert_line(line, x, y):

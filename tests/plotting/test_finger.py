@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
-from tools.fakes import fake_result
+from tools.fakes import bar_of, fake_result, lines_of
 from tools.meshes import KINDS, square_mesh
 from tools.refusals import refuses
 
@@ -19,17 +19,8 @@ from evfem.simulation.model import placed
 WINDOW = (-0.5, 0.7, -0.1, 0.4)
 
 
-def lines_of(ax):
-    return {line.get_label(): line for line in ax.get_lines()}
-
-
 def current(result, frame=-1):
     return result.mesh.points + result.frames[frame].displacement
-
-
-def bar_of(ax):
-    (bar,) = [one for one in ax.figure.axes if one.get_label() == "<colorbar>"]
-    return bar
 
 
 @pytest.mark.parametrize("kind", KINDS)

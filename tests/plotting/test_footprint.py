@@ -6,7 +6,7 @@ from matplotlib.collections import PolyCollection
 from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 from tools.domes import Dome, dome, dome_scene
-from tools.fakes import fake_result
+from tools.fakes import bar_of, fake_result
 from tools.refusals import refuses
 
 import evfem as ev
@@ -62,8 +62,7 @@ def test_statuses_fill_the_shares_of_the_nodes_with_their_colour(result):
 
 
 def test_shear_is_a_magnitude_and_has_colours_from_zero(result):
-    axes = footprint(result, "shear_traction").figure.axes
-    bar = next(one for one in axes if one.get_label() == "<colorbar>")
+    bar = bar_of(footprint(result, "shear_traction"))
     assert bar.get_ylim()[0] == 0.0
     assert "shear traction (MPa)" in (bar.get_ylabel(), bar.get_xlabel())
 

@@ -48,16 +48,10 @@ def test_axes_have_the_units_of_the_sweep():
     assert [line.get_label() for line in lines] == ["force 0.1 N", "force 0.2 N"]
 
 
-def test_what_is_varied_beside_is_points_without_a_line():
-    (line,) = sweep(table(GRID), GAP, OUT).get_lines()
-    assert line.get_linestyle() == "None"
-    assert line.get_marker() == "o"
-    assert len(line.get_xdata()) == 6
-
-
-def test_samples_are_points_without_a_line():
-    (line,) = sweep(table(GRID[:2], samples={"count": 2}), GAP, OUT).get_lines()
-    assert line.get_linestyle() == "None"
+def test_what_is_varied_beside_and_samples_are_points_without_a_line():
+    for found, count in ((table(GRID), 6), (table(GRID[:2], samples={"count": 2}), 2)):
+        (line,) = sweep(found, GAP, OUT).get_lines()
+        assert (line.get_linestyle(), line.get_marker(), len(line.get_xdata())) == ("None", "o", count)
 
 
 def test_names_stand_in_the_order_of_the_table():

@@ -181,7 +181,7 @@ RESUMED = {
 @pytest.mark.filterwarnings("ignore:motion . has steps of", "ignore:probes have")
 def test_a_resumed_run_repeats_itself(name, after, tmp_path):
     """In the middle of a motion and between two."""
-    whole, again = resumed(RESUMED[name], after, tmp_path)
+    whole, again = resumed(RESUMED[name], after, folder=tmp_path)
     for column in set(COLUMNS) - {"motion", "seconds"}:
         np.testing.assert_allclose(again[column], whole[column], rtol=1e-11, atol=1e-15, err_msg=column)
     assert again.warnings == whole.warnings
