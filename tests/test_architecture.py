@@ -96,19 +96,8 @@ EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
-LATE = {
-    "skfem",
-    "meshio",
-    "matplotlib",
-    "PIL",
-    "pypardiso",
-    "tqdm",
-    "distributed",
-    "pyarrow",
-    "pandas",
-    "xarray",
-    "SurfaceTopography",
-}
+LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm"}
+LATE |= {"distributed", "pyarrow", "pandas", "xarray", "SurfaceTopography"}
 #: compiled from C, without imports
 BUILT = {f"evfem.tissue.kernels.{name}" for name in ("loops", "solids", "contact")}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450

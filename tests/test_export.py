@@ -29,14 +29,8 @@ from evfem.mesh.mesh import raised
 from evfem.simulation.model import make_model
 from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS
 
-POINT_DATA = (
-    "displacement",
-    "gap",
-    "contact_pressure",
-    "shear_traction",
-    "electrostatic_traction",
-    "contact_status",
-)
+POINT_DATA = ("displacement", "gap", "contact_pressure", "shear_traction")
+POINT_DATA += ("electrostatic_traction", "contact_status")
 CELL_DATA = ("region", "von_mises", "cauchy_stress", "J")
 
 

@@ -37,6 +37,7 @@ def test_hertz_load_is_the_integral_of_its_pressure():
     a = HERTZ.half_width
     assert integral(HERTZ.pressure, -a, a) == pytest.approx(0.05, rel=1e-5)
     assert HERTZ.pressure(np.array([0.0, a, 2.0 * a])).tolist() == [HERTZ.peak_pressure, 0.0, 0.0]
+    assert HertzLine.from_half_width(a, HERTZ.radius, HERTZ.modulus).load == pytest.approx(0.05, rel=1e-14)
 
 
 def test_stick_zone_carries_the_tangential_load_within_the_cone():
