@@ -4,13 +4,13 @@ A new file of `evfem/` must be given its place in `ROOMS`.
 """
 
 import ast
-import subprocess
 import sys
 import tomllib
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from tools.commands import printed
 
 import evfem
 
@@ -96,19 +96,8 @@ EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
-LATE = {
-    "skfem",
-    "meshio",
-    "matplotlib",
-    "PIL",
-    "pypardiso",
-    "tqdm",
-    "distributed",
-    "pyarrow",
-    "pandas",
-    "xarray",
-    "SurfaceTopography",
-}
+LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm"}
+LATE |= {"distributed", "pyarrow", "pandas", "xarray", "SurfaceTopography"}
 #: compiled from C, without imports
 BUILT = {f"evfem.tissue.kernels.{name}" for name in ("loops", "solids", "contact")}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
@@ -275,14 +264,6 @@ def test_no_test_is_skipped_or_expected_to_fail():
             assert not (isinstance(node, ast.Attribute) and node.attr in words), f"{path}, line {node.lineno}"
 
 
-def fresh_process(code):
-    """What a new interpreter prints that finds the same packages."""
-    words = [sys.executable, "-c", f"import sys\nsys.path[:0] = {sys.path!r}\n{code}"]
-    done = subprocess.run(words, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
-
-
 def test_the_laws_load_neither_scikit_fem_nor_matplotlib():
     code = (
         "import evfem as ev\n"
@@ -293,7 +274,7 @@ def test_the_laws_load_neither_scikit_fem_nor_matplotlib():
         "heavy = {'skfem', 'matplotlib', 'scipy.optimize', 'scipy.integrate', 'meshio'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
-    assert fresh_process(code) == "[]"
+    assert printed(code) == "[]"
 
 
 def test_a_press_loads_no_package_that_it_has_no_use_for(tmp_path):
@@ -310,12 +291,12 @@ def test_a_press_loads_no_package_that_it_has_no_use_for(tmp_path):
         f"ev.meshfile.write(pad.mesh(), {str(tmp_path / 'pad.vtu')!r})\n"
         f"press(ev.MeshedFinger({str(tmp_path / 'pad.vtu')!r}, pad.materials))"
     )
-    assert fresh_process(code).splitlines() == ["[] False", "[] True"]
+    assert printed(code).splitlines() == ["[] False", "[] True"]
 
 
 def test_importing_the_package_loads_nothing_else():
     code = "import evfem\nprint([m for m in sys.modules if m.startswith(('numpy', 'scipy', 'evfem.'))])"
-    assert fresh_process(code) == "[]"
+    assert printed(code) == "[]"
 
 
 def test_public_modules_are_found_by_their_public_names():
@@ -326,7 +307,7 @@ def test_public_modules_are_found_by_their_public_names():
         "assert ev.electrostatics.Kaczmarek is ev.Kaczmarek\n"
         "print(export.__name__, plotting.__name__, meshfile.__name__)"
     )
-    assert fresh_process(code) == "evfem.export evfem.plotting evfem.mesh.file"
+    assert printed(code) == "evfem.export evfem.plotting evfem.mesh.file"
 
 
 def test_every_public_name_can_be_loaded_and_is_listed():

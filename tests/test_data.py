@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tools.refusals import refuses
 
 from evfem import data
-from evfem.errors import InputError
 
 
 @pytest.mark.parametrize("name", data.NAMES)
@@ -31,9 +31,6 @@ def test_participants_reproduce_the_printed_statistics():
 
 
 def test_unknown_names_list_what_exists():
-    with pytest.raises(InputError, match="table1, table2"):
-        data.load("table3")
-    with pytest.raises(InputError, match="E_sc"):
-        data.load("table2").value("E_bone")
-    with pytest.raises(InputError, match="HVHD"):
-        data.load("table1")["LVHD"]
+    refuses("table1, table2", data.load, "table3")
+    refuses("E_sc", data.load("table2").value, "E_bone")
+    refuses("HVHD", lambda: data.load("table1")["LVHD"])

@@ -11,7 +11,8 @@ from random import Random
 import numpy as np
 import pytest
 from tools import kills
-from tools.commands import called, run_process
+from tools.builders import resumed
+from tools.commands import called, contents, run_process
 
 import evfem
 from evfem import runfolder
@@ -19,14 +20,10 @@ from evfem.common.storage import load_arrays, save_arrays
 from evfem.scene.file import load
 from evfem.simulation.checkpoint import CHECKPOINT_FORMAT
 from evfem.simulation.history import csv_header
-from evfem.simulation.result import COLUMNS, Saved
+from evfem.simulation.result import COLUMNS
 from evfem.simulation.run import simulate
 
 pytestmark = pytest.mark.solver
-
-
-def contents(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.mark.parametrize(
@@ -64,20 +61,12 @@ def test_kills_at_random_moments_lose_nothing(name, count, tmp_path):
 @pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_run_resumed_after_any_step_repeats_the_uninterrupted_one_to_the_last_bit(name, tmp_path):
     kills.prepare(tmp_path, name)
-    scene, kept = load(tmp_path / f"{name}.toml"), {}
-
-    class Keep:
-        def step(self, row, frame, checkpoint):
-            kept[row["step"]] = ({key: np.array(a) for key, a in checkpoint().items()}, dict(row))
-
-    whole = simulate(scene, observers=[Keep()])
+    whole, *others = resumed(load(tmp_path / f"{name}.toml"), 1, 4, 9, 19)
     assert max(whole.newton_iterations) > 1
-    for at in (1, 4, 9, 19):
-        saved = Saved(kept[at][0], [kept[k][1] for k in range(1, at + 1)])
-        resumed = simulate(scene, resume=saved)
+    for again in others:
         for column in set(COLUMNS) - {"seconds", "motion"}:
-            np.testing.assert_array_equal(getattr(resumed, column), getattr(whole, column), err_msg=column)
-        np.testing.assert_array_equal(resumed.frames[-1].displacement, whole.frames[-1].displacement)
+            np.testing.assert_array_equal(again[column], whole[column], err_msg=column)
+        np.testing.assert_array_equal(again.frames[-1].displacement, whole.frames[-1].displacement)
 
 
 @pytest.fixture(scope="module")

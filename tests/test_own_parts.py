@@ -10,6 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 from tools.builders import INSULATOR, SKIN
 from tools.meshes import block
+from tools.refusals import refuses
 
 import evfem as ev
 from evfem.errors import InputError
@@ -170,8 +171,7 @@ def test_a_stop_before_the_first_step_is_an_error() -> None:
 def test_an_observer_that_would_be_told_of_nothing_is_refused_before_the_run(deaf: Any) -> None:
     heard = Progress()
     words = r"observers\[1\]: given .*; allowed: an object with started\(mesh, scene, total_steps\), step\("
-    with pytest.raises(InputError, match=words):
-        ev.simulate(ev.Scene(pad(), FLAT, motion=[PRESS]), observers=[heard, deaf])
+    refuses(words, ev.simulate, ev.Scene(pad(), FLAT, motion=[PRESS]), observers=[heard, deaf])
     assert not hasattr(heard, "lines")
 
 
@@ -239,5 +239,4 @@ def test_objects_that_are_no_surface() -> None:
     for kind in classes:
         with pytest.raises(InputError, match=f"surface: given the class {kind.__name__}; allowed: an object"):
             ev.Scene(pad(), kind, motion=[PRESS])
-    with pytest.raises(InputError, match=r"surface\.friction: given -1\.0"):
-        ev.Scene(pad(), Rough(), motion=[PRESS])
+    refuses(r"surface\.friction: given -1\.0", ev.Scene, pad(), Rough(), motion=[PRESS])

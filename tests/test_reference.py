@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from tools.refusals import refuses
 
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
 from evfem.errors import InputError
@@ -36,11 +37,7 @@ def test_hertz_load_is_the_integral_of_its_pressure():
     a = HERTZ.half_width
     assert integral(HERTZ.pressure, -a, a) == pytest.approx(0.05, rel=1e-5)
     assert HERTZ.pressure(np.array([0.0, a, 2.0 * a])).tolist() == [HERTZ.peak_pressure, 0.0, 0.0]
-
-
-def test_hertz_from_its_half_width():
-    again = HertzLine.from_half_width(HERTZ.half_width, HERTZ.radius, HERTZ.modulus)
-    assert again.load == pytest.approx(HERTZ.load, rel=1e-14)
+    assert HertzLine.from_half_width(a, HERTZ.radius, HERTZ.modulus).load == pytest.approx(0.05, rel=1e-14)
 
 
 def test_stick_zone_carries_the_tangential_load_within_the_cone():
@@ -157,6 +154,4 @@ def test_sliding_point_jams_where_friction_times_slope_reaches_one():
     ],
 )
 def test_impossible_input_is_refused_by_key(make, key):
-    with pytest.raises(InputError) as caught:
-        make()
-    assert caught.value.key == key
+    assert refuses("allowed", make).key == key

@@ -53,7 +53,15 @@ def steps_on_disk(path):
     return rows, series, index, [row["step"] for row in point.rows]
 
 
-@pytest.mark.parametrize("place", ["frame", "checkpoint", "history", "index"])
+@pytest.mark.parametrize(
+    "place",
+    [
+        "export.write_frame",
+        "runfolder.Checkpoint.write",
+        "runfolder.csv_line",
+        "export.ParaViewSeries.write_index",
+    ],
+)
 def test_a_step_whose_writing_was_interrupted_is_written_at_the_end(tmp_path, monkeypatch, place):
     folder = started(tmp_path, plots=False)
     take(folder, 1, 2)
@@ -61,13 +69,7 @@ def test_a_step_whose_writing_was_interrupted_is_written_at_the_end(tmp_path, mo
     def interrupt(*arguments, **more):
         raise KeyboardInterrupt
 
-    what = {
-        "frame": (export, "write_frame"),
-        "checkpoint": (Checkpoint, "write"),
-        "history": ("evfem.runfolder", "csv_line"),
-        "index": (export.ParaViewSeries, "write_index"),
-    }[place]
-    monkeypatch.setattr(*(what if place != "history" else (f"{what[0]}.{what[1]}",)), interrupt)
+    monkeypatch.setattr(f"evfem.{place}", interrupt)
     with pytest.raises(KeyboardInterrupt):
         take(folder, 3)
     monkeypatch.undo()

@@ -6,10 +6,9 @@ threads than the main one.
 """
 
 import os
-import subprocess
-import sys
 
 import pytest
+from tools.commands import printed
 
 WATCH = """
 import time
@@ -56,11 +55,7 @@ WAYS = {
 
 def fresh(code, folder):
     """What a new process prints, without the variables that limit threads."""
-    environment = {key: value for key, value in os.environ.items() if not key.endswith("_NUM_THREADS")}
-    words = [sys.executable, "-c", f"import sys\nsys.path[:0] = {sys.path!r}\n{code}"]
-    done = subprocess.run(words, capture_output=True, text=True, env=environment, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+    return printed(code, folder, **{key: None for key in os.environ if key.endswith("_NUM_THREADS")})
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tools.commands import printed
 
 import evfem
 
@@ -63,8 +64,7 @@ def test_the_marker_of_typed_packages_is_installed():
 
 def test_only_public_names_are_shown():
     code = "import evfem as ev\nev.simulate, ev.plotting, ev.scenefile\nprint(*dir(ev))"
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert shown.split() == sorted(["__version__", *evfem.__all__])
+    assert printed(code).split() == sorted(["__version__", *evfem.__all__])
 
 
 @pytest.mark.types

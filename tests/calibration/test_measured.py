@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tools.builders import finger
 from tools.meshes import block
+from tools.refusals import refuses
 
 from evfem.calibration.measured import MeasuredCurve, MeasuredValues, along
 from evfem.errors import InputError
@@ -121,9 +122,8 @@ def test_a_file_as_machines_write_it(tmp_path, coding, columns):
 )
 def test_what_a_file_of_a_machine_lacks_is_said(tmp_path, given, sentence):
     (tmp_path / "press.csv").write_text(MACHINE)
-    with pytest.raises(InputError, match=sentence) as caught:
-        MeasuredCurve.from_csv(tmp_path / "press.csv", **given)
-    assert str(tmp_path) not in str(caught.value)
+    caught = refuses(sentence, MeasuredCurve.from_csv, tmp_path / "press.csv", **given)
+    assert str(tmp_path) not in str(caught)
 
 
 def test_values_from_a_file(tmp_path):
@@ -155,10 +155,8 @@ def test_values_from_a_file(tmp_path):
 )
 def test_damaged_files_are_refused(tmp_path, text, sentence):
     (tmp_path / "press.csv").write_text(text)
-    with pytest.raises(InputError, match=sentence):
-        MeasuredCurve.from_csv(tmp_path / "press.csv")
-    with pytest.raises(InputError, match="No such file"):
-        MeasuredCurve.from_csv(tmp_path / "none.csv")
+    refuses(sentence, MeasuredCurve.from_csv, tmp_path / "press.csv")
+    refuses("No such file", MeasuredCurve.from_csv, tmp_path / "none.csv")
 
 
 GAPS = {"motion.0.gap": [0.1, 0.2]}
@@ -190,8 +188,7 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
     ],
 )
 def test_what_is_no_measurement_is_refused(make, sentence):
-    with pytest.raises(InputError, match=sentence):
-        make()
+    refuses(sentence, make)
 
 
 def test_separators_at_the_ends_of_lines_and_units_after_a_blank(tmp_path):
@@ -211,5 +208,4 @@ def test_a_file_in_newtons_is_divided_by_its_depth(tmp_path):
     np.testing.assert_allclose(curve.sd, [0.1, 0.2])
     path.write_text("position,peak_contact_pressure\n1,0.03\n")
     assert MeasuredCurve.from_csv(path, depth=10.0).values.tolist() == [0.03]  # no depth in it
-    with pytest.raises(InputError, match=r"data.depth: given 0.0; allowed: a depth in mm"):
-        MeasuredCurve.from_csv(path, depth=0.0)
+    refuses(r"data.depth: given 0.0; allowed: a depth in mm", MeasuredCurve.from_csv, path, depth=0.0)

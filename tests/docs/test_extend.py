@@ -6,13 +6,12 @@ the file, at the beginning of a line, however they are spaced there.
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from textwrap import indent
 
 import pytest
 from docs.test_pages import DOCS, blocks
+from tools.commands import printed
 
 import evfem
 
@@ -170,9 +169,7 @@ def test_the_table_says_how_many_files_each_change_touches():
     "use", [LAYER, COLUMN, WAVEFORM, OTHERS], ids=["layer", "column", "waveform", "others"]
 )
 def test_the_recipes_work_together_in_a_copy(copy, use):
-    path = [str(copy), *sys.path]
     head = (
-        f"import sys\nsys.path[:] = {path!r}\nimport evfem, evfem as ev\nassert {path[0]!r} in ev.__file__\n"
+        f"sys.path.insert(0, {str(copy)!r})\nimport evfem, evfem as ev\nassert {str(copy)!r} in ev.__file__\n"
     )
-    done = subprocess.run([sys.executable, "-c", head + use], capture_output=True, text=True, cwd=copy)
-    assert done.returncode == 0, done.stderr[-2000:]
+    printed(head + use, copy)

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from tools.refusals import refuses
 
 import evfem as ev
 from evfem.electrostatics import signalfile
@@ -168,8 +169,7 @@ def test_ticks_are_the_finest_that_fit():
     assert signalfile.ticks(10.0, 48.1) == (-5, 4810)  # 48100 micrometres a second are more than 48000
     assert signalfile.ticks(70.0, 20.0) == (-5, 2000)  # 70000 micrometres are more than 16 bits hold
     assert signalfile.ticks(10.0, 12.34567) == (-6, 12_346)
-    with pytest.raises(InputError, match=r"speed: given 0.014 mm/s over 500 mm"):
-        signalfile.ticks(500.0, 0.014)
+    refuses(r"speed: given 0.014 mm/s over 500 mm", signalfile.ticks, 500.0, 0.014)
 
 
 def test_the_carrier_stands_in_the_description():
@@ -208,15 +208,12 @@ def test_files_of_others_are_textures_or_get_a_sentence(tmp_path):
     perception["perception_modality"] = "Vibration"
     other = json.loads(json.dumps(perception)) | {"perception_modality": "Friction", "unit_exponent": -5}
     path.write_text(json.dumps(file | {"perceptions": [perception, other]}))
-    with pytest.raises(InputError, match=r"a\.hjif, without them; allowed: a \.hjif with the largest"):
-        signalfile.read_signal(path)
+    refuses(r"a\.hjif, without them; allowed: a \.hjif with the largest", signalfile.read_signal, path)
     assert Haptics(licence="CC0-1.0")(path).length == pytest.approx(100.0)  # ten times as long
     for text in ("", "[]", json.dumps(file | {"perceptions": [perception]}), '{"perceptions": [3]}'):
         path.write_text(text)
-        with pytest.raises(InputError, match=r"path: given a\.hjif, of another kind or damaged; allowed: a"):
-            signalfile.read_signal(path)
-    with pytest.raises(InputError, match="No such file"):
-        signalfile.read_signal(tmp_path / "none.hjif")
+        refuses(r"path: given a\.hjif, of another kind or damaged; allowed: a", signalfile.read_signal, path)
+    refuses("No such file", signalfile.read_signal, tmp_path / "none.hjif")
 
 
 # structure and names: developer.apple.com/documentation/corehaptics, "Representing haptic patterns in AHAP
@@ -272,9 +269,6 @@ def test_what_is_no_pattern_gets_a_sentence(tmp_path):
         with pytest.raises(InputError, match=r"a\.ahap, of another kind or damaged; allowed: an AHAP file"):
             ev.Sampled.from_ahap(path, 100.0)
     pattern(path, {"Event": CONTINUOUS | {"EventDuration": 1e9}})
-    with pytest.raises(InputError, match="allowed: 2 to 1000000 samples"):
-        ev.Sampled.from_ahap(path, 100.0)
-    with pytest.raises(InputError, match="full_scale: given -1"):
-        ev.Sampled.from_ahap(path, -1.0)
-    with pytest.raises(InputError, match="No such file"):
-        ev.Sampled.from_ahap(tmp_path / "none.ahap", 1.0)
+    refuses("allowed: 2 to 1000000 samples", ev.Sampled.from_ahap, path, 100.0)
+    refuses("full_scale: given -1", ev.Sampled.from_ahap, path, -1.0)
+    refuses("No such file", ev.Sampled.from_ahap, tmp_path / "none.ahap", 1.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tools.builders import benchmark_finger, coarse_pad, left_over
+from tools.refusals import refuses
 from tools.scenes import PRESS, head
 
 import evfem as ev
@@ -56,10 +57,8 @@ def test_derivatives_are_those_of_the_separation(law):
 
 def test_what_is_no_gap_is_refused():
     for given in (-0.001, 2.0, "rough", None, True, POWER.__class__):
-        with pytest.raises(ev.InputError, match="roughness_gap"):
-            roughness_of(given)
-    with pytest.raises(ev.InputError, match="open_gap"):
-        ev.ExponentialRoughness(decay=0.001, pressure=1.0, open_gap=0.001)
+        refuses("roughness_gap", roughness_of, given)
+    refuses("open_gap", ev.ExponentialRoughness, decay=0.001, pressure=1.0, open_gap=0.001)
     with pytest.raises(ev.InputError, match="only with a law"):
         ev.Scene(coarse_pad(), ev.Flat(), motion=ev.Press(force=0.01), roughness_gap=0.001)
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.refusals import refuses
 
 from evfem.common.tables import read_table
-from evfem.errors import InputError
 from evfem.estimate.correction import corrected
 from evfem.estimate.database import CURVES, FILE, compute_database, read, reference_curves, shipped, textures
 from evfem.estimate.estimate import estimate, known_error, reduced
@@ -177,8 +177,7 @@ def test_a_level_texture_and_a_spectrum_have_no_estimate():
     level = Texture("t", "k", [0.0, 1.0], [0.1, 0.1], "CC0-1.0")
     spectrum = Texture("t", "k", [1.0, 2.0], [0.6, 0.8], "CC0-1.0", "friction_spectrum")
     for texture in (level, spectrum):
-        with pytest.raises(InputError, match="texture: given t"):
-            estimate(texture, Touch())
+        refuses("texture: given t", estimate, texture, Touch())
 
 
 def test_the_database_is_resumed_and_written_whole(tmp_path, monkeypatch):
@@ -206,5 +205,4 @@ def test_the_database_is_resumed_and_written_whole(tmp_path, monkeypatch):
     assert np.ptp(curves["weave"][curves["ridged"] == 1.0]) > 1.0
     assert np.isnan(curves["wood"]).all()
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(InputError, match=FILE):
-        read(tmp_path / "other.csv", True)
+    refuses(FILE, read, tmp_path / "other.csv", True)

@@ -1,15 +1,13 @@
 """Condensing factorisations against dense algebra; both back ends on the same problems."""
 
 import importlib.util
-import os
-import subprocess
-import sys
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.commands import printed
 
 from evfem.common.arrays import mkl_library
 from evfem.newton.condensation import Pardiso, Singular, SuperLU
@@ -228,9 +226,7 @@ for allocations in range(30):
 @every_back_end
 def test_a_factorisation_may_be_collected_while_numpy_changes_its_error_state(back_end):
     """CPython keeps a context variable that is read just then after it is freed."""
-    program = COLLECTED.replace("Pardiso", back_end.__name__)
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert printed(COLLECTED.replace("Pardiso", back_end.__name__)) == ""
 
 
 @pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
@@ -265,6 +261,4 @@ factor = make_condensation(pattern, np.arange(12))
 factor.factorise(upper)
 assert np.allclose(factor.schur, 2.0 * np.eye(12))
 """
-    environment = os.environ | {"MALLOC_PERTURB_": "165"}
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert printed(program, MALLOC_PERTURB_="165") == ""

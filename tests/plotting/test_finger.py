@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
-from tools.fakes import fake_result
+from tools.fakes import bar_of, fake_result, lines_of
 from tools.meshes import KINDS, square_mesh
+from tools.refusals import refuses
 
 import evfem as ev
 from evfem.plotting import FIELDS, contact_pressure, deformed, figures, regions, side_by_side
@@ -18,17 +19,8 @@ from evfem.simulation.model import placed
 WINDOW = (-0.5, 0.7, -0.1, 0.4)
 
 
-def lines_of(ax):
-    return {line.get_label(): line for line in ax.get_lines()}
-
-
 def current(result, frame=-1):
     return result.mesh.points + result.frames[frame].displacement
-
-
-def bar_of(ax):
-    (bar,) = [one for one in ax.figure.axes if one.get_label() == "<colorbar>"]
-    return bar
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -319,19 +311,14 @@ def test_contact_pressure_is_drawn_along_the_current_x_of_the_pad():
 
 def test_unknown_fields_frames_and_windows_get_a_sentence():
     result = fake_result()
-    with pytest.raises(ev.InputError, match="von_mises"):
-        deformed(result, "stress")
-    with pytest.raises(ev.InputError, match="2 frames kept"):
-        deformed(result, frame=2)
-    with pytest.raises(ev.InputError, match="2 frames kept"):
-        contact_pressure(result, frame=-3)
+    refuses("von_mises", deformed, result, "stress")
+    refuses("2 frames kept", deformed, result, frame=2)
+    refuses("2 frames kept", contact_pressure, result, frame=-3)
     for near in ("touch", (1.0, 0.0, 0.0, 1.0), (0.0, 1.0), (0.0, np.inf, 0.0, 1.0), 3.0):
-        with pytest.raises(ev.InputError, match=r"near: .*contact, or a window"):
-            deformed(result, near=near)
+        refuses(r"near: .*contact, or a window", deformed, result, near=near)
     with pytest.raises(ev.InputError, match=r"vmin: given 2\.0; allowed: a value below vmax, which is 1"):
         deformed(result, vmin=2.0, vmax=1.0)
-    with pytest.raises(ev.InputError, match="results: given nothing"):
-        side_by_side({})
+    refuses("results: given nothing", side_by_side, {})
 
 
 def test_probes_are_marked_where_they_are_and_only_in_the_window():

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
-from tools.fakes import fake_result
+from tools.fakes import bar_of, fake_result
 from tools.meshes import KINDS
 
 from evfem.plotting import deformed
@@ -55,8 +55,7 @@ def test_statuses_have_their_colours_and_names():
     colours = {0: to_rgba(STATUS["open"]), 2: to_rgba(STATUS["slip"])}
     for value, colour in zip(lines.get_array(), lines.get_colors(), strict=True):
         assert tuple(colour) == colours[value]
-    (bar,) = [one for one in ax.figure.axes if one.get_label() == "<colorbar>"]
-    assert [text.get_text() for text in bar.get_yticklabels()] == ["open", "stick", "slip"]
+    assert [text.get_text() for text in bar_of(ax).get_yticklabels()] == ["open", "stick", "slip"]
 
 
 def test_no_traction_has_no_colour():

@@ -9,6 +9,7 @@ import jsonschema
 import pytest
 import tomli_w
 from tools.meshes import square_mesh
+from tools.refusals import refuses
 
 from evfem import templates
 from evfem.errors import InputError
@@ -124,9 +125,7 @@ def test_what_the_schema_refuses_the_reader_refuses(scene_schema, side):
             step = {"minimum": -1, "maximum": 1}.get(side, 0)
             text = put(one, key.name, limit + step)
             assert judged(scene_schema, text), (one.name, key.name)
-            with pytest.raises(InputError) as caught:
-                loads(text)
-            assert caught.value.key.endswith(key.name)
+            assert refuses("allowed", loads, text).key.endswith(key.name)
             tried += 1
     assert tried >= {"minimum": 30, "exclusiveMinimum": 5, "maximum": 30, "not": 1}[side]
 
@@ -223,10 +222,8 @@ def test_a_template_makes_a_scene_and_overwrites_nothing(tmp_path):
             others = [one for one in written if one != file]
             for one in others:
                 one.unlink()
-            with pytest.raises(InputError, match="which exists; allowed: a file that is not there yet"):
-                templates.write(name, path)
+            refuses("which exists; allowed: a file that is not there yet", templates.write, name, path)
             assert all(not one.exists() for one in others)
             for one in others:
                 one.write_bytes(before[one])
-    with pytest.raises(InputError, match=r'--template: given "none"; allowed: display \| texture'):
-        templates.text("none")
+    refuses(r'--template: given "none"; allowed: display \| texture', templates.text, "none")

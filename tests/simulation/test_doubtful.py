@@ -49,7 +49,7 @@ def test_a_resumed_run_knows_what_passed_before(tmp_path):
     scene = replace(
         scene_2d(0.5), motion=[ev.Press(indentation=0.2, steps=1), ev.Press(indentation=0.01, steps=1)]
     )
-    whole, again = resumed(scene, 1, tmp_path)
+    whole, again = resumed(scene, 1, folder=tmp_path)
     assert any("passed through the surface" in said for said in whole.warnings)
     assert again.warnings == whole.warnings
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, SKIN
+from tools.builders import INSULATOR, SKIN, watched
 from tools.grids import fine_points
 from tools.meshes import block
 
@@ -37,15 +37,9 @@ def run():
     surface = WAVES.shifted(lowest - G0)
     solver = ev.Solver(element="q2", dynamics="inertial")
     scene = ev.Scene(FINGER, surface, ev.Kaczmarek(), V, MOTION, direction="normal", solver=solver)
-    states = []
-
-    class Observer:
-        def step(self, row, frame, checkpoint):
-            states.append(SimpleNamespace(**{k: np.copy(a) for k, a in checkpoint().items()}))
-
-    result = ev.simulate(scene, observers=[Observer()])
+    result, kept = watched(scene)
     assert (result.substeps == 1).all()
-    return result, make_model(scene), [_start(make_model(scene)), *states]
+    return result, make_model(scene), [_start(make_model(scene)), *(SimpleNamespace(**one) for one in kept)]
 
 
 def _outline():

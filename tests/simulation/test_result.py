@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
+from tools.refusals import refuses
 
 from evfem.errors import InputError, StorageError
 from evfem.simulation.history import MEANINGS, csv_header, csv_line
@@ -57,8 +58,7 @@ def test_a_result_without_frames_comes_back(tmp_path):
 
 
 def test_the_name_of_another_format_is_refused_with_what_writes_it(tmp_path):
-    with pytest.raises(InputError, match=r"\.npz: to_csv writes the history"):
-        fake_result().save(tmp_path / "run.csv")
+    refuses(r"\.npz: to_csv writes the history", fake_result().save, tmp_path / "run.csv")
     assert not list(tmp_path.iterdir())
 
 
@@ -66,8 +66,7 @@ def test_rows_with_a_missing_or_unknown_column_are_refused():
     row = fake_row(1)
     with pytest.raises(InputError, match="'time'"):
         Result.from_rows([{k: v for k, v in row.items() if k != "time"}], [], fake_result().mesh, {})
-    with pytest.raises(InputError, match="'extra'"):
-        Result.from_rows([row | {"extra": 1}], [], fake_result().mesh, {})
+    refuses("'extra'", Result.from_rows, [row | {"extra": 1}], [], fake_result().mesh, {})
 
 
 @pytest.mark.parametrize("lacking", COLUMNS)
@@ -79,8 +78,7 @@ def test_a_result_of_a_version_with_fewer_columns_is_read_or_refused_as_such(lac
     del arrays[f"history/{lacking}"]
     np.savez(tmp_path / "old.npz", **arrays)
     if lacking in NEEDED:
-        with pytest.raises(InputError, match=f"of another version: without history/{lacking};"):
-            load(tmp_path / "old.npz")
+        refuses(f"of another version: without history/{lacking};", load, tmp_path / "old.npz")
         return
     old = load(tmp_path / "old.npz")
     np.testing.assert_array_equal(getattr(old, lacking), np.full(4, 0 if lacking in INTEGERS else np.nan))
@@ -204,10 +202,7 @@ def test_a_total_has_the_same_names_over_the_depth(tmp_path):
 def test_without_a_depth_there_is_no_total(name):
     for result in (fake_result(), with_depth(None)):
         assert result.depth is None
-        with pytest.raises(
-            InputError, match=r"depth: missing; allowed: a depth in mm, by Scene\(depth=...\)"
-        ):
-            getattr(result, name)
+        refuses(r"depth: missing; allowed: a depth in mm, by Scene\(depth=...\)", getattr, result, name)
         assert "total" not in result.summary()
 
 

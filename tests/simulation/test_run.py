@@ -97,14 +97,8 @@ def test_sliding_the_other_way_is_the_mirror_image(options):
     forth, back = (
         run(Display(), Press(indentation=0.3, steps=3), Slide(d, steps=6), **options) for d in (0.6, -0.6)
     )
-    same = (
-        "applied_force",
-        "normal_force",
-        "electrostatic_force",
-        "contact_width",
-        "stored_energy",
-        "min_gap",
-    )
+    same = ["applied_force", "normal_force", "electrostatic_force"]
+    same += ["contact_width", "stored_energy", "min_gap"]
     np.testing.assert_allclose(columns(back, *same), columns(forth, *same), rtol=1e-7, atol=1e-9)
     signed = ("tangential_force", "applied_tangential_force", "electrostatic_force_x", "position")
     np.testing.assert_allclose(columns(back, *signed), -columns(forth, *signed), atol=1e-9)
@@ -181,7 +175,7 @@ RESUMED = {
 @pytest.mark.filterwarnings("ignore:motion . has steps of", "ignore:probes have")
 def test_a_resumed_run_repeats_itself(name, after, tmp_path):
     """In the middle of a motion and between two."""
-    whole, again = resumed(RESUMED[name], after, tmp_path)
+    whole, again = resumed(RESUMED[name], after, folder=tmp_path)
     for column in set(COLUMNS) - {"motion", "seconds"}:
         np.testing.assert_allclose(again[column], whole[column], rtol=1e-11, atol=1e-15, err_msg=column)
     assert again.warnings == whole.warnings

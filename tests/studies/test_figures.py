@@ -7,27 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from evfem.studies import common, laws, measured, plots
+from evfem.studies import common, fingertip, fringe, laws, measured, plots
 
+import evfem as ev
 from evfem import data, studies
-from evfem.electrostatics.laws import Layer
+from evfem.electrostatics.laws import Layer, Layers
 from evfem.errors import InputError, StorageError
 from evfem.reference import cylinder_force
+from evfem.surface.skin import make_skin
 
 CASES = ("HVHD", "HVLD", "LVLD")
-QUICK = [
-    "section321",
-    "laws",
-    "fig03",
-    "fig05",
-    "fig06",
-    "fig07",
-    "fig08",
-    "fig09",
-    "fig10",
-    "frequency",
-    "hypotheses",
-]
+QUICK = ["section321", "laws", "fig03", "fig05", "fig06", "fig07", "fig08", "fig09", "fig10"]
+QUICK += ["frequency", "hypotheses"]
 SLOW = ["fig11", "fig12", "fig13", "participants", "uncertainty", "stability", "work_precision", "fringe"]
 SLOW += ["fingertip", "fingerprint", "friction_spectrum", "stick_slip", "relaxation", "impedance"]
 SLOW += ["sensitivities", "soft_display", "moisture"]
@@ -161,3 +152,28 @@ def test_hypotheses_bring_the_law_down_to_the_measured_median(numbers_of):
         charge = numbers[f"charge.median_uC_per_m2.{case}"] / numbers[f"lift.median_V.{case}"]
         assert charge == pytest.approx(8.8541878e-12 * 3.35 / 9e-5 * 1e6, rel=1e-6)
         assert 0.05 < numbers[f"distance.median_mm.{case}"] < 0.5
+
+
+def test_both_ridges_have_the_height_of_the_fingers():
+    for shape in ("t7", "sinus"):
+        x, height = fringe.ridge(shape, 101)
+        assert np.ptp(height) == pytest.approx(0.15)
+        assert height[50] == 0.0
+        assert x[-1] == 0.5
+
+
+def test_a_smooth_rigid_pad_has_the_force_of_its_ellipsoid():
+    """Kaczmarek's pressure over the ellipse of the lower half, by Gauss's rule in polar coordinates:
+    within 0.1 %. The stratum corneum is as thick as below the lowest point.
+    """
+    finger = ev.Fingertip.participant("ii", "coarse", ridges=False)
+    a, b, c = 0.5 * finger.width, 0.5 * finger.height, 0.5 * finger.length
+    x, w = np.polynomial.legendre.leggauss(400)
+    radius, weight = 0.5 * (1.0 + x), 0.5 * w  # sin of the polar angle
+    layers = Layers.of(Layer(0.38, 1650.0), ev.FILM)
+    for voltage, gap in ((2000.0, 0.5), (2000.0, 0.25)):
+        pressure = ev.Kaczmarek().traction(gap + b * (1.0 - np.sqrt(1.0 - radius**2)), voltage, layers)
+        exact = 1e3 * 2.0 * np.pi * a * c * float(weight @ (radius * pressure))
+        mesh = finger.mesh()
+        own = fingertip.force_on(finger, mesh, make_skin(mesh), ev.Kaczmarek(), voltage, gap)
+        assert own == pytest.approx(exact, rel=1e-3)

@@ -1,12 +1,8 @@
 """What the quick studies of fringes, friction, tissue in time and whole fingertips find."""
 
-import numpy as np
 import pytest
-from evfem.studies import fingertip, fringe
 
-import evfem as ev
-from evfem.electrostatics.laws import Layers
-from evfem.surface.skin import make_skin
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -14,7 +10,6 @@ def numbers(numbers_of):
     return numbers_of("fringe")
 
 
-@pytest.mark.slow
 def test_ridges_over_the_film_as_computed_elsewhere(numbers):
     """-4.2 % at 0.25 mm and -11.4 % in contact, by boundary integrals; always between the bounds."""
     assert numbers["ridge.t7.film.0.25mm.columns_percent"] == pytest.approx(-4.2, abs=0.1)
@@ -25,27 +20,23 @@ def test_ridges_over_the_film_as_computed_elsewhere(numbers):
         assert not (key.endswith("high_percent") and value < -1e-3), key
 
 
-@pytest.mark.slow
 def test_a_field_spreads_in_the_skin_from_smooth_contacts(numbers):
     assert numbers["spreading.smooth"] > 1.5
     assert 1.0 < numbers["spreading.5um"] < numbers["spreading.1um"] < 1.25
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("faces", "expected"), [("smooth", 1.95), ("1um", 1.22), ("5um", 1.05)])
 def test_a_layer_that_fills_the_ridges_spreads_as_computed_elsewhere(numbers, faces, expected):
     """Walls of another slope: within 4 %."""
     assert numbers[f"spreading.filled.{faces}"] == pytest.approx(expected, rel=0.04)
 
 
-@pytest.mark.slow
 def test_ridged_fingers_gain_more_than_smooth_ones(numbers):
     for case in ("HVHD", "HVLD", "LVLD", "pressed"):
         ridged, smooth = (numbers[f"finger.{name}.{case}.full_over_local"] for name in ("ridged", "smooth"))
         assert ridged > smooth > 1.0, case
 
 
-@pytest.mark.slow
 def test_electrodes_that_end(numbers):
     assert numbers["edge.normal_in_the_middle_over_whole"] == pytest.approx(0.5, abs=0.02)
     assert 0.0 < numbers["edge.largest_x_over_whole"] < 0.2
@@ -57,15 +48,6 @@ def test_electrodes_that_end(numbers):
         assert grounded < 1.0
 
 
-def test_both_ridges_have_the_height_of_the_fingers():
-    for shape in ("t7", "sinus"):
-        x, height = fringe.ridge(shape, 101)
-        assert np.ptp(height) == pytest.approx(0.15)
-        assert height[50] == 0.0
-        assert x[-1] == 0.5
-
-
-@pytest.mark.slow
 def test_the_share_of_the_air_rises(numbers):
     """More at ridged fingers than at smooth ones, and more by the full field than by columns."""
     share = {
@@ -77,7 +59,6 @@ def test_the_share_of_the_air_rises(numbers):
     assert share["ridged", "local"] < share["ridged", "full"]
 
 
-@pytest.mark.slow
 def test_participants_remain_twice_as_strong_as_measured(numbers):
     """Ridges and fringes together change (8a) by a few per cent."""
     for case in ("HVHD", "HVLD", "LVLD"):
@@ -86,7 +67,6 @@ def test_participants_remain_twice_as_strong_as_measured(numbers):
         assert full == pytest.approx(law, rel=0.1)
 
 
-@pytest.mark.slow
 def test_ridges_make_a_line_in_the_spectrum_of_friction(numbers_of):
     """v / pitch = 20 / 0.5 Hz; Scheibert et al. and Prevost et al. (2009) saw it, and none without ridges."""
     found = numbers_of("friction_spectrum")
@@ -96,7 +76,6 @@ def test_ridges_make_a_line_in_the_spectrum_of_friction(numbers_of):
     assert found["strongest_above_quarter_Hz.smooth.20_mm_s"] < 30.0
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_stick_slip_has_the_period_of_the_equation_of_motion(numbers_of):
     """With few steps in a slip; the error is of first order in them."""
@@ -109,7 +88,6 @@ def test_stick_slip_has_the_period_of_the_equation_of_motion(numbers_of):
     )
 
 
-@pytest.mark.slow
 def test_a_fast_press_needs_more_and_all_end_at_rest(numbers_of):
     found = numbers_of("relaxation")
     peaks = [found[f"peak_over_rest.{speed}_mm_s"] for speed in (2, 10, 50)]
@@ -120,7 +98,6 @@ def test_a_fast_press_needs_more_and_all_end_at_rest(numbers_of):
     assert all(0.2 < found[f"lost_in_stroke.{speed}_mm_s"] < 0.4 for speed in (1, 10, 100))
 
 
-@pytest.mark.slow
 def test_the_contact_lies_ahead_of_a_cylinder_that_is_drawn(numbers_of):
     """Hunter's half-plane to within what the block's size and cells leave."""
     found = numbers_of("relaxation")
@@ -130,7 +107,6 @@ def test_the_contact_lies_ahead_of_a_cylinder_that_is_drawn(numbers_of):
     assert found["rolling.peak_ahead_mm.20_mm_s"] > found["rolling.middle_ahead_mm.20_mm_s"]
 
 
-@pytest.mark.slow
 def test_a_slow_impedance_is_the_slope_of_a_press(numbers_of):
     found = numbers_of("impedance")
     slope = found["slope_of_a_press.mN_per_mm2"]
@@ -138,7 +114,6 @@ def test_a_slow_impedance_is_the_slope_of_a_press(numbers_of):
     assert found["vanishes_Hz.tangential.0.6_mm.onset"] < found["vanishes_Hz.normal.0.6_mm.onset"]
 
 
-@pytest.mark.slow
 def test_friction_decides_in_full_slip_alone_and_the_voltage_counts_twice(numbers_of):
     found = numbers_of("sensitivities")
     tangential = "tangential_force.surface.friction"
@@ -151,27 +126,6 @@ def test_friction_decides_in_full_slip_alone_and_the_voltage_counts_twice(number
         assert found[name] == pytest.approx(found[name.removesuffix("run") + "derivative"], rel=0.2)
 
 
-SKIN = ev.Layer(0.38, 1650.0)
-
-
-def test_a_smooth_rigid_pad_has_the_force_of_its_ellipsoid():
-    """Kaczmarek's pressure over the ellipse of the lower half, by Gauss's rule in polar coordinates:
-    within 0.1 %. The stratum corneum is as thick as below the lowest point.
-    """
-    finger = ev.Fingertip.participant("ii", "coarse", ridges=False)
-    a, b, c = 0.5 * finger.width, 0.5 * finger.height, 0.5 * finger.length
-    x, w = np.polynomial.legendre.leggauss(400)
-    radius, weight = 0.5 * (1.0 + x), 0.5 * w  # sin of the polar angle
-    layers = Layers.of(SKIN, ev.FILM)
-    for voltage, gap in ((2000.0, 0.5), (2000.0, 0.25)):
-        pressure = ev.Kaczmarek().traction(gap + b * (1.0 - np.sqrt(1.0 - radius**2)), voltage, layers)
-        exact = 1e3 * 2.0 * np.pi * a * c * float(weight @ (radius * pressure))
-        mesh = finger.mesh()
-        own = fingertip.force_on(finger, mesh, make_skin(mesh), ev.Kaczmarek(), voltage, gap)
-        assert own == pytest.approx(exact, rel=1e-3)
-
-
-@pytest.mark.slow
 def test_areas_and_widths_and_what_would_bring_them_to_adams(numbers_of):
     """The quick study: Adams' area is twice the pad's at 0.5 N, half the moduli give 1.4, and a
     cross-section needs a wider pad under more load; ridges and laws order the hovering forces.
@@ -188,7 +142,6 @@ def test_areas_and_widths_and_what_would_bring_them_to_adams(numbers_of):
             assert 0.92 < numbers[f"verdict.smooth.{law}.over_closed_form.{case}"] < 1.0
 
 
-@pytest.mark.slow
 def test_parallel_ridges_yield_across_and_slide_in_the_end_with_the_coefficient(numbers_of):
     """The quick study: two directions of one pattern, beside a smooth pad."""
     numbers = numbers_of("fingerprint")

@@ -16,16 +16,8 @@ import pytest
 from evfem.electrostatics.signalfile import read_signal
 
 pytestmark = [pytest.mark.browser, pytest.mark.filterwarnings("ignore::ImportWarning")]
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
+FLAGS = ("--headless", "--no-sandbox", "--no-first-run", "--disable-gpu", "--disable-quic", "--disable-sync")
+FLAGS += ("--disable-background-networking", "--disable-component-update")
 PATIENCE = 60.0
 
 

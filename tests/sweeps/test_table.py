@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
+from tools.refusals import refuses
 
 import evfem as ev
 from evfem.common import tables
-from evfem.errors import InputError
 from evfem.simulation.history import UNITS
 from evfem.sweeps.table import SweepResult, read, table_units, told
 
@@ -78,16 +78,13 @@ WRONG = {
 def test_what_is_no_table_gets_a_sentence(folder):
     for text, sentence in WRONG.items():
         (folder / "sweep.csv").write_text(text)
-        with pytest.raises(InputError, match=sentence):
-            read(folder)
+        refuses(sentence, read, folder)
     (folder / "sweep.csv").unlink()
-    with pytest.raises(InputError, match=r"path: given sweep\.csv \(No such file"):
-        read(folder)
+    refuses(r"path: given sweep\.csv \(No such file", read, folder)
     made().to_csv(folder / "sweep.csv")
     for text in ("{}", "[1", '{"points": 3, "outputs": []}'):
         (folder / "sweep.json").write_text(text)
-        with pytest.raises(InputError, match=r"^path: given sweep\.json \(.*allowed: the sweep\.json of a"):
-            ev.load(folder)
+        refuses(r"^path: given sweep\.json \(.*allowed: the sweep\.json of a", ev.load, folder)
 
 
 def sampled(count=200):
@@ -121,12 +118,8 @@ def test_statistics_are_those_of_the_numbers(monkeypatch, pandas):
 
 
 def test_statistics_of_words_or_beyond_the_table_are_refused():
-    with pytest.raises(
-        InputError, match=r'columns: given "electrostatics\.law"; allowed: columns of numbers'
-    ):
-        made().statistics([LAW])
-    with pytest.raises(InputError, match=r"quantiles: given \(1\.5,\); allowed: numbers from 0 to 1"):
-        made().statistics(quantiles=(1.5,))
+    refuses(r'columns: given "electrostatics\.law"; allowed: columns of numbers', made().statistics, [LAW])
+    refuses(r"quantiles: given \(1\.5,\); allowed: numbers from 0 to 1", made().statistics, quantiles=(1.5,))
 
 
 def test_the_rank_correlation_is_spearmans():

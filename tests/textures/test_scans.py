@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tools.refusals import refuses
 
 from evfem.errors import InputError
 from evfem.textures.importers import Scan, Table
@@ -32,8 +33,7 @@ def test_a_line_of_a_scan_is_in_millimetres(tmp_path, name, unit, scale, row, fa
 
 def test_a_file_without_a_unit_needs_one(tmp_path):
     np.savetxt(tmp_path / "a.xyz", np.column_stack([X, HEIGHT]))
-    with pytest.raises(InputError, match=r"unit: given .*without a unit"):
-        Scan(**SOURCE)(tmp_path / "a.xyz")
+    refuses(r"unit: given .*without a unit", Scan(**SOURCE), tmp_path / "a.xyz")
     texture = Scan(**SOURCE, unit="mm", level="none")(tmp_path / "a.xyz")
     np.testing.assert_allclose(texture.values, HEIGHT, atol=1e-9)
 
@@ -41,8 +41,7 @@ def test_a_file_without_a_unit_needs_one(tmp_path):
 @pytest.mark.parametrize("name", ["a.x3p", "a.sur", "a.xyz"])
 def test_a_damaged_file_is_refused(tmp_path, name):
     (tmp_path / name).write_bytes(b"PK\x03\x04 nothing of that kind")
-    with pytest.raises(InputError, match="file: given"):
-        Scan(**SOURCE)(tmp_path / name)
+    refuses("file: given", Scan(**SOURCE), tmp_path / name)
 
 
 def test_a_foreign_csv_is_left_to_surfacetopography(tmp_path):
@@ -56,5 +55,4 @@ def test_a_foreign_csv_is_left_to_surfacetopography(tmp_path):
     with pytest.raises(InputError, match=r"b\.csv, which starts with 'a,b'; allowed: x,height \| x,friction"):
         Table(**SOURCE)(tmp_path / "b.csv")
     (tmp_path / "c.csv").write_text("nothing\n")
-    with pytest.raises(InputError, match=r"c\.csv without a line of numbers"):
-        Table(**SOURCE)(tmp_path / "c.csv")
+    refuses(r"c\.csv without a line of numbers", Table(**SOURCE), tmp_path / "c.csv")

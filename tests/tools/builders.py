@@ -46,23 +46,31 @@ def unbalanced(result):
     return np.array([x, y, z])
 
 
-def resumed(scene, after, folder=None):
-    """The result of a scene, and that of a run that goes on from its checkpoint after a step, by way of a
-    file where a folder is given.
-    """
+def watched(scene):
+    """The result of a scene, and copies of what a checkpoint has after every step."""
     kept = []
 
     class Keeper:
         def step(self, row, frame, checkpoint):
-            kept.append(checkpoint())
+            kept.append({name: np.copy(array) for name, array in checkpoint().items()})
 
-    whole = ev.simulate(scene, observers=[Keeper()])
-    saved = Saved(kept[after - 1], whole.rows[:after])
-    if folder is not None:
-        file = ev.Checkpoint(folder / "checkpoint.npz")
-        file.write(scene.digest(), saved.arrays, saved.rows)
-        saved = file.read(scene.digest())
-    return whole, ev.simulate(scene, resume=saved)
+    return ev.simulate(scene, observers=[Keeper()]), kept
+
+
+def resumed(scene, *after, folder=None):
+    """The result of a scene, and those of runs that go on from its checkpoints after steps, by way of a file
+    where a folder is given.
+    """
+    whole, kept = watched(scene)
+    found = [whole]
+    for step in after:
+        saved = Saved(kept[step - 1], whole.rows[:step])
+        if folder is not None:
+            file = ev.Checkpoint(folder / "checkpoint.npz")
+            file.write(scene.digest(), saved.arrays, saved.rows)
+            saved = file.read(scene.digest())
+        found.append(ev.simulate(scene, resume=saved))
+    return found
 
 
 def pad_state(result, k=-1):

@@ -28,6 +28,20 @@ def process_of(*words):
     return [sys.executable, "-m", "evfem.cli", *map(str, words)], environment
 
 
+def printed(code, folder=None, **environment):
+    """What Python prints in a process of its own that finds the same packages; it says nothing else."""
+    words = [sys.executable, "-c", f"import sys\nsys.path[:0] = {sys.path!r}\n{code}"]
+    given = {name: value for name, value in (os.environ | environment).items() if value is not None}
+    done = subprocess.run(words, capture_output=True, text=True, env=given, cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.strip()
+
+
+def contents(folder):
+    """What is in the files of a folder and those below it, by their paths in it."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
 def run_process(folder, *words):
     """Exit status, standard output and error of `evfem WORDS` in a process of its own in `folder`."""
     command, environment = process_of(*words)

@@ -24,6 +24,17 @@ friction = 0.2
 """
 
 
+def lines_of(ax):
+    """The lines of a picture by their labels."""
+    return {line.get_label(): line for line in ax.get_lines()}
+
+
+def bar_of(ax):
+    """The bar of its colours."""
+    (bar,) = [one for one in ax.figure.axes if one.get_label() == "<colorbar>"]
+    return bar
+
+
 def fake_row(step):
     """Two steps of press, then slide; every number different and not representable in few digits."""
     row = {name: (step + i) / 7.0 for i, name in enumerate(COLUMNS)}

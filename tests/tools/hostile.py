@@ -14,7 +14,7 @@ import evfem as ev
 from evfem.common.storage import save_arrays
 from evfem.mesh import file as meshfile
 from evfem.scene.file import load
-from tools.commands import called
+from tools.commands import called, contents
 from tools.kills import head
 from tools.meshes import block
 
@@ -93,7 +93,7 @@ def _whole():
             (folder / f"{kind}.toml").write_text(text)
         assert called(folder, "run", "checkpoint.toml", "--no-plots", "--no-fields")[0] == 0
         ev.simulate(load(folder / "checkpoint.toml")).save(folder / "run.npz")
-        return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+        return contents(folder)
 
 
 def damaged(kind, folder, rng):
@@ -198,7 +198,7 @@ def _archive(path, rng):
         arrays = {name: archive[name] for name in archive.files}
     for _ in range(rng.choice((1, 1, 2))):
         name = rng.choice(sorted(arrays))
-        change = rng.choice((_other_kind, _other_shape, _other_values, _other_values, _objects))
+        change = rng.choice((_other_kind, _other_shape, _other_values, _other_values, objects))
         arrays[name] = change(arrays[name], rng)
         if rng.random() < 0.1:
             del arrays[name]
@@ -243,7 +243,8 @@ class _Payload:
         return open, ("owned", "w")
 
 
-def _objects(array, rng):
+def objects(*_):
+    """An array of an object that does."""
     held = np.empty(1, dtype=object)
     held[0] = _Payload()
     return held
