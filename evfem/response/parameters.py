@@ -251,6 +251,8 @@ def _with(owner: Any, path: tuple[str, ...], value: float, key: str) -> Any:
         return type(owner)(part if i == int(step) else one for i, one in enumerate(owner))
     attribute = _field(owner, step)
     assert attribute is not None
+    if is_dataclass(owner) and attribute not in {spec.name for spec in fields(owner)}:
+        raise InputError(key, f"{attribute}, which {type(owner).__name__} computes", "what is given to it")
     if is_dataclass(owner) and vars(type(owner))["__dataclass_params__"].init:
         return replace(owner, **{attribute: part})  # type: ignore[type-var]
     changed = copy(owner)

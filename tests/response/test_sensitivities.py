@@ -282,6 +282,11 @@ def test_what_is_no_parameter_is_refused_in_a_sentence(key, said):
         ev.sensitivities(block(), [key])
 
 
+def test_what_a_finger_computes_is_no_parameter():
+    with pytest.raises(ev.InputError, match="materials, which Dome computes; allowed: what is given to it"):
+        ev.sensitivities(dome_scene(ev.Press(indentation=0.1, steps=1)), "finger.materials.lower.E")
+
+
 def test_an_elastic_surface_is_refused():
     soft = replace(block().surface, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
     with pytest.raises(ev.InputError, match="a rigid one: derivatives know no other"):

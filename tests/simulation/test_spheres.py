@@ -31,18 +31,18 @@ def growing(count, first, total):
     return first * np.cumsum(factor ** np.arange(count))
 
 
-def paraboloid(fine, coarse, rows, sphere=RADIUS):
+def paraboloid(fine, coarse, rows, radius=RADIUS):
     """Linear cells: `fine` ones on 0.6 mm from the middle, `coarse` ones beyond, `rows` upwards."""
     cell = FINE / fine
     half = np.append(np.linspace(0.0, FINE, fine + 1), FINE + growing(coarse, 1.3 * cell, 0.5 * SIZE - FINE))
     along, up = np.append(-half[:0:-1], half), np.append(0.0, growing(rows, cell, SIZE))
     count = along.size - 1
-    mesh = dome((count, rows, count), (SIZE, SIZE, SIZE), sphere)
+    mesh = dome((count, rows, count), (SIZE, SIZE, SIZE), radius)
     points = mesh.points
     i, k = (np.rint((points[:, a] / SIZE + 0.5) * count).astype(int) for a in (0, 2))
-    low = 0.5 * (points[:, 0] ** 2 + points[:, 2] ** 2) / sphere
+    low = 0.5 * (points[:, 0] ** 2 + points[:, 2] ** 2) / radius
     j = np.rint((points[:, 1] - low) / (SIZE - low) * rows).astype(int)
-    low = 0.5 * (along[i] ** 2 + along[k] ** 2) / sphere
+    low = 0.5 * (along[i] ** 2 + along[k] ** 2) / radius
     points[:] = np.column_stack([along[i], low + (SIZE - low) * up[j] / SIZE, along[k]])
     return mesh
 
@@ -58,24 +58,24 @@ class Sphere(Dome):
         return mesh
 
 
-def press(fine, coarse, rows, elastic=None):
+def sphere(fine, coarse, rows, elastic=None):
     """Pressed, and pulled sideways by less than friction holds; alone pressed on an elastic half space."""
     motion = [ev.Press(indentation=2.5e-4, steps=1), ev.Slide(0.7e-4, steps=1)][: 2 if elastic is None else 1]
     finger = Sphere(paraboloid(fine, coarse, rows), ev.NeoHookean(E=E, nu=NU))
     given = {"surface": ev.Flat(friction=0.3, elastic=elastic), "law": None, "voltage": 0.0}
-    return simulate(dome_scene(*motion, finger=finger, solver=ev.Solver(element="hex27p1"), **given))
+    return dome_scene(*motion, finger=finger, solver=ev.Solver(element="hex27p1"), **given)
 
 
 @pytest.fixture(scope="module")
 def pressed():
     """10 nodes on the contact's radius, 41,000 in all."""
-    return press(6, 6, 8)
+    return simulate(sphere(6, 6, 8))
 
 
 @pytest.fixture(scope="module")
 def coarser():
     """7 nodes on the radius, half as many in all."""
-    return press(4, 5, 7)
+    return simulate(sphere(4, 5, 7))
 
 
 def touching(result, step, traction):
@@ -127,7 +127,7 @@ def test_two_elastic_bodies_are_one_of_the_combined_modulus():
     With 7 nodes the depth is right to 0.2 %, the peak to 1.3 %.
     """
     half_space = ev.ElasticLayer(2.5, 0.3, 1e3)
-    result = press(3, 4, 6, half_space)
+    result = simulate(sphere(3, 4, 6, half_space))
     load, stiff = result.applied_force[0], 1.0 / (1.0 / STIFF + (1.0 - 0.3**2) / 2.5)
     radius = radius_under(load, stiff)
     assert_allclose(result.indentation[0], radius**2 / RADIUS, rtol=0.005)
