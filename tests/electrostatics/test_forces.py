@@ -110,16 +110,18 @@ def test_plates_follow_equations_2_to_7():
     assert plate_force(StrongTroxel(), 100.0, 0.04, 140.0, one) == pytest.approx(1.25 * capacitor, rel=1e-14)
 
 
+@pytest.mark.parametrize("order", [1, -1], ids=["thin first", "thick first"])
 @pytest.mark.parametrize("friction", [(1.0, 1.0), (0.3, 0.45)])
-def test_thickness_found_gives_equal_tangential_forces(friction):
-    films = Layer(0.02, 3.0), Layer(0.03, 4.5)
-    voltages = np.array([80.0, 85.0, 90.0]), 100.0
-    for law in (StrongTroxel(), Kaczmarek()):
-        if isinstance(law, StrongTroxel):
-            films = Layer(0.02, 3.0), Layer(0.06, 4.5)
-            thickness = 2000.0 * effective_thickness_from_thresholds(voltages, films, friction)
-        else:
-            thickness = stratum_corneum_from_thresholds(voltages, films, 2000.0, friction)
+def test_thickness_found_gives_equal_tangential_forces(friction, order):
+    """Either film may come first: (23) has its positive root on either side then."""
+    voltages = (np.array([80.0, 85.0, 90.0]), 100.0)[::order]
+    films = (Layer(0.02, 3.0), Layer(0.06, 4.5))[::order]
+    friction = friction[::order]
+    found = {
+        StrongTroxel(): 2000.0 * effective_thickness_from_thresholds(voltages, films, friction),
+        Kaczmarek(): stratum_corneum_from_thresholds(voltages, films, 2000.0, friction),
+    }
+    for law, thickness in found.items():
         pulls = [
             mu * law.traction(0.0, u, Layers.of(Layer(thickness, 2000.0), film))
             for mu, u, film in zip(friction, voltages, films, strict=True)
