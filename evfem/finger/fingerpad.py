@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import between, check_fields, instance, one_of, set_frozen, truth
+from evfem.common.checks import check_fields, instance, one_of, set_frozen, truth
 from evfem.common.views import short
 from evfem.errors import ABSENT, InputError, Mistakes, quoted, unknown
 from evfem.finger.layers import NAIL, thickness_of
@@ -29,15 +29,17 @@ from evfem.finger.sizes import (
     Electrical,
     LayeredFinger,
     Materials,
+    NailThickness,
+    NailWidth,
     Relaxation,
     Skin,
     Viscosity,
     check_at_most,
     check_bone,
     check_cells,
+    check_nail,
     check_profile,
     check_skin,
-    thickness_range,
 )
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
@@ -132,8 +134,8 @@ class FingerPad(LayeredFinger):
         {"allowed": "the path of a csv file with the header x,height or x,y", "type": _SCAN, "file": True},
         "ridges as they were scanned",
     ] = None
-    nail_thickness: Annotated[float, thickness_range("nail"), "of the nail"] = thickness_of("nail")
-    nail_width: Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"] = 11.0
+    nail_thickness: NailThickness = thickness_of("nail")
+    nail_width: NailWidth = 11.0
     beside = (NAIL,)
 
     def __post_init__(self) -> None:
@@ -205,7 +207,7 @@ def _check_alone(pad: FingerPad) -> None:
 
 def _check_section(pad: FingerPad, section: Section) -> None:
     """Refuse geometry whose parts do not fit into each other."""
-    (outermost, second, *_), (thickness, below, *_) = section.layers, section.thickness
+    (outermost, *_), (thickness, *_) = section.layers, section.thickness
     ridges, outer = section.ridges, section.outer
     check_cells(pad.cells_per_ridge, ridges is not None)
     low, high = SLIMMEST
@@ -222,8 +224,7 @@ def _check_section(pad: FingerPad, section: Section) -> None:
             _check_scan(ridges, ridges.steepest * steeper, spacing)
         else:
             check_profile(ridges, steeper)
-    meaning = f"{outermost.spoken} + 0.7 {second.spoken}"
-    check_at_most("nail_thickness", pad.nail_thickness, thickness + 0.7 * below, meaning)
+    check_nail(pad.nail_thickness, section.layers, section.thickness)
     check_at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
     skin = sum(section.thickness)
     check_skin(skin, outer.smallest_radius, 0.6)

@@ -23,20 +23,24 @@ from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
+from evfem.finger.layers import NAIL, thickness_of
 from evfem.finger.outline import Ridges
 from evfem.finger.sizes import (
     LayeredFinger,
+    NailThickness,
+    NailWidth,
     check_at_most,
     check_bone,
     check_cells,
+    check_nail,
     check_profile,
     check_skin,
 )
-from evfem.finger.solid import RECTANGLE, Ellipsoid, Grid, Solid, rows_that_merge
+from evfem.finger.solid import RECTANGLE, Ellipsoid, Grid, Nail, Solid, rows_that_merge
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import scaled_jacobian
 
-RIMS = ("fixed", "free")
+RIMS = ("fixed", "free", "nail")
 #: angle (degrees) at which the finger of Table 1 was held, whose length is seen from above
 HELD = 30.0
 #: smallest scaled Jacobian of a cell below measured ridges, and the largest part of the outline's
@@ -73,13 +77,15 @@ def _is_file(ridges: str) -> bool:
 
 @dataclass(frozen=True, repr=False)
 class Fingertip(LayeredFinger):
-    """The lower half of a finger's end in three dimensions: x across the finger, y up, z along it,
-    its tip towards +z.
+    """The lower half of a finger's end in three dimensions, or all of it: x across the finger, y up, z along
+    it, its tip towards +z.
 
     **Shape.** The lower half of an ellipsoid around (0, 0, 0), above it the lower half of the bone, another
     ellipsoid. `length` is about that of the paper's fingers seen from above, 26 mm held at 30 degrees; the
-    bone's length is assumed. The cut between the two moves with the bone (`rim` "fixed": the nail holds it)
-    or is "free".
+    bone's length is assumed. The cut between the two moves with the bone (`rim` "fixed", as a nail would hold
+    it) or is "free". With `rim` "nail" the upper halves are there too, and a nail of `nail_thickness` on top,
+    as wide as `nail_width` along the lines of the mesh and as long (assumed), ending 0.64 of the half length
+    from the middle; the bone alone is held.
 
     **Ridges.** False or "none"; "along" (True: those of the cross-section, whose crests run along the
     finger), "across", "whorl", "loop" or "arch" (`evfem.finger.fingerprint`), with the profile of
@@ -89,11 +95,12 @@ class Fingertip(LayeredFinger):
     from it; `ridge_width` then says how finely the pad is divided. Ridges fade out towards
     the edges of the rectangle that is 0.64 of the pad's axes.
 
-    **Layers and materials** are those of `FingerPad` (one table), without nail and nail bed.
+    **Layers and materials** are those of `FingerPad` (one table), nail and nail bed with `rim` "nail" alone.
 
     **Mesh.** Smooth about 5k, 12k and 43k nodes; with parallel ridges 22k, 34k and 115k, with curved ones
-    53k, 83k and 193k. Sets of nodes: `pad` (the skin's surface), `bone` (with the cut, where the rim is
-    fixed), `rim` (the cut). `mesh(1)` has linear hexahedra, twice as many in each direction.
+    53k, 83k and 193k; with a nail nearly twice as many. Sets of nodes: `pad` (the skin's surface), `bone`
+    (with the cut, where the rim is fixed), `rim` (the cut), `nail` (its outer side). `mesh(1)` has linear
+    hexahedra, twice as many in each direction.
 
     Raises `InputError` for values out of range and for geometry that cannot exist.
 
@@ -116,12 +123,16 @@ class Fingertip(LayeredFinger):
     ] = "medium"
     length: Annotated[float, between(16.0, 32.0, "mm"), "full length of the ellipsoid"] = 22.5
     bone_length: Annotated[float, between(6.0, 28.0, "mm"), "full length of the bone"] = 17.0
-    rim: Annotated[str, one_of(*RIMS), "whether the cut around the nail moves with the bone"] = "fixed"
+    rim: Annotated[str, one_of(*RIMS), "what holds the edge of the lower half"] = "fixed"
     posture: Annotated[float, between(0.0, 45.0, "degrees"), "how far the tip is turned down"] = 0.0
     ridge_pixel: Annotated[float, between(0.005, 0.5, "mm"), "from point to point of a grey image"] = 0.05
     ridge_dark: Annotated[
         str | None, one_of("ridges", "grooves"), "what is dark in a grey image, which must be said"
     ] = None
+
+    nail_thickness: NailThickness = thickness_of("nail")
+    nail_width: NailWidth = 11.0
+    beside = (NAIL,)
 
     def __post_init__(self) -> None:
         mistakes = Mistakes()
@@ -179,7 +190,13 @@ class Fingertip(LayeredFinger):
             relief=relief,
             rim_is_fixed=self.rim == "fixed",
             posture=self.posture,
+            nail=Nail(self.nail_thickness, self.nail_width) if self.rim == "nail" else None,
         )
+
+    @property
+    def _usual(self) -> dict[str, Any]:
+        laws = super()._usual
+        return {name: law for name, law in laws.items() if self.rim == "nail" or name != NAIL.name}
 
     @property
     def _profile(self) -> Ridges:
@@ -251,9 +268,14 @@ def _check_shape(tip: Fingertip, solid: Solid) -> None:
         check_at_most("ridge_height", height, 0.7 * solid.thickness[0], meaning)
         if not isinstance(relief, HeightMap):
             check_profile(tip._profile)
+    if solid.nail is not None:
+        check_nail(tip.nail_thickness, tip.layers, solid.thickness)
+        check_at_most("nail_width", tip.nail_width, 0.7 * tip.width, "0.7 times the width")
     angle = np.linspace(0.0, 0.5 * np.pi, 46)
     theta, phi = (grid.ravel() for grid in np.meshgrid(angle, angle))
     unit = np.column_stack([np.sin(theta) * np.cos(phi), -np.cos(theta), np.sin(theta) * np.sin(phi)])
+    if solid.nail is not None:
+        unit = np.vstack([unit, unit * [1.0, -1.0, 1.0]])
     inside = solid.outer.point(unit) - skin * solid.outer.normal(unit)
     bone = solid.bone
     check_bone("bone_length", inside - [0.0, bone.centre, 0.0], (bone.a, bone.b, bone.c))

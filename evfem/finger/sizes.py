@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Self
 
@@ -33,6 +33,8 @@ def thickness_range(name: str) -> dict[str, Any]:
     return between(found.lowest, found.highest, "mm")
 
 
+NailThickness = Annotated[float, thickness_range("nail"), "of the nail"]
+NailWidth = Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"]
 CELLS = "an even whole number from 4 to 96"
 Viscosity = Annotated[float, between(0.0, 1e3, "s"), "relaxation time of materials without their own"]
 Relaxation = Annotated[Pairs, BRANCHES, "Maxwell branches of materials without their own"]
@@ -211,6 +213,12 @@ def check_skin(skin: float, radius: float, factor: float) -> None:
     deepest = [layer for layer in LAYERS if layer.thickness][-1]
     meaning = f"{factor:g} times the surface's smallest radius, together with the layers above it"
     check_at_most(deepest.parameter, skin, factor * radius, meaning)
+
+
+def check_nail(nail: float, layers: Sequence[TissueLayer], thickness: Sequence[float]) -> None:
+    """Refuse a nail that reaches too far into the second layer."""
+    meaning = f"{layers[0].spoken} + 0.7 {layers[1].spoken}"
+    check_at_most("nail_thickness", nail, thickness[0] + 0.7 * thickness[1], meaning)
 
 
 def check_profile(ridges: Ridges, steeper: float = 1.0) -> None:

@@ -1,5 +1,5 @@
 r"""The mesh of a whole finger pad: layers between the lower halves of two ellipsoids, the finger's
-and the bone's.
+and the bone's, or, with a nail, between the whole ones.
 
 A point of either surface is named by a unit vector e with :math:`e_y \le 0`: :math:`(a e_x, b e_y,
 c e_z)` for semi-axes a, b, c. Seen from below the vectors fill the unit disc :math:`(p, q) = (e_x,
@@ -16,7 +16,9 @@ follow the lines, and four sides whose lines go on to the rim along great circle
 
 The skin's interfaces are true offsets of the smooth ellipsoid along its normals; straight lines to
 the bone fill the hypodermis. Ridges are cut along the normals, and the columns below them merge
-three to one (`evfem.finger.blocks`).
+three to one (`evfem.finger.blocks`). With a nail the upper half is the same lattice with
+:math:`e_y \ge 0`, without ridges; the nail takes the place of the outermost layer in those columns of
+the rectangle that lie under it, and the nail bed, dermis, that of all below.
 """
 
 from __future__ import annotations
@@ -24,14 +26,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.finger.blocks import DIGITS, block
 from evfem.finger.fingerprint import faded
-from evfem.finger.layers import TissueLayer
+from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
 from evfem.finger.outline import in_layers
 from evfem.mesh.hexahedron import MIRRORED
 from evfem.mesh.mesh import Mesh
@@ -63,6 +65,12 @@ class Ellipsoid:
         n = unit / [self.a, self.b, self.c]
         return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
 
+    def towards(self, points: Floats) -> Floats:
+        """Where the ways from points (N, 3) to the centre meet the surface."""
+        centre = [0.0, self.centre, 0.0]
+        away = points - centre
+        return np.asarray(centre + away / np.linalg.norm(away / [self.a, self.b, self.c], axis=1)[:, None])
+
 
 class Relief(Protocol):
     """Ridges over the smooth pad."""
@@ -87,11 +95,19 @@ class Grid:
 
 
 @dataclass(frozen=True)
+class Nail:
+    """Thickness and width (mm); it is as long as it is wide, up to the rectangle's end."""
+
+    thickness: float
+    width: float
+
+
+@dataclass(frozen=True)
 class Solid:
     """Geometry of a whole pad (mm).
 
     `layers` from the surface to the bone, `thickness` of all of them but the innermost, `rows` of
-    quadratic cells in each; `posture` in degrees turns the tip (+z) down.
+    quadratic cells in each; with a `nail` the whole finger; `posture` in degrees turns the tip (+z) down.
     """
 
     outer: Ellipsoid
@@ -103,25 +119,32 @@ class Solid:
     relief: Relief | None = None
     rim_is_fixed: bool = True
     posture: float = 0.0
+    nail: Nail | None = None
 
     def mesh(self, order: int) -> Mesh:
         """Hexahedra of `order` 1, or 2 with half the divisions and mid-nodes on the true surfaces."""
         per_cell = 3 - order
         rows = [n * per_cell for n in self.rows]
         places, cells, row = self._joined(sum(rows), per_cell, order)
+        if self.nail is not None:
+            places, cells, row = _doubled(places, cells, row)
         unit, r = places[:, :3], places[:, 3]
         starts = np.concatenate([[0], np.cumsum(rows)])
-        level = np.interp(r, starts, np.arange(len(starts)))
-        points = self._turned(self._points(unit, level))
+        points = self._turned(self._points(unit, np.interp(r, starts, np.arange(len(starts)))))
         layer = np.repeat(np.arange(len(rows)), rows)[row]
         region = np.array([one.number for one in self.layers])[layer]
         names = {one.name: one.number for one in self.layers}
         rim, bone = np.flatnonzero(unit[:, 1] == 0.0), np.flatnonzero(r == r.max())
         sets = {
-            "pad": np.flatnonzero(r == 0.0),
+            "pad": np.flatnonzero((r == 0.0) & (unit[:, 1] <= 0.0)),
             "bone": np.union1d(bone, rim) if self.rim_is_fixed else bone,
             "rim": rim,
         }
+        if self.nail is not None:
+            below = self._below_nail(unit[cells].mean(axis=1))
+            names |= {NAIL.name: NAIL.number}
+            region = np.where(below, np.where(layer == 0, NAIL.number, names[NAIL_BED]), region)
+            sets["nail"] = np.intersect1d(np.flatnonzero(r == 0.0), cells[region == NAIL.number])
         kind = "hexahedron27" if order == 2 else "hexahedron"
         return Mesh(points, _right_handed(points, cells), kind, region, names, sets)
 
@@ -169,9 +192,14 @@ class Solid:
     def _points(self, unit: Floats, level: Floats) -> Floats:
         """Points (N, 3) at levels counted in layers: 0 the surface, 1 below the outermost ..."""
         foot, normal = self.outer.point(unit), self.outer.normal(unit)
-        deeper = (np.full(len(unit), depth) for depth in np.cumsum(self.thickness))
-        depth = np.array([self._relief(unit, foot), *deeper])
-        return in_layers(foot, normal, depth, level, lambda _: self.bone.point(unit))
+        outermost, *deeper = (np.full(len(unit), depth) for depth in np.cumsum(self.thickness))
+        if self.nail is not None:
+            outermost += (self.nail.thickness - self.thickness[0]) * self._towards_nail(unit)
+        depth = np.array([self._relief(unit, foot), outermost, *deeper])
+        whole = self.nail is not None
+        return in_layers(
+            foot, normal, depth, level, self.bone.towards if whole else lambda _: self.bone.point(unit)
+        )
 
     def _relief(self, unit: Floats, foot: Floats) -> Floats:
         """Depth (N,) of the surface below the smooth ellipsoid."""
@@ -179,7 +207,27 @@ class Solid:
             return np.zeros(len(unit))
         low, high = np.array(self.grid.low), np.array(self.grid.high)
         share = (2.0 * unit[:, [0, 2]] - low - high) / (high - low)
-        return faded(self.relief.depth(foot[:, 0], foot[:, 2]), share)
+        depth = faded(self.relief.depth(foot[:, 0], foot[:, 2]), share)
+        return np.where(unit[:, 1] <= 0.0, depth, 0.0)
+
+    def _below_nail(self, unit: Floats) -> Any:
+        """Which of these vectors (N, 3) lie under the nail, (N,) bool."""
+        assert self.nail is not None
+        p, q, (low, high) = unit[:, 0], unit[:, 2], (self.grid.low[0], self.grid.high[0])
+        across = (np.maximum(low, -self._half) < p) & (p < np.minimum(high, self._half))
+        end = self.grid.high[1]
+        return (unit[:, 1] > 0.0) & across & (end - self.nail.width / self.outer.c < q) & (q < end)
+
+    @property
+    def _half(self) -> float:
+        """Half of the nail's width over the semi-axis."""
+        return 0.0 if self.nail is None else 0.5 * self.nail.width / self.outer.a
+
+    def _towards_nail(self, unit: Floats) -> Floats:
+        """0 on the lower side, 1 on the nail, smooth in between."""
+        corner = 1.0 - self._half**2 - self.grid.high[1] ** 2
+        s = np.clip(unit[:, 1] / math.sqrt(corner), 0.0, 1.0)
+        return np.asarray(s * s * (3.0 - 2.0 * s))
 
     def _turned(self, points: Floats) -> Floats:
         """Points of the pad in its posture."""
@@ -187,6 +235,15 @@ class Solid:
             return points
         c, s = math.cos(math.radians(self.posture)), math.sin(math.radians(self.posture))
         return points @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+
+
+def _doubled(places: Floats, cells: Ints, row: Ints) -> tuple[Floats, Ints, Ints]:
+    """The lower half's places (N, 4), cells and their rows, and those of its image above the rim."""
+    above = np.flatnonzero(places[:, 1] != 0.0)
+    number = np.arange(len(places))
+    number[above] = len(places) + np.arange(above.size)
+    upper = places[above] * [1.0, -1.0, 1.0, 1.0]
+    return np.vstack([places, upper]), np.vstack([cells, number[cells]]), np.tile(row, 2)
 
 
 def _right_handed(points: Floats, cells: Ints) -> Ints:

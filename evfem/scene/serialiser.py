@@ -7,6 +7,7 @@ Beyond what files written by hand need, three keys let a file stand alone: `poin
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,7 @@ def _finger(finger: Any) -> dict[str, Any]:
     from evfem.finger.fingertip import FINGERS
 
     table = _of_kind(finger, FINGERS, "finger")
-    usual = type(finger)().materials
+    usual = replace(finger, materials={}).materials
     own = {name: table["materials"][name] for name, law in finger.materials.items() if law != usual[name]}
     table["materials"] = own
     return {name: v for name, v in table.items() if v != {} and (name, v) != ("kind", "pad")}

@@ -89,6 +89,42 @@ def test_surfaces_are_the_ellipsoids():
         assert np.abs(heights + 6.395 - depth).min() < 1e-12
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("ridges", ["none", "along"])
+def test_with_a_nail_the_finger_is_whole(ridges, order):
+    """Between two ellipsoids; below, the surface of the half without; no cracks; the nail of its thickness on
+    top, as wide as given to a column, ending at 0.64 of the half length.
+    """
+    finger = tip(rim="nail", ridges=ridges)
+    mesh, lower = finger.mesh(order), tip(ridges=ridges).mesh(order)
+    assert scaled_jacobian(mesh).min() > 0.3
+    pad = [one.points[one.node_sets["pad"]] for one in (mesh, lower)]
+    np.testing.assert_array_equal(*pad)
+    outer = [len(one.sides_of("pad")) for one in (mesh, lower)]
+    assert len(mesh.outer_sides) == 2 * outer[0] + len(mesh.sides_of("bone"))
+    assert outer[0] == outer[1]
+    if ridges == "none" and order == 2:
+        whole = np.prod([16.68, 12.79, 22.5]) - np.prod([6.0, 5.0, 17.0])
+        assert volume(mesh) == pytest.approx(np.pi / 6.0 * whole, rel=2e-3)
+    nail = mesh.points[mesh.node_sets["nail"]]
+    assert nail[:, 1].min() > 0.0
+    assert np.ptp(nail[:, 0]) == pytest.approx(11.0, abs=1.5)
+    assert nail[:, 2].max() == pytest.approx(0.64 * 11.25, abs=1e-9)
+    inner = np.unique(mesh.cells[mesh.region == mesh.region_names["nail"]])
+    top = mesh.points[inner][np.hypot(*mesh.points[inner][:, ::2].T) < 1e-9, 1]
+    assert np.ptp(top) == pytest.approx(0.45)
+
+
+def test_a_nail_holds_the_finger_less_than_a_fixed_rim_and_more_than_none():
+    """And its material counts: a hundred times softer it holds no more than the skin."""
+    soft = {"nail": ev.NeoHookean(E=0.17, nu=0.3)}
+    fingers = [tip(rim="free"), tip(rim="nail", materials=soft), tip(rim="nail"), tip(rim="fixed")]
+    solver, press = ev.Solver(element="hex8"), ev.Press(indentation=0.4, steps=1)
+    scenes = (ev.Scene(one, ev.Flat(friction=0.3), motion=press, solver=solver) for one in fingers)
+    forces = [ev.simulate(scene).normal_force[-1] for scene in scenes]
+    assert (np.diff(forces) > 0.0).all(), forces
+
+
 def test_posture_turns_the_tip_down():
     """About x, by its angle: a rigid turn, after which the tip is lower than the finger's other end."""
     level, turned = (tip(posture=angle).mesh().points for angle in (0.0, 30.0))
@@ -202,6 +238,9 @@ WRONG = [
     ({"ridges": "missing.png"}, "finger.ridges"),
     ({"resolution": "paper"}, "finger.resolution"),
     ({"posture": 60.0}, "finger.posture"),
+    ({"rim": "nail", "nail_width": 12.0}, "finger.nail_width"),
+    ({"rim": "nail", "nail_thickness": 0.8}, "finger.nail_thickness"),
+    ({"materials": {"nail": ev.NeoHookean(E=1.0, nu=0.3)}}, "finger.materials.nail"),
     ({"bone_length": 20.0}, "finger.bone_length"),
     ({"ridges": "along", "ridge_exponent": 16.0}, "finger.ridge_height"),
     ({"ridges": "along", "ridge_height": 0.3}, "finger.ridge_height"),

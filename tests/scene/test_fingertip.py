@@ -34,7 +34,7 @@ def test_kind_chooses_the_finger():
 @pytest.mark.parametrize(
     ("text", "key"),
     [
-        ('kind = "fingertip"\nnail_width = 11.0', "finger.nail_width"),
+        ('kind = "fingertip"\nnail_breadth = 11.0', "finger.nail_breadth"),
         ('kind = "fingertip"\nridge_scan = "scan.csv"', "finger.ridge_scan"),
         ('kind = "fingertip"\nridges = "nowhere.csv"', "finger.ridges"),
         ('kind = "fingertip"\nrim = "loose"', "finger.rim"),
