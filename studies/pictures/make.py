@@ -24,6 +24,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 #: "paraview.png" needs evfem[vtk]
 OF_PAGES = {
     "howto-layers.png": ("howto/finger.md", "layers.png"),
+    "howto-nail.png": ("howto/fingertip.md", "nail.png"),
     "howto-residuals.png": ("howto/fit.md", "residuals.png"),
     "tutorial-forces.png": ("tutorial.md", "forces.png"),
     "tutorial-deformed.png": ("tutorial.md", "deformed.png"),
