@@ -46,10 +46,11 @@ class DenseSolver:
         """
         if len(matrix) < LARGE_SYSTEM:
             return np.linalg.solve(matrix, right)
-        old = self._unknowns is not None and unknowns == self._unknowns
+        named = None if unknowns is None else (len(matrix), unknowns)
+        old = named is not None and named == self._unknowns
         found = self._refined(matrix, right, OLD_FACTORS) if old else None
         if found is None and self._factorise(matrix):
-            self._unknowns = unknowns
+            self._unknowns = named
             found = self._refined(matrix, right, 2 * OLD_FACTORS)
         return np.linalg.solve(matrix, right) if found is None else found
 

@@ -128,6 +128,7 @@ class Scene:
             check_drive,
             _check_friction,
             _check_elastic,
+            _check_adhesion,
             _check_hand,
             _check_motion,
             _check_speeds,
@@ -312,6 +313,12 @@ def _check_elastic(scene: Scene) -> None:
     if found or any(course.gap is not None for course in scene.courses):
         allowed = "a rigid surface, or a voltage that is given: it is not sought above an elastic surface"
         raise InputError("surface.elastic", "an elastic surface under a voltage that is sought", allowed)
+
+
+def _check_adhesion(scene: Scene) -> None:
+    if scene.adhesion is not None and scene.law is not None and scene.coupling == "staggered_once":
+        allowed = "monolithic or staggered: adhesion is told apart from the attraction at one place alone"
+        raise InputError("electrostatics.coupling", "staggered_once with adhesion", allowed)
 
 
 def _check_motion(scene: Scene) -> None:

@@ -44,6 +44,9 @@ def test_new_unknowns_have_new_factors():
     first = solver._factors
     assert_allclose(matrix[::-1] @ solver.solve(matrix[::-1], right, "others"), right, atol=1e-11)
     assert solver._factors is not first
+    # by the same name, but fewer
+    fewer, known = matrix[1:, 1:], right[1:]
+    assert_allclose(fewer @ solver.solve(fewer, known, "others"), known, atol=1e-11)
 
 
 def test_a_matrix_beyond_single_precision_is_solved_in_double():

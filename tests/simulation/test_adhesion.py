@@ -198,6 +198,11 @@ def test_staggered_rounds_without_a_voltage_have_no_electrostatic_force():
     assert found.electrostatic_force[2] > 1e-6
 
 
+def test_adhesion_is_refused_where_the_attraction_is_of_another_place():
+    given = {"adhesion": MOIST, "coupling": "staggered_once", "law": ev.Kaczmarek(), "voltage": 100.0}
+    refuses("monolithic or staggered", scene_of, ev.Display(), **given)
+
+
 def test_rough_faces_out_of_reach_do_not_adhere():
     """Closed faces 2 um apart, a law that ends at 1 um: the friction is that without adhesion."""
     motion = [ev.Press(indentation=0.3, steps=1), ev.Slide(0.3, steps=1)]
