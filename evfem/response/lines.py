@@ -44,8 +44,8 @@ FAR = 4.0
 #: rounding where it falls no more than by the next factor, and what is too much; the factor by which it must
 #: fall with the matrix of another part
 ROUNDS, DONE, ROUNDING, NOISE, WRONG, SLOW = 30, 1e-13, 1e-7, 0.5, 1e-6, 0.01
-#: the unknowns of a part
-UNKNOWN = ("u", "bone", "contact_force")
+#: the unknowns of a part, and what follows from them where the surface is elastic
+UNKNOWN, SUNK = ("u", "bone", "contact_force"), ("given", "strain")
 #: what of a state knows the kinks of the attraction
 NEARBY = ("attraction", "charges")
 TIED = "several nodes touch the surface first, and which one is next depends on the sign of the change"
@@ -210,15 +210,17 @@ class Line:
         """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(part, jumps, part.old) for one in self.beside]
         voltage = difference([one.target.voltage.voltage for one in equations], self.step)
-        change: Change = {name: np.zeros_like(getattr(part.new, name)) for name in UNKNOWN}
+        change: Change = {name: np.zeros_like(getattr(part.new, name)) for name in (*UNKNOWN, *SUNK)}
         change["voltage"] = float(voltage)
+        sunk = self._sunk(part, equations)
         by_parameter, reaction = self._partial(part, equations, jumps)
         rate, before, rounds = 1.0, 1.0, 0
         while rounds < ROUNDS:
             rounds += 1
+            settling = self._sink(part, jumps, change, sunk) if sunk else 0.0
             more = solve(-by_parameter - self._along(part, jumps, change)[0])
             self._add(change, more)
-            share = self._share(more, change, part.new)
+            share = max(self._share(more, change, part.new), settling)
             rate, before = share / before if rounds > 1 else 1.0, share
             if share * rate <= DONE or (share <= ROUNDING and rate > NOISE):
                 break
@@ -241,6 +243,21 @@ class Line:
         both = zip(zip(*smooth, strict=True), zip(*kinked, strict=True), strict=True)
         equation, reaction = (difference(a, far) + difference(b, self.step) for a, b in both)
         return equation, reaction
+
+    def _sunk(self, part: Accepted, equations: list[Equations]) -> list[Any]:
+        """Derivatives by the parameter alone of what an elastic surface gives way by, none of a rigid one."""
+        if self.centre.run.model.equilibrium.interface.bed is None:
+            return []
+        found = zip(*(one.sunk(part.new) for one in equations), strict=True)
+        return [difference(each, self.step) for each in found]
+
+    def _sink(self, part: Accepted, jumps: Jumps, change: Change, by_parameter: list[Any]) -> float:
+        """Take what an elastic surface gives way by along with the rest; returns its relative change."""
+        along = self._slopes(part, jumps, change, self._way(part, change), Equations.sunk)
+        before, usual = change["given"], STEP / self.longest * np.abs(part.new.given).max()
+        change |= {name: by_parameter[i] + along[i] for i, name in enumerate(SUNK)}
+        largest = max(np.abs(change["given"]).max(), usual, 1e-300)
+        return float(np.abs(change["given"] - before).max() / largest)
 
     def _add(self, change: Change, more: Floats) -> None:
         """Add a solution (m,) of a part's equations to a derivative."""
@@ -277,6 +294,8 @@ class Line:
         model = self.centre.run.model
         slope = model.equilibrium.interface.surface_at(part.new).slope
         moves = change["u"][model.pad.nodes]
+        if change["given"].size:
+            moves = moves + change["given"]
         rate = np.maximum(np.abs(moves[:, 1] - np.sum(slope * moves[:, ::2], axis=1)), 1e-300)
         nearest = min(float((self.lengths(part.new) / rate).min()), NEAR * reach)
         if not model.surface.is_flat:

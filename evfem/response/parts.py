@@ -64,6 +64,12 @@ class Equations:
         attraction = self.model.equilibrium.attraction_at(self.old, state, state.voltage)
         return replace(state, attraction=attraction)
 
+    def sunk(self, state: State) -> tuple[Floats, Floats]:
+        """What an elastic surface adds to the nodes' places, as `State.given` and `strain`."""
+        force = self.interface.contact_forces(state) + self._attracted(state).attraction
+        below = self.interface.below(state)
+        return below.given(force), below.change(force)
+
     def ended(self, state: State) -> State:
         """The state as the run would accept it, its reaction left, with the history that it leaves behind."""
         state, attraction = self._attracted(state), self.model.attraction

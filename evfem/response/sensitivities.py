@@ -350,8 +350,7 @@ def sensitivities(
     Raises
     ------
     InputError
-        A parameter that the scene does not have, that is 0, or that changes the mesh's cells; an elastic
-        surface.
+        A parameter that the scene does not have, that is 0, or that changes the mesh's cells.
     NotConverged
         A step has no solution.
 
@@ -386,8 +385,6 @@ def sensitivities(
 
 def _check(scene: Scene) -> None:
     """Refuse what is not differentiated as a whole."""
-    if scene.ground.elastic is not None:
-        raise InputError("surface.elastic", "an elastic surface", "a rigid one: derivatives know no other")
     if scene.coupling == "staggered_once" and scene.law is not None:
         given = "staggered_once, whose forces are those of another place"
         raise InputError("electrostatics.coupling", given, "monolithic or staggered, to be differentiated")

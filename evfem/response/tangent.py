@@ -58,15 +58,27 @@ class Tangent:
         place[kept], place[size + closed] = np.arange(kept.size), kept.size + np.arange(closed.size)
         count = kept.size + closed.size
         matrix = np.zeros((count, count))
-        matrix[: kept.size, : kept.size] = self.factor.schur
+        below = np.full(self.state.contact_force.size, -1)
+        below[closed] = kept.size + np.arange(closed.size)
         _add(matrix, self._pad_forces(), place, place)
+        _add(matrix, self._contact_rows(), below, place)
+        if self.equations.interface.bed is not None:
+            self._add_bed(matrix, place)
+        matrix[: kept.size, : kept.size] += self.factor.schur
         for axis in range(self.state.bone.size):
             row = kept.size - self.state.bone.size + axis
             matrix[row] = self._bone_row(matrix[row], row, axis)
-        below = np.full(self.state.contact_force.size, -1)
-        below[closed] = kept.size + np.arange(closed.size)
-        _add(matrix, self._contact_rows(), below, place)
         return matrix
+
+    def _add_bed(self, matrix: Floats, place: Ints) -> None:
+        """Add what an elastic surface gives way by, under the forces on the pad, to a matrix of the balance
+        and of contact by these places.
+        """
+        moves = self._columns()[0]
+        near = np.flatnonzero((place[moves] >= 0).all(axis=1))
+        moved = place[moves[near]].ravel()
+        given = self.equations.interface.below(self.state).among(near) @ -matrix[moved]
+        matrix += matrix[:, moved] @ np.linalg.solve(np.eye(moved.size) - given[:, moved], given)
 
     def _bone_row(self, balance: Floats, row: int, axis: int) -> Floats:
         """What the bone lacks along an axis by the dense unknowns, from the row of the `balance`."""

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from evfem.common import arrays
 from evfem.common.arrays import DenseSolver, inverse
-from evfem.contact.signorini import OPEN, SLIP, STICK, Forces, Projected
+from evfem.contact.signorini import FORWARD, OPEN, SLIP, STICK, Forces, Projected, side, solve_statuses
 from evfem.contact.solve import solve_contact
 from tests.contact.test_disc import half_space, missed
 
@@ -87,6 +87,21 @@ def test_contact_in_single_precision_is_contact(monkeypatch):
     assert_array_equal(fast.status, exact.status)
     assert_allclose(fast.force, exact.force, atol=1e-11 * np.abs(exact.force).max())
     assert missed(problem, fast) < 1e-10
+
+
+def test_nodes_that_stick_and_slip_have_factors_of_their_own(monkeypatch):
+    """In the plane the same components act with the unknowns of both."""
+    monkeypatch.setattr(arrays, "LARGE_SYSTEM", 1)
+    problem, _ = half_space(6, 0.3)
+    plane = np.flatnonzero(np.arange(3 * 36) % 3 < 2)
+    compliance = problem.compliance[np.ix_(plane, plane)]
+    problem = replace(problem, start=problem.start[plane], compliance=compliance)
+    for status in (np.full(36, one) for one in (STICK, FORWARD)):
+        found, alone = (
+            solve_statuses(one, status, side(status)).contact
+            for one in (problem, replace(problem, dense=DenseSolver()))
+        )
+        assert_allclose(found, alone, atol=1e-11 * np.abs(alone).max())
 
 
 def test_contact_is_solved_to_its_tolerance():
