@@ -10,8 +10,9 @@ stick  :math:`g = 0`, slip since z :math:`= 0`
 slip   :math:`g = 0`, :math:`\lambda_t + b(\lambda_n, x, s)\,s/|s| = 0`
 =====  ========================================================
 
-with the bound b of friction, :math:`\mu(x)\lambda_n` under Coulomb's law. `Equations` asks the parts
-of the run's own model: tissue, attraction, surface, law of friction, controls.
+with the bound b of friction, :math:`\mu(x)\lambda_n` under Coulomb's law. What an elastic surface gives way
+by follows from w (`Equations.sunk`). `Equations` asks the parts of the run's own model: tissue, attraction,
+surface, law of friction, controls.
 """
 
 from __future__ import annotations
