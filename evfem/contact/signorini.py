@@ -360,7 +360,7 @@ def solve_statuses(
         assert problem.attraction is not None
         matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
         right[own, 0] += problem.attraction.reference_gap[attracted]
-    names = whole.tobytes(), place.size, last.size
+    names = whole.tobytes(), last.size
     if extra is None:
         x, d = problem.dense.solve(matrix, right, names)[:, 0], np.zeros(0)
     else:
