@@ -32,6 +32,9 @@ PLACES, WEIGHTS = (-2, -1, 1, 2), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 #: the farthest place goes no further than this share of the way to a kink of the attraction or to another
 #: status, than this share of the length over which the attraction changes, and at least so far
 NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
+#: how far contact forces change between places, as a share of themselves, under a law of friction, which may
+#: have a kink over the pressure
+PRESSED = 1e-4
 #: how far nodes of the undeformed finger move between places, as a share of the distance of pad nodes; in mm
 #: pad nodes below which there is an attraction or a profile, and nodes along a profile
 INSIDE, SHIFT, ALONG = 4e-3, 5e-6, 1e-5
@@ -298,6 +301,10 @@ class Line:
             moves = moves + change["given"]
         rate = np.maximum(np.abs(moves[:, 1] - np.sum(slope * moves[:, ::2], axis=1)), 1e-300)
         nearest = min(float((self.lengths(part.new) / rate).min()), NEAR * reach)
+        if model.equilibrium.interface.law is not None:
+            force, changed = part.new.contact_force[:, 0], np.abs(change["contact_force"][:, 0])
+            pressed = force / np.maximum(changed, 1e-300)
+            nearest = min(nearest, PRESSED * float(pressed[force > 0.0].min(initial=np.inf)))
         if not model.surface.is_flat:
             nearest = min(nearest, ALONG / max(float(np.abs(moves[:, 0]).max()), 1e-300))
         return max(min(self.longest, nearest / max(PLACES)), LEAST * self.longest)
