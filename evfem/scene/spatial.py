@@ -56,7 +56,7 @@ def _beyond_space(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, str, str]]:
 
 
 def needed_memory(mesh: Mesh) -> float:
-    """Memory (bytes) that a run with a finger of hexahedra takes at most, within 20 % where its
+    """Memory (bytes) that a run with a finger of hexahedra takes at most, within 30 % where its
     tissue is not nearly incompressible and PARDISO is there.
 
     >>> from evfem.finger.fingertip import Fingertip
