@@ -1,6 +1,6 @@
 """Mistakes that nobody chose: random single edits of the physics, and whether a test sees them.
 
-    python tests/tools/mutants.py [--count N] [--seed S] [--out FILE]
+    python tests/tools/mutants.py [--count N] [--seed S] [--out FILE] [--again]
 
 1. Every operator, comparison, number, truth value, minimum and maximum of the `ROOMS` is a place of an edit;
    `count` of them are drawn with equal chances.
@@ -8,9 +8,11 @@
    name, until one fails or `PATIENCE` is over.
 3. A line in `FILE` for each: what was changed, and the first test that fails or `survives`. Edits that are
    there already are not made again.
+4. With `--again` the survivors of `FILE` are made once more and the tests of the other rooms are run, in the
+   order of `USERS`.
 
-What survives is no mistake (the same result on another way), is seen by another room's tests, or a test is
-missing; the ones worth it go into `mistakes.toml`.
+What survives is no mistake (the same result on another way), or a test is missing; the ones worth it go into
+`mistakes.toml`.
 """
 
 from __future__ import annotations
@@ -28,9 +30,15 @@ from tempfile import TemporaryDirectory
 
 from mistakes import CHECKOUT, Copy, replaced
 
+from evfem.common.storage import write_text
+
 ROOMS = ("tissue", "electrostatics", "contact", "newton", "solver", "simulation")
+#: rooms whose tests run whole scenes, the quickest first
+USERS = "solver newton simulation response contact estimate sweeps calibration scene".split()
 #: pytest's status where all tests of a file have other marks
 NO_TESTS = 5
+#: what a line has where no test failed
+SURVIVES = "\tsurvives\t"
 #: seconds of tests after which an edit counts as not seen
 PATIENCE = 240.0
 #: operators and comparisons by what they are exchanged for, either way
@@ -121,10 +129,17 @@ def seen(copy: Copy, test: str) -> str | None:
     return failed[1] if failed else f"{test}: status {done.returncode}"
 
 
-def judge(edit: Edit, copy: Copy) -> str:
+def tests_of(edit: Edit, tests: Path, *, others: bool) -> list[Path]:
+    """Test files of the edit's room, first the one of the same name, or those of the other rooms."""
+    own, name = Path(edit.file).parts[0], f"test_{Path(edit.file).name}"
+    rooms = [room for room in USERS if room != own] if others else [own]
+    found = [path for room in rooms for path in sorted((tests / room).rglob("test_*.py"))]
+    return sorted(found, key=lambda path: path.name != name)
+
+
+def judge(edit: Edit, copy: Copy, *, others: bool = False) -> str:
     """The edit and the test that sees it, or `survives`."""
-    room, name = Path(edit.file).parts[0], f"test_{Path(edit.file).name}"
-    tests = sorted((copy.folder / "tests" / room).rglob("test_*.py"), key=lambda path: path.name != name)
+    tests = tests_of(edit, copy.folder / "tests", others=others)
     file, began, failed = copy.package / edit.file, time.monotonic(), None
     text = file.read_text(encoding="utf-8")
     copy.write(file, edit.made_in(text))
@@ -144,18 +159,21 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200, help="how many (200)")
     parser.add_argument("--seed", type=int, default=0, help="which ones (0)")
     parser.add_argument("--out", type=Path, default="mutants.txt", help="where they are told (mutants.txt)")
+    parser.add_argument("--again", action="store_true", help="survivors, with other rooms' tests")
     given = parser.parse_args()
     places = edits()
     chosen = random.Random(given.seed).sample(places, given.count)
     done = given.out.read_text(encoding="utf-8").splitlines() if given.out.exists() else []
     print(f"{len(places)} places, {len(chosen)} drawn, {len(done)} done")
-    with given.out.open("a", encoding="utf-8") as told, TemporaryDirectory() as folder:
+    survivors = [i for i, line in enumerate(done) if SURVIVES in line]
+    todo = survivors if given.again else range(len(done), len(chosen))
+    with TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
-        for edit in chosen[len(done) :]:
-            done.append(judge(edit, copy))
-            for target in (None, told):
-                print(done[-1], file=target, flush=True)
-    survived = sum("\tsurvives\t" in line for line in done)
+        for i in todo:
+            done[i : i + 1] = [judge(chosen[i], copy, others=given.again)]
+            print(done[i], flush=True)
+            write_text(given.out, "".join(f"{line}\n" for line in done))
+    survived = sum(SURVIVES in line for line in done)
     print(f"{len(done)} edits, {survived} survived")
 
 
