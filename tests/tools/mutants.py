@@ -34,7 +34,7 @@ from evfem.common.storage import write_text
 
 ROOMS = ("tissue", "electrostatics", "contact", "newton", "solver", "simulation")
 #: rooms whose tests run whole scenes, the quickest first
-USERS = "solver newton simulation response contact estimate sweeps calibration scene".split()
+USERS = ("solver", "newton", "simulation", "response", "contact", "estimate", "sweeps", "scene")
 #: pytest's status where all tests of a file have other marks
 NO_TESTS = 5
 #: what a line has where no test failed
