@@ -41,13 +41,15 @@ without inertia with the step, and is ``integrator_dissipation``.
 A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
 where time stops), and the end is far away however small the part. Then L does not fall with the step. It is
 the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and either the body, the loads at their
-final values, moves along forces that grow faster than the tissue's,
+final values, moves along forces that grow faster than the tissue's, seen from the bone,
 
 .. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
           w = \Delta u - \Delta b,
 
-or L exceeds the share `SNAP` of :math:`|\Delta f\cdot w|/2`. Both are right in the limit of small
-parts, and only say which of two columns has L.
+and from the surface, with u_0 and Delta u on the right (a bone that presses moves what sticks to the surface
+only in its own eyes), or L exceeds the share `SNAP` of half the larger of :math:`|\Delta f\cdot w|` and what
+the shear of the nodes changes by times their slip. Both are right in the limit of small parts, and only say
+which of two columns has L.
 
 Where no equilibrium is near, the body is released and comes to rest at another one
 (`evfem.solver.relaxation`). The energy set free there is what the drag dissipates on the way,
@@ -94,7 +96,7 @@ from evfem.simulation.history import SUMS
 from evfem.simulation.model import Model
 from evfem.surface.adhesion import ON
 
-#: share of the work of the change of the internal forces that no small smooth part sets free
+#: share of the work of the change of internal forces or shear that no small smooth part sets free
 SNAP = 0.5
 #: share of the work of the internal forces, all counted positive, that is the solver's tolerance
 NOISE = 1e-7
@@ -399,17 +401,20 @@ class SubstepWork:
         if not lost > NOISE * float(np.abs(after * moved).sum()):
             return False
         work = float(np.sum((after - before) * along))
-        return lost > 0.5 * SNAP * abs(work) or work < self._pulled_along(along[self.model.pad.nodes])
-
-    def _pulled_along(self, along: Floats) -> float:
-        """Work of attraction and friction on the way `along` (P, dim) without the bone, under end loads."""
-        model, old, new = self.model, self.old, self.new
+        changed = np.linalg.norm((new.contact_force - old.contact_force)[:, 1:], axis=1)
+        if lost > 0.5 * SNAP * max(abs(work), float(changed @ self.slip_length)):
+            return True
         carried = replace(old, u=old.u + (new.bone - old.bone))
-        work = 0.0
+        return all(work < self._pulled(begin) for begin in (carried, old))
+
+    def _pulled(self, begin: State) -> float:
+        """Work of what attraction and friction grow by from `begin` to the end, under the end loads."""
+        model, old, new = self.model, self.old, self.new
+        along, work = (new.u - begin.u)[model.pad.nodes], 0.0
         if model.attraction is not None:
-            at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
+            at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (begin, new)]
             work += float(np.sum((at[1] - at[0]) * along))
-        less = self._coefficient(model.equilibrium.interface.on_display(carried))
+        less = self._coefficient(model.equilibrium.interface.on_display(begin))
         less = less - self._coefficient(self.places[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 

@@ -86,6 +86,18 @@ def test_what_the_way_loses_falls_with_the_square_of_the_step(name):
     assert fine.snap_dissipation[-1] < 1e-9 * fine.stored_energy[-1]
 
 
+def test_no_snap_is_where_the_loss_falls_with_the_step():
+    """A press on rough faces with an attraction of half the load, and the step that begins to slip whole."""
+    body = replace(coarse_pad(ridges=False), width=14.0)
+    screen = Display(insulator=ev.Layer(1e-3, 4.0), friction=0.3)
+    press, slide = Press(force=0.03, steps=10), Slide(1.0, steps=10, hold="force")
+    rough = scene(screen, StrongTroxel(), 200.0, (press, slide), body, roughness_gap=0.005)
+    found, half = simulate(rough), simulate(replace(rough, motion=(replace(press, steps=20),)))
+    assert found.electrostatic_force[9] > 0.5 * found.applied_force[9]
+    assert found.jumps.sum() == 0
+    assert half.integrator_dissipation[-1] < 0.4 * found.integrator_dissipation[9]
+
+
 @pytest.mark.parametrize("gap", [0.05, 0.018], ids=["wide", "narrow"])
 def test_a_plate_that_snaps_sets_free_what_the_closed_form_says(gap):
     """A column that cannot move sideways is a spring, and its lower face a plate. In a narrow gap it is near
