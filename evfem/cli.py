@@ -309,7 +309,7 @@ def _sensitivities(given: argparse.Namespace) -> None:
     folder = given.out or Path(f"{given.scene.stem}-out")
     with alone_in(folder):
         found = sensitivities(scene, by, columns, progress=True)
-        for key in (key for key in (*found.parameters, *(columns or ())) if key in found.reasons):
+        for key in (key for key in columns or () if key in found.reasons):
             notices.tell(f"{key}: {found.reasons[key]}")
         print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
 

@@ -76,8 +76,8 @@ class Core:
         return (
             f"{steep}: below {1e3 * self.length:.2g} um a line of the same work takes the law's place (work "
             f"of adhesion {self.work:.2g} N/mm, exact beyond); an edge of contact is right to "
-            f"{EDGE * self.distance:.2g} mm, a load to 1 %, a pull-off to 3 %; a finer mesh needs less, "
-            'rough faces none; core = "off" gives the law itself and answers that depend on the way'
+            f"{EDGE * self.distance:.2g} mm, a load to 1 %, a pull-off to 3 %; a finer mesh or a wider "
+            'roughness_gap needs less; core = "off" gives the law itself and answers that depend on the way'
         )
 
 

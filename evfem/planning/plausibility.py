@@ -34,11 +34,14 @@ DRIES = ("stratum_corneum", "nail")
 THIN = 1.0
 #: size across (mm) of a mesh, at least, and of an insulator, at most; speed of a slide (mm/s), at
 #: least, and rms slope of a profile, at most
-SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.95, 0.2, 20.0
+SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.95, 0.2, 3.0
 #: stiffness against a change of volume over that in shear, of tissue in which elements lock: nu = 0.499995
 LOCKED = 1e5
 #: length (mm) of a sampled profile, at least, where it has more points than a step or a bump needs
 SHORTEST, FEW = 0.15, 20
+#: length (mm) beside the end of a profile that a finger at the end touches, and share of the profile's height
+#: that it varies there where the profile does not end level
+BESIDE, ROUGH_END = 1.0, 0.1
 #: field (V/um) that breaks any solid down
 BREAKDOWN = 300.0
 #: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
@@ -60,6 +63,7 @@ def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[
         *_small(scene),
         *_large(scene, mesh, min(moduli.values())),
         *_other_units(scene, mesh),
+        *_profile(scene, mesh),
         *_at_rest(scene),
         *_breakdown(scene),
         *_unbearable(scene),
@@ -117,13 +121,26 @@ def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
         if course.distance and course.speed is not None and course.speed <= SLOWEST:
             slow = f"motion {i} slides at {course.speed:g} mm/s, slower than any finger explores"
             yield f"{slow}: speeds are in mm/s, not in m/s"
-    if isinstance(scene.ground, Profile):
-        length = float(np.ptp(scene.ground.x))
-        if length < SHORTEST and scene.ground.x.size > FEW:
-            yield f"the profile is {length:.3g} mm long: lengths are in mm, not in m"
-        slope = np.diff(scene.ground.samples) / np.diff(scene.ground.x)
-        if (rms := float(np.sqrt(np.mean(slope**2)))) > STEEPEST:
-            yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
+
+
+def _profile(scene: Scene, mesh: Mesh) -> Iterator[str]:
+    """A sampled profile in other units, or one that ends below the finger while it is still rough."""
+    if not isinstance(scene.ground, Profile):
+        return
+    x, height = scene.ground.x, scene.ground.samples
+    if (length := float(np.ptp(x))) < SHORTEST and x.size > FEW:
+        yield f"the profile is {length:.3g} mm long: lengths are in mm, not in m"
+    if (rms := float(np.sqrt(np.mean((np.diff(height) / np.diff(x)) ** 2)))) > STEEPEST:
+        yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
+    middle = np.cumsum([0.0, *(course.distance or 0.0 for course in scene.courses)])
+    for end, way in ((x[0], middle.min()), (x[-1], middle.max())):
+        beside = height[np.abs(x - end) < BESIDE]
+        over = (end - way) * np.sign(end - np.mean(x)) < BESIDE
+        if mesh.dim == 2 and over and np.ptp(beside) > ROUGH_END * np.ptp(height):
+            yield (
+                f"the profile ends at x = {end:.4g} mm below the finger, whose middle begins at x = 0 and "
+                f"goes to {way:.4g} mm: beyond its ends it is level"
+            )
 
 
 def _at_rest(scene: Scene) -> Iterator[str]:
@@ -186,6 +203,11 @@ def _unbearable(scene: Scene) -> Iterator[str]:
         yield (
             f"at {scene.electrics.largest_voltage:g} V touching skin is attracted with {traction:.3g} MPa, "
             f"and a load presses a fingertip with up to {PRESSED:g} MPa: the attraction exceeds the load"
+            + (
+                "; rough faces keep a gap: see roughness_gap"
+                if roughness_of(scene.roughness_gap) is None
+                else ""
+            )
         )
 
 

@@ -297,12 +297,20 @@ class Sensitivities:
         pairs = {f"{name} by {key}": self[name, key] for key in self.parameters for name in self.columns}
         return frame({"step": np.asarray(self.result.step), **pairs})
 
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Parameters without a derivative at the end; `reasons` says why."""
+        return tuple(key for key in self.parameters if key in self.reasons)
+
     def __repr__(self) -> str:
         """The parameters by the relative change of normal and tangential force at the end."""
         lines = [f"Sensitivities of {len(self.result.step)} steps, d ln column / d ln parameter at the end:"]
         known = [name for name in self.columns if name not in self.reasons]
         names = [name for name in known if name in ("normal_force", "tangential_force")] or known
         for key in self.parameters:
+            if key in self.missing:
+                lines.append(f"  {key}: {self.reasons[key]}")
+                continue
             shares = [f"{name} {self.elasticity[name, key][-1]:.4g}" for name in names]
             lines.append(f"  {key}: {', '.join(shares)}")
         return "\n".join(lines)

@@ -64,8 +64,9 @@ class Uncertainty:
         one = self.checked
         lines = [
             f"Uncertainty of {len(self.result.step)} steps to first order; {one.key} larger by its sd "
-            f"changes {one.column} at the end by {one.by_derivative:.4g}, a run by {one.by_run:.4g}"
+            f"changes {one.column} at the end by {one.by_derivative:.4g}, in a run by {one.by_run:.4g}"
         ]
+        lines += [f"  {key}: {self.found.reasons[key]}" for key in self.found.missing]
         for name in ("normal_force", "tangential_force", "electrostatic_force"):
             if name in self.sd:
                 lines.append(f"  {name}: {self.result[name][-1]:.6g} +- {self.sd[name][-1]:.2g}")

@@ -80,7 +80,8 @@ def needed_time(scene: Scene, mesh: Mesh) -> float:
 def needs(scene: Scene, mesh: Mesh) -> str:
     """Memory and time of a run with a finger in three dimensions, in a sentence."""
     seconds = f"{float(f'{needed_time(scene, mesh):.2g}'):g}"
-    return f"a run takes about {needed_memory(mesh) / 1e9:.2g} GB of memory and {seconds} s of CPU time"
+    memory = f"{needed_memory(mesh) / 1e9:.2g} GB of memory"
+    return f"a run takes about {memory} and {seconds} s of CPU time with PARDISO"
 
 
 def check_memory(mesh: Mesh) -> None:

@@ -4,6 +4,8 @@ import csv
 
 import numpy as np
 import pytest
+from tools.builders import finger
+from tools.meshes import block
 
 import evfem as ev
 from evfem.cli import main
@@ -51,6 +53,17 @@ def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
     assert np.ptp(band[:, 1]) > found.result.tangential_force.max()
     with pytest.raises(ev.InputError, match="unknown key"):
         ev.plotting.tornado(found, "substeps")
+
+
+def test_why_an_uncertainty_is_missing_is_said():
+    """A finger that snaps down in its second step."""
+    key, motion = "finger.materials.tissue.E", [ev.Hover(0.05, steps=1), ev.VoltageRamp(4000.0, steps=1)]
+    snapping = ev.Scene(finger(block(8, 3, sag=0.4)), ev.Display(), ev.StrongTroxel(), 0.0, motion)
+    found = ev.uncertainty(snapping, {key: 0.01}, ["normal_force"])
+    assert np.isnan(found.sd["normal_force"][-1])
+    reason = f"{key}: the finger snapped or was released in step 2"
+    assert reason in repr(found)
+    assert reason in repr(found.found)
 
 
 def test_what_cannot_be_asked_is_said(path):

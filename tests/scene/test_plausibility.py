@@ -88,6 +88,27 @@ def test_a_profile_with_heights_in_micrometres_is_doubted():
         assert len([one for one in found if "rms slope of 43" in one]) == doubted
 
 
+@pytest.mark.parametrize(
+    ("begin", "end", "way", "ends"),
+    [
+        (-6.0, 6.0, 3.0, ""),
+        (0.0, 6.0, 3.0, "x = 0 "),
+        (-6.0, 3.5, 3.0, "x = 3.5"),
+        (-2.0, 6.0, -3.0, "x = -2"),
+    ],
+)
+def test_a_profile_that_ends_below_the_finger_is_doubted(begin, end, way, ends):
+    x = np.linspace(begin, end, 401)
+    asked = scene(None, ev.Press(force=0.03), ev.Slide(distance=way, steps=3))
+    for height, doubted in (
+        (1e-3 * np.sin(9.0 * x), bool(ends)),
+        (1e-3 * np.exp(-25.0 * (x - 1.5) ** 2), False),
+    ):
+        found = plan(replace(asked, surface=ev.Profile(x, height))).warnings
+        said = [one for one in found if f"the profile ends at {ends}" in one]
+        assert len(said) == doubted, found
+
+
 def test_bone_in_a_mesh_of_softer_parts_is_taken():
     moduli = {"tissue": 0.04, "bone": 6.5e3}
     asked = scene()
