@@ -82,7 +82,9 @@ def picture(view: Any, near: Near, limits: tuple[float | None, float | None], ax
     """A view (`View`, or that of a skin) with its title and colour bar."""
     window = view.window(near)
     scale = fields.scale_of(view.scaled_as, view.shown(window), *limits)
-    ax = figures.axes_or_new(ax, figure_height(window))
+    if ax is None:  # the layout that keeps room for the labels of a narrow window
+        ax = figures.axes_or_new(None, figure_height(window))
+        figures.whole_figure(ax).set_layout_engine("compressed")
     mapped = view.draw(ax, window, scale)
     ax.set_title(told(view.result, view.frame), fontsize="medium")
     label_bar(figures.add_colorbar(mapped, ax, field_label(view.field), scale.extend), view.field)
