@@ -1,5 +1,6 @@
 """The footprint shows what the result says of the skin, where it says it."""
 
+import io
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
@@ -74,6 +75,12 @@ def test_a_close_up_is_around_what_touches_or_is_nearest(result):
     hover = simulate(dome_scene(ev.Hover(gap=0.3)))
     assert abs(sum(footprint(hover, "gap", near="contact").get_xlim())) < 0.1
     assert len(footprint(hover).collections) > 0  # nothing presses
+
+
+def test_labels_of_a_narrow_window_stay_in_the_picture(result):
+    figure = footprint(result, near=(-0.33, 0.33, -0.5, 0.5)).figure
+    figure.savefig(io.BytesIO())
+    assert figure.get_tightbbox().x0 > 0.0
 
 
 def test_other_fields_fingers_and_pictures_are_refused(result, tmp_path):
