@@ -1,6 +1,7 @@
 """The footprint shows what the result says of the skin, where it says it."""
 
 import io
+
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
