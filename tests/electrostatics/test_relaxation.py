@@ -49,6 +49,11 @@ def test_the_state_after_a_ramp_is_that_of_a_matrix_exponential(gap, seconds):
     np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
 
 
+def test_no_rate_of_the_layers_is_above_the_fastest():
+    rates = [-np.linalg.eigvals(system(gap)[0]).real for gap in (*GAPS, 10.0)]
+    assert np.max(rates) < STACK.fastest < 5.0 * np.max(rates)
+
+
 def test_without_poles_and_without_seconds_it_is_the_sandwich():
     skin = ev.Layer(0.30, ev.Dielectric(1136.0, (), 2e-4))
     plain = Sandwich.of(skin, ev.TOUCHSCREEN, frequency=75.0, gap_conductivity=LEAK, gap_eps_r=1.2)
