@@ -173,6 +173,8 @@ def test_derivatives_are_those_of_potential_and_traction_also_between_pressed_ro
     for rate, of in ((cored.traction, cored.potential), (cored.traction_derivative, cored.traction)):
         found = (of(gap + step, 1000.0, SCREEN) - of(gap - step, 1000.0, SCREEN)) / (2.0 * step)
         np.testing.assert_allclose(rate(gap, 1000.0, SCREEN), found, rtol=1e-5)
+    shallow, deep = cored.potential(0.002 + np.array([1e-9, -1e-9]), 1000.0, SCREEN)
+    assert deep == pytest.approx(shallow, rel=1e-5)
 
 
 def test_without_need_the_law_is_the_law_to_the_last_digit():

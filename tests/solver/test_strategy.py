@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tools.builders import finger
 from tools.meshes import block
+from tools.refusals import refuses
 
 from evfem.newton.state import Record, StepFailed
 from evfem.newton.strategy import Strategy
@@ -293,6 +294,11 @@ def test_the_error_of_the_path_sets_the_length_of_its_parts():
     assert finer == pytest.approx(off / 2.0, rel=0.1)
     # the last part was cut by the end of the step, which says nothing against the next one
     assert stepper.substep == pytest.approx(parts[-2], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["path_error", "smallest_part"])
+def test_shares_are_above_zero(name):
+    refuses(f"{name}: given 0.0; allowed: a share", Strategy, **{name: 0.0})
 
 
 def test_parts_that_err_too_much_are_done_again_shorter():
