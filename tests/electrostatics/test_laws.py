@@ -173,7 +173,7 @@ def test_derivatives_are_those_of_potential_and_traction_also_between_pressed_ro
     for rate, of in ((cored.traction, cored.potential), (cored.traction_derivative, cored.traction)):
         found = (of(gap + step, 1000.0, SCREEN) - of(gap - step, 1000.0, SCREEN)) / (2.0 * step)
         np.testing.assert_allclose(rate(gap, 1000.0, SCREEN), found, rtol=1e-5)
-    shallow, deep = cored.potential(0.002 + np.array([1e-9, -1e-9]), 1000.0, SCREEN)
+    shallow, deep = (cored.potential(0.002 + way, 1000.0, SCREEN) for way in (1e-9, -1e-9))
     assert deep == pytest.approx(shallow, rel=1e-5)
 
 
