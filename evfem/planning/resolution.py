@@ -26,7 +26,7 @@ from evfem.tissue.laws import split
 #: share of a profile's height that may lie between two neighbouring nodes and be missed by both
 MISSED = 0.2
 #: share of a profile's slope (root mean square) that may be too fine for the nodes
-ROUGH = 0.5
+ROUGH = 0.25
 #: nodes that the shortest wave of roughness needs
 PER_WAVE = 5.0
 #: samples of the profile per node spacing, and at most
