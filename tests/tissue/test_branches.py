@@ -13,7 +13,7 @@ from tools.solids import block as solid
 from tools.solids import box
 
 import evfem as ev
-from evfem.tissue.branches import Branches, branches_of
+from evfem.tissue.branches import Branches, branches_of, make_branches
 
 SKIN = ((0.8, 0.004), (0.5, 0.07), (0.4, 1.4))
 SMALL = 1e-5  # mm: strain so small that everything is linear
@@ -141,16 +141,20 @@ def test_a_motion_without_time_ends_at_rest():
 @pytest.mark.parametrize("bulk", [False, True])
 @pytest.mark.parametrize("element", ["q1", "q2p1", "hex8"])
 def test_tangent_and_potential(element, bulk):
-    """The tangent is the forces' derivative, these the potential's, in the second of two steps."""
+    """The tangent is the forces' derivative, these the potential's, in the second of two steps; the compiled
+    loops end it alike.
+    """
     space = box("hex8", (1, 2, 1)) if element == "hex8" else rectangle(element, (2, 2))
     law = ev.Yeoh(c1=0.2, nu=0.4, relaxation=((0.8, 0.01), (0.5, 0.3)), bulk_relaxation=bulk)
     branches, X = branch_of(space, law), space.mesh.points
+    looped = make_branches(space, branches_of(space, {"lower": law}, SimpleNamespace()))
 
     def wavy(size, phase=0.0):
         return size * np.sin(X @ np.arange(2.0, 2.0 + space.dim)[:, None] + phase + np.arange(space.dim))
 
-    branches.begin(wavy(0.0), branches.at_rest, 0.01)
-    branches.begin(wavy(0.05), branches.inner(wavy(0.05)), 0.02)
+    for one in (looped, branches):
+        one.begin(wavy(0.0), one.at_rest, 0.01)
+        one.begin(wavy(0.05), one.inner(wavy(0.05)), 0.02)
     u, along = wavy(0.08, 0.3), np.random.default_rng(0).normal(size=X.shape)
     forces = branches.forces(u)
     h = 1e-6
@@ -160,6 +164,8 @@ def test_tangent_and_potential(element, bulk):
     change = (branches.forces(ahead) - branches.forces(behind)) / (2.0 * h)
     tangent = (tangent_of(space, u, branches) @ along.ravel()).reshape(X.shape)
     np.testing.assert_allclose(tangent, change, atol=1e-7 * np.abs(change).max())
+    assert looped.energy(u) == pytest.approx(branches.energy(u), rel=1e-9)
+    assert looped.dissipation(u) == pytest.approx(branches.dissipation(u), rel=1e-9)
 
 
 def test_layers_without_their_own_have_the_fingers(tmp_path):
