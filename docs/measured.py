@@ -414,7 +414,7 @@ def keep(folder: Path, found: dict[str, Found]) -> None:
     needed = {file for _, files in BLOCKS.values() for file in files}
     for study, one in found.items():
         shutil.copy(folder / f"{study}.png", DOCS / "pictures" / f"{study}.png")
-        if one["paper"] or f"{study}.json" in needed:
+        if one["paper"] or f"{study}.json" in needed or (RESULTS / f"{study}.json").exists():
             shutil.copy(folder / f"{study}.json", RESULTS / f"{study}.json")
     if "campaign" in found:
         path = RESULTS / "campaigns.csv"

@@ -34,7 +34,7 @@ DRIES = ("stratum_corneum", "nail")
 THIN = 1.0
 #: size across (mm) of a mesh, at least, and of an insulator, at most; speed of a slide (mm/s), at
 #: least, and rms slope of a profile, at most
-SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.95, 0.2, 3.0
+SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.95, 0.2, 5.0
 #: stiffness against a change of volume over that in shear, of tissue in which elements lock: nu = 0.499995
 LOCKED = 1e5
 #: length (mm) of a sampled profile, at least, where it has more points than a step or a bump needs
@@ -130,7 +130,7 @@ def _profile(scene: Scene, mesh: Mesh) -> Iterator[str]:
     x, height = scene.ground.x, scene.ground.samples
     if (length := float(np.ptp(x))) < SHORTEST and x.size > FEW:
         yield f"the profile is {length:.3g} mm long: lengths are in mm, not in m"
-    if (rms := float(np.sqrt(np.mean((np.diff(height) / np.diff(x)) ** 2)))) > STEEPEST:
+    if (rms := float(np.sqrt(np.sum(np.diff(height) ** 2 / np.diff(x)) / length))) > STEEPEST:
         yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
     middle = np.cumsum([0.0, *(course.distance or 0.0 for course in scene.courses)])
     for end, way in ((x[0], middle.min()), (x[-1], middle.max())):

@@ -86,6 +86,9 @@ def test_a_profile_with_heights_in_micrometres_is_doubted():
         surface = ev.Profile(x, height * np.sin(4.0 * np.pi * x), friction=0.3)
         found = plan(replace(scene(), surface=surface)).warnings
         assert len([one for one in found if "rms slope of 43" in one]) == doubted
+    edges = np.arange(-10.0, 10.0, 0.5)[:, None] + [0.0, 0.02]
+    walls = ev.Profile(edges.ravel(), np.tile([0.0, 0.3, 0.3, 0.0], 20))
+    assert not [one for one in plan(replace(scene(), surface=walls)).warnings if "rms slope" in one]
 
 
 @pytest.mark.parametrize(
