@@ -320,7 +320,7 @@ def test_where_a_force_is_held_shapes_change_normal_force_and_attraction_alike()
     for key in keys:
         normal, pull = (found[name, key][0] for name in ("normal_force", "electrostatic_force"))
         assert abs(pull) > 1e-6
-        assert normal == pytest.approx(pull, abs=3e-10)
+        assert normal == pytest.approx(pull, abs=2e-9)
 
 
 def test_a_shape_whose_first_touch_passes_to_another_node_is_differentiated_before_that():
