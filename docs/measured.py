@@ -224,7 +224,7 @@ def seconds(value: float) -> str:
 
 def robustness(stability: Found, campaigns: list[Found], long: list[Found], mistakes: Found) -> str:
     """What was tried to break it, and what it did."""
-    n, last = stability["numbers"], campaigns[-1]
+    n, last = stability["numbers"], max(reversed(campaigns), key=lambda one: int(one["scenes"]))
     rows = [[row["question"], row["answer"], f"`{row['where']}`"] for row in long]
     cases = f"{n['good']:.0f} of {n['cases']:.0f} end as they should"
     rows.append(["hard cases", cases, "`evfem study stability`"])
