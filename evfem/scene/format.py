@@ -105,7 +105,7 @@ class Measured:
 class BesideFinger:
     """The key of [finger] that is the scene's."""
 
-    depth: Annotated[float | None, DEPTH, "of the finger; adds forces in N, areas in mm2"] = None
+    depth: Annotated[float | None, DEPTH, "of a finger in the plane; adds forces in N, areas in mm2"] = None
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ the file's, and no page is older than studies and files.
 import csv
 import json
 import runpy
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from evfem.studies import printed
 from evfem import studies
 
 DOCS = Path(__file__).parents[2] / "docs"
+sys.path.insert(0, str(DOCS))
 MEASURED = runpy.run_path(str(DOCS / "measured.py"))
 NUMBERS = {
     "B.L2.evfem_q2p1.cpu_s": 3.21,
