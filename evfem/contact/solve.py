@@ -11,9 +11,10 @@ Newton's method on the laws as projections, a primal-dual active set::
         change all violated nodes; from the first statuses on that have been met before, the worst one
             alone; give up where these go round in a circle
 
-What has not converged is never used. In three dimensions it begins again from what the laws make of the last
+What has not converged is never used. From a circle it begins again from what the laws make of the last
 iteration's forces after the motion, then with the nodes that touched, and with all nodes, sticking: slips
-found by chance may drive it about, but nothing changes for nodes that stick.
+found by chance may drive it about, but nothing changes for nodes that stick. In the plane it does so only
+if the body does not give way.
 
 The projections' sources are in `evfem.contact.signorini`; primal-dual active set: S. Hueeber, G. Stadler,
 B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
@@ -70,8 +71,8 @@ def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Pr
     present = np.where(touched & ~held, slip, status)
     if problem.dim == 2 or touched.any():
         yield Projected(pressing[:, 0], shear, present, none)
-    if problem.dim == 2:
-        return
+    if problem.dim == 2 and problem.gives_way:
+        return  # what is found from elsewhere is seldom stable
     count = 0 if problem.extra_unknowns is None else problem.extra_unknowns.right.size
     yield Projected.of(problem, Forces(force, np.zeros_like(force), np.zeros(count)))
     for closed in ([touched] if touched.any() else []) + [np.ones_like(touched)]:

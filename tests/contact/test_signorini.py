@@ -244,6 +244,17 @@ def test_a_node_that_can_neither_slip_nor_open_sticks():
         assert found.force == pytest.approx(-np.linalg.solve(compliance, problem.start))
 
 
+@pytest.mark.parametrize("status", [OPEN, STICK, FORWARD, BACKWARD])
+def test_a_steep_law_of_friction_is_solved_from_every_status(status):
+    """The tangent of a bound that bends up, 2 p - 0.5: p + t / 2 = 1 and p / 2 + t = 0.5 at p = 1, t = 0.
+    Where the node slips, the bound is negative, and statuses go round in a circle.
+    """
+    compliance = np.array([[1.0, 0.5], [0.5, 1.0]])
+    start, bound = np.array([-1.0, -0.5]), {"friction": np.array([2.0]), "cohesion": np.array([-0.5])}
+    found = solve_contact(ContactProblem(start, compliance, **bound), np.array([status]))
+    np.testing.assert_allclose(found.force, [1.0, 0.0], atol=1e-15)
+
+
 def adhering(slip, cohesion=0.5):
     """A node pressed with 2 N/mm, of compliance 0.1, friction 0.3 and a shear force without load."""
     start = np.array([-0.2, slip])
