@@ -115,6 +115,7 @@ def test_with_a_nail_the_finger_is_whole(ridges, order):
     assert np.ptp(top) == pytest.approx(0.45)
 
 
+@pytest.mark.slow
 def test_a_nail_holds_the_finger_less_than_a_fixed_rim_and_more_than_none():
     """And its material counts: a hundred times softer it holds no more than the skin."""
     soft = {"nail": ev.NeoHookean(E=0.17, nu=0.3)}

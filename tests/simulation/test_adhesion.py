@@ -81,6 +81,7 @@ def test_the_width_is_that_of_johnson_kendall_and_roberts(way):
     assert 0.5 * result.contact_width[-1] == pytest.approx(of_theory, abs=0.15)
 
 
+@pytest.mark.slow
 def test_the_pull_off_comes_to_that_of_johnson_kendall_and_roberts():
     """0.472470 C at a rate of about the square root of the nodes' distance or better."""
     motion = [ev.Press(indentation=0.0, steps=1), ev.Press(indentation=-0.03, steps=30)]
