@@ -32,7 +32,7 @@ from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
 from evfem.electrostatics.signals import PadState, Reading, electrode_charge, smallest_gap
-from evfem.newton.hand import HandControl
+from evfem.newton.hand import RIGID, Drive
 from evfem.newton.state import State, StepFailed
 
 #: a voltage (V) that is none
@@ -323,7 +323,7 @@ def sticks(state: State) -> bool:
 @dataclass(frozen=True)
 class Target:
     """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds, in three
-    dimensions z (mm), and the `hand` between drive and bone: x and z are then those of the drive.
+    dimensions z (mm); x and z are those of the `drive`, behind a hand others than the bone's.
     """
 
     x: float
@@ -331,7 +331,7 @@ class Target:
     voltage: VoltageControl
     duration: float = 0.0
     z: float | None = None
-    hand: HandControl | None = None
+    drive: Drive = RIGID
 
     @classmethod
     def held(cls, bone: Floats, voltage: float) -> Target:
@@ -347,9 +347,15 @@ class Target:
         """Translation of the bone (dim,) as far as it is known; the `present` one where it is not."""
         bone = np.array(present, dtype=float)
         bone[1] = self.height.known(float(present[1]))
-        if self.hand is None:
-            bone[::2] = self.place
+        bone[::2] = self.drive.known(self.place, bone[::2])
         return bone
+
+    @property
+    def free(self) -> Any:
+        """Components of the bone's translation that are unknowns, (dim,) bool."""
+        free = np.full(2 if self.z is None else 3, self.drive.free)
+        free[1] = self.height.free
+        return free
 
     @property
     def place(self) -> Floats:
@@ -359,15 +365,21 @@ class Target:
     def increment(self, present: Floats) -> Floats:
         """Expected displacement of the bone from its `present` translation (dim,)."""
         increment = self.bone(present) - present
-        if self.hand is not None:
-            increment[::2] = self.hand.increment
+        increment[::2] = self.drive.travel(increment[::2])
         return increment
+
+    def unknowns(self, tangent: CondensedTangent, bone: Floats) -> tuple[ExtraUnknown, ...]:
+        """The unknown components of the bone's travel from its translation (dim,)."""
+        return (*self.height.unknowns(tangent, float(bone[1])), *self.drive.unknowns(tangent, bone))
+
+    def at_once(self, bone: Floats) -> Target:
+        """The target while no time passes: the bone (dim,) stays where it is along the display."""
+        z = None if self.z is None else float(bone[2])
+        return replace(self, x=float(bone[0]), z=z, duration=0.0, drive=RIGID)
 
     def begun(self, old: State) -> Target:
         """The target of a step that starts from `old`."""
-        if self.hand is None:
-            return self
-        return replace(self, hand=self.hand.begun(old, self.place, self.duration))
+        return replace(self, drive=self.drive.begun(old, self.place, self.duration))
 
     def reached(self, bone: Floats) -> bool:
         """Whether the bone's translation is, to the last digit, what is known of it."""
@@ -379,9 +391,7 @@ class Target:
             return old
         before, now = old.rates[0][bone].tolist(), ((self.bone(old.bone) - old.bone) / self.duration).tolist()
         pairs = list(zip(before, now, strict=True))
-        if self.hand is not None:
-            driven = (self.place - old.hand[0]) / self.duration
-            pairs[::2] = zip(old.hand[3].tolist(), driven.tolist(), strict=True)
+        pairs[::2] = self.drive.given_speeds(old, self.place, self.duration, pairs[::2])
         if self.height.free:
             del pairs[1]
         jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)

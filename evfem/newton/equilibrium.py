@@ -192,8 +192,7 @@ class Equilibrium:
             raise Folded(FOLDED.format(place), self.record.residuals)
         if (margin := self.body.leaves(old, state, target)) is not None:
             raise Unstable(NOT_STABLE.format(margin.cause, margin.ratio))
-        state = self.interface.aged(old, self.body.accepted(old, state))
-        return state if target.hand is None else target.hand.settled(state)
+        return target.drive.settled(self.interface.aged(old, self.body.accepted(old, state)))
 
     def _accepts(self, old: State, state: State, target: Target) -> bool:
         if not self.obeys_contact(old, state):

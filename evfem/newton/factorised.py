@@ -138,8 +138,7 @@ class FactorisedBody:
         dim = state.bone.size
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
-        if target.hand is not None:
-            missing.append(target.hand.unbalanced(state.bone[::2], reaction))
+        missing.append(target.drive.unbalanced(state.bone[::2], reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
         return max(float(free / largest), target.voltage.lacking(self._pad_state(state)))
 
@@ -186,12 +185,8 @@ class FactorisedBody:
             ):
                 self._anderson.reset()
                 return after
-        bone = after.bone.copy()
-        bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.voltage.free else after.voltage
-        if target.hand is not None:
-            bone[::2] = mixed.bone[::2]
-        return replace(mixed, bone=bone, voltage=voltage)
+        return replace(mixed, bone=np.where(target.free, mixed.bone, after.bone), voltage=voltage)
 
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
         """The next iterate; nodes that sank in become candidates, many of them start the way again."""
@@ -230,7 +225,6 @@ class FactorisedBody:
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
         linearisation, tangent = self.linearisation, self.linearisation.tangent
-        height = target.height.unknowns(tangent, float(state.bone[1]))
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
@@ -242,7 +236,7 @@ class FactorisedBody:
             candidates=known,
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
-            unknowns=height if target.hand is None else (*height, *target.hand.unknowns(tangent, state.bone)),
+            unknowns=target.unknowns(tangent, state.bone),
             bed=None if self.interface.bed is None else self.interface.bed_of(state, c),
             tolerance=max(constants.ROUNDING, inner),
         )
@@ -279,7 +273,7 @@ class FactorisedBody:
         c, fraction = self.linearisation.candidates, update.fraction
         force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
         force[c], status[c] = update.contact.force, update.contact.status
-        whole = fraction == 1.0 and not target.height.free and target.hand is None
+        whole = fraction == 1.0 and not target.free.any()
         voltage = state.voltage
         if update.driven:
             voltage = target.voltage.after(voltage, fraction * update.driven)

@@ -18,7 +18,7 @@ cut-off frequency of the friction by 13.8 Hz. In the plane all three are per mm 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
@@ -73,15 +73,16 @@ class Hand:
 
     def stored(self, state: State) -> float:
         """Energy of the spring in N mm."""
-        return 0.5 * self.stiffness * float(np.sum((state.hand[0] - state.bone[::2]) ** 2))
+        return 0.5 * self.stiffness * float(np.sum((state.memory["hand"][0] - state.bone[::2]) ** 2))
 
     def kinetic(self, state: State) -> float:
         """Energy of the mass in N mm."""
-        return 0.5 * self.mass * float(np.sum(state.hand[1] ** 2))
+        return 0.5 * self.mass * float(np.sum(state.memory["hand"][1] ** 2))
 
-    def given(self, old: State, new: State) -> float:
+    def work(self, old: State, new: State) -> float:
         """Work of the actuator beyond that on the bone, between two states, in N mm."""
-        drive = 0.5 * (old.hand[2] + new.hand[2]) * (new.hand[0] - old.hand[0])
+        before, after = old.memory["hand"], new.memory["hand"]
+        drive = 0.5 * (before[2] + after[2]) * (after[0] - before[0])
         bone = 0.5 * (old.reaction + new.reaction) * (new.bone - old.bone)
         return float(np.sum(drive - bone[::2]))
 
@@ -89,31 +90,131 @@ class Hand:
         """Dissipation of the damper in so many seconds, in N mm."""
         if duration == 0.0:
             return 0.0
-        stretched = (new.hand[0] - old.hand[0]) - (new.bone - old.bone)[::2]
+        stretched = (new.memory["hand"][0] - old.memory["hand"][0]) - (new.bone - old.bone)[::2]
         return float(self.damping * np.sum(stretched**2) / duration)
 
+    def potential(self, old: State, new: State, places: Floats) -> Floats:
+        """Energy of the spring beyond the constant force of the end, at the shares `places` (w,) of a part."""
+        square = float(np.sum((new.bone - old.bone)[::2] ** 2))
+        return 0.5 * self.stiffness * square * ((1.0 - places) ** 2 - (1.0 - places[0]) ** 2)
 
-def at_rest(dim: int) -> Floats:
-    """What `State.hand` is at the beginning of a run: `HandControl.settled` says of what."""
-    return np.zeros((6, dim - 1))
+    def takes_time(self, seconds: float) -> bool:
+        """Whether speeds count in a part of so many seconds."""
+        return self.timed and seconds > 0.0
 
 
 @dataclass(frozen=True)
-class HandControl:
+class Drive:
+    """What moves the bone along the display, here rigidly: its x[, z] is that of the drive.
+
+    `free`: whether the bone's place along the display is an unknown; `timed`: whether it knows of time.
+    """
+
+    free = timed = False
+
+    def memory(self, dim: int) -> dict[str, Floats]:
+        """What `State.memory` has of it at the beginning of a run."""
+        return {}
+
+    def begun(self, old: State, drive: Floats, duration: float) -> Drive:
+        """In the step from `old` that takes the drive to x[, z] = `drive` (d,)."""
+        return self
+
+    def known(self, drive: Floats, present: Floats) -> Floats:
+        """x[, z] of the bone (d,) as far as it is known: `present` where it is an unknown."""
+        return drive
+
+    def travel(self, ahead: Floats) -> Floats:
+        """Expected displacement of the bone (d,) in mm; `ahead` if it stood still before."""
+        return ahead
+
+    def unknowns(self, tangent: CondensedTangent, bone: Floats) -> tuple[ExtraUnknown, ...]:
+        """The extra unknowns: the bone's travels along x[, z], or nothing."""
+        return ()
+
+    def residual(self, bone: Floats, drive: Floats, reaction: Floats) -> Floats:
+        """What the bone (dim,) lacks along x[, z] (d,): of its place in mm, or of the force on it in N/mm."""
+        return np.asarray(bone[::2] - drive)
+
+    def unbalanced(self, x: Any, reaction: Floats) -> float:
+        """The largest missing force on the bone in N/mm."""
+        return 0.0
+
+    def own_stiffness(self, axis: int) -> float | None:
+        """Stiffness at the bone along an axis (N/mm per mm), None where its place is prescribed."""
+        return None
+
+    def given_speeds(self, old: State, drive: Floats, duration: float, bone: Any) -> list[tuple[Any, Any]]:
+        """Speeds (mm/s) that are prescribed along x[, z] before and now; `bone`: those of the bone."""
+        return list(bone)
+
+    def settled(self, state: State) -> State:
+        """The accepted state with what the drive keeps."""
+        return state
+
+    def begin_at(self, start: dict[str, float], travelled: tuple[float, float]) -> dict[str, float]:
+        """Where a motion starts, from where the bone is and how far the drive has `travelled` (mm)."""
+        return start
+
+    def place(self, state: State) -> dict[str, float]:
+        """Where the drive is if not at the bone."""
+        return {}
+
+
+RIGID = Drive()
+
+
+def drive_of(hand: Hand | None) -> Drive:
+    """The drive of a scene: a hand, or rigid."""
+    return RIGID if hand is None else HandControl(hand)
+
+
+@dataclass(frozen=True)
+class HandControl(Drive):
     """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), its
     velocity (mm/s), and their mean rates over the part before, for the step's `difference`.
     """
 
     hand: Hand
     drive: Any = 0.0
+    free = True
     duration: float = 0.0
     before: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
     rates: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
     difference: Difference = field(default_factory=Difference)
 
+    @property
+    def timed(self) -> bool:  # type: ignore[override]
+        return self.hand.timed
+
+    def memory(self, dim: int) -> dict[str, Floats]:
+        return {"hand": np.zeros((6, dim - 1))}
+
+    def known(self, drive: Floats, present: Floats) -> Floats:
+        return present
+
+    def travel(self, ahead: Floats) -> Floats:
+        return np.asarray(self.before[2] * self.duration)
+
+    def residual(self, bone: Floats, drive: Floats, reaction: Floats) -> Floats:
+        return self.missing(bone[::2], reaction)
+
+    def own_stiffness(self, axis: int) -> float | None:
+        return self.stiffness if axis != 1 else None
+
+    def given_speeds(self, old: State, drive: Floats, duration: float, bone: Any) -> list[tuple[Any, Any]]:
+        kept = old.memory["hand"]
+        return list(zip(kept[3].tolist(), ((drive - kept[0]) / duration).tolist(), strict=True))
+
+    def begin_at(self, start: dict[str, float], travelled: tuple[float, float]) -> dict[str, float]:
+        return start | dict(zip(("position", "position_z"), travelled, strict=True))
+
+    def place(self, state: State) -> dict[str, float]:
+        return dict(zip(("position", "position_z"), state.memory["hand"][0].tolist(), strict=False))
+
     def begun(self, old: State, drive: Floats, duration: float) -> HandControl:
-        """In the step from `old` that takes the drive to x[, z] = `drive` (d,)."""
-        before, (along, moved, faster) = (old.hand[0], old.bone[::2], old.hand[1]), old.hand[3:]
+        kept = old.memory["hand"]
+        before, (along, moved, faster) = (kept[0], old.bone[::2], kept[1]), kept[3:]
         difference = Difference.over(duration, old.seconds)
         return HandControl(self.hand, drive, duration, before, (along, moved, faster), difference)
 
@@ -129,11 +230,6 @@ class HandControl:
             return self.hand.stiffness
         rate = self.difference.share / self.duration
         return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
-
-    @property
-    def increment(self) -> Any:
-        """Displacement of the bone if nothing changes, (d,) in mm."""
-        return self.before[2] * self.duration
 
     def velocity(self, x: Any) -> Any:
         """Velocity of the bone at the end of the step, (d,) in mm/s."""
@@ -180,4 +276,5 @@ class HandControl:
         ends = np.stack([self.drive, x, self.velocity(x)])
         changes = ends - self.before
         rates = changes / self.duration if self.duration > 0.0 else 0.0 * changes
-        return replace(state, hand=np.stack([self.drive, ends[2], self.driving(x), *rates]))
+        kept = np.stack([self.drive, ends[2], self.driving(x), *rates])
+        return state.remembering(hand=kept)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,8 +18,6 @@ from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES, Past
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
-#: what a hand keeps where there is none
-NO_HAND: Floats = np.zeros(0)
 #: the time since a node touched where nothing depends on it
 NO_AGE: Floats = np.zeros(0)
 #: what a rigid surface gives way by, and its change along x
@@ -55,8 +55,8 @@ class State:
     the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
     velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
     pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
-    Coulomb's `age` (P,) in s; with a hand what it keeps, `hand` (6, d) (`evfem.newton.hand`); under a voltage
-    resolved in time charges over eps_0 (M, P) in V/mm. Maxwell branches keep `inner`
+    Coulomb's `age` (P,) in s; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. What a term
+    keeps from part to part is in its `memory`, by the term's name. Maxwell branches keep `inner`
     (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
     `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface
     adds to the places of the pad's nodes relative to it is `given` (P, dim) in mm, its derivatives along x[,
@@ -74,13 +74,29 @@ class State:
     last_increment: Floats
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
     age: Floats = field(default_factory=lambda: NO_AGE)
-    hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
     inner: Floats = field(default_factory=lambda: NO_BRANCHES)
     rates: Floats = field(default_factory=lambda: NO_RATES)
     seconds: float = 0.0
     given: Floats = field(default_factory=lambda: NO_BED)
     strain: Floats = field(default_factory=lambda: NO_BED)
+    memory: Mapping[str, Floats] = field(default_factory=lambda: MappingProxyType({}))
+
+    def remembering(self, **kept: Floats) -> State:
+        """The state with what terms keep of it."""
+        return replace(self, memory=MappingProxyType({**self.memory, **kept}))
+
+    @property
+    def parts(self) -> dict[str, Any]:
+        """All of it by name, what terms keep as `memory.term`."""
+        own = {spec.name: getattr(self, spec.name) for spec in fields(self) if spec.name != "memory"}
+        return own | {f"memory.{name}": kept for name, kept in self.memory.items()}
+
+    def with_parts(self, parts: Mapping[str, Any]) -> State:
+        """The state with some of its `parts` replaced."""
+        kept = {name.partition(".")[2]: value for name, value in parts.items() if "." in name}
+        own = {name: value for name, value in parts.items() if "." not in name}
+        return replace(self, **own).remembering(**kept) if kept else replace(self, **own)
 
     @property
     def past(self) -> Past:

@@ -89,9 +89,14 @@ def changes(owners: Sequence[Any], step: float) -> Any:
     """`difference` of arrays, or of every field of states or books that has real numbers."""
     if not is_dataclass(owners[0]):
         return difference(owners, step)
-    names = [spec.name for spec in fields(owners[0])]
-    real = [name for name in names if np.asarray(getattr(owners[0], name)).dtype.kind == "f"]
-    return {name: difference([getattr(one, name) for one in owners], step) for name in real}
+    each = [parts_of(one) for one in owners]
+    real = [name for name, value in each[0].items() if np.asarray(value).dtype.kind == "f"]
+    return {name: difference([one[name] for one in each], step) for name in real}
+
+
+def parts_of(owner: Any) -> dict[str, Any]:
+    """A state, or books, by name."""
+    return owner.parts if isinstance(owner, State) else vars(owner)
 
 
 def added(first: Change, second: Change) -> Change:
@@ -101,7 +106,9 @@ def added(first: Change, second: Change) -> Change:
 
 def moved(owner: Any, change: Change, way: float) -> Any:
     """A state, or books, so far along a derivative."""
-    return replace(owner, **{name: getattr(owner, name) + way * value for name, value in change.items()})
+    parts = parts_of(owner)
+    further = {name: parts[name] + way * value for name, value in change.items()}
+    return owner.with_parts(further) if isinstance(owner, State) else replace(owner, **further)
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,8 +75,7 @@ class Equations:
         """The state as the run would accept it, its reaction left, with the history that it leaves behind."""
         state, attraction = self._attracted(state), self.model.attraction
         state = self.interface.aged(self.old, self.model.equilibrium.body.accepted(self.old, state))
-        if self.target.hand is not None:
-            state = self.target.hand.settled(state)
+        state = self.target.drive.settled(state)
         if attraction is None or attraction.charging is None:
             return state
         resting, pressing = self.interface.resting(state), state.contact_force[:, 0]
@@ -109,7 +108,7 @@ class Equations:
 
     def pulled(self, axis: int) -> bool:
         """Whether the bone lacks a force along an axis, not a way."""
-        return self.target.hand is not None if axis == 0 else axis == 1 and self.target.height.free
+        return bool(self.target.free[axis])
 
     def _bone(self, state: State) -> Floats:
         """What the bone lacks (dim,): of its place in mm, or of the force on it in N/mm."""
@@ -118,8 +117,7 @@ class Equations:
             found[1] = target.height.missing(float(state.bone[1]), state.reaction)
         elif isinstance(target.height, Unsupported):
             found[1] = state.bone[1] - self.old.bone[1]
-        if target.hand is not None:
-            found[::2] = target.hand.missing(state.bone[::2], state.reaction)
+        found[::2] = target.drive.residual(state.bone, target.place, state.reaction)
         return found
 
     def _slip(self, state: State) -> Floats:

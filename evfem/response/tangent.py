@@ -84,8 +84,8 @@ class Tangent:
         """What the bone lacks along an axis by the dense unknowns, from the row of the `balance`."""
         target, own = self.equations.target, np.zeros_like(balance)
         own[row] = 1.0
-        if axis == 0 and target.hand is not None:
-            return -target.hand.stiffness * own - balance
+        if (stiffness := target.drive.own_stiffness(axis)) is not None:
+            return -stiffness * own - balance
         return -balance if self.equations.pulled(axis) else own
 
     def solve(self, right: Floats) -> Floats:

@@ -52,7 +52,8 @@ def rise(part: SubstepWork, target: Target) -> float:
     given = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
     given = given - float(np.sum(body.given_forces(new.u) * way))
     potential = stored - stored[0] - _pulled(part, carried) + (_rubbed(part) - given) * PLACES
-    potential = potential + _lifted(part) + _in_time(part) + _hand(part)
+    potential = potential + _lifted(part) + _dragged(part)
+    potential = potential + sum(term.potential(old, new, PLACES) for term in part.model.terms)
     climbed = potential - np.minimum.accumulate(potential)
     return float(climbed.max()) / max(stored[0], stored[-1], LEAST)
 
@@ -60,10 +61,7 @@ def rise(part: SubstepWork, target: Target) -> float:
 def _carried(part: SubstepWork, target: Target) -> Floats:
     """Displacements (P, dim) of pad nodes with a bone that is not loaded; 0 where they keep touching."""
     travel = part.new.bone - part.old.bone
-    if target.height.free:
-        travel[1] = 0.0
-    if target.hand is not None:
-        travel[::2] = 0.0
+    travel[target.free] = 0.0
     attraction = part.model.attraction
     sticks = attraction is not None and attraction.adhesive is not None  # what adheres is not carried off
     return np.where((part.old.touching & (part.new.touching | sticks))[:, None], 0.0, travel)
@@ -124,20 +122,8 @@ def _lifted(part: SubstepWork) -> Floats:
     return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES
 
 
-def _in_time(part: SubstepWork) -> Floats:
-    """The potential of what time adds to the forces; drag counts from the release."""
-    body, old = part.model.body, part.old
-    way, dynamics = part.new.u - old.u, body.dynamics
-    held = np.array([0.5 * body.drag_dissipation(old.u + s * way) for s in PLACES])
-    if dynamics is not None:
-        held = held + dynamics.potential(old.u, way, PLACES)
+def _dragged(part: SubstepWork) -> Floats:
+    """The potential of drag, which counts from the release."""
+    way = part.new.u - part.old.u
+    held = np.array([0.5 * part.model.body.drag_dissipation(part.old.u + s * way) for s in PLACES])
     return held - held[0]
-
-
-def _hand(part: SubstepWork) -> Floats:
-    """Energy of a hand's spring beyond the constant force of the end."""
-    hand = part.model.scene.hand
-    if hand is None:
-        return np.zeros_like(PLACES)
-    square = float(np.sum((part.new.bone - part.old.bone)[::2] ** 2))
-    return 0.5 * hand.stiffness * square * ((1.0 - PLACES) ** 2 - (1.0 - PLACES[0]) ** 2)

@@ -41,7 +41,7 @@ OF_ANY_SIZE = ("candidates", "factor_pressure", "came_off", PROBES)
 
 def state_arrays(state: State) -> dict[str, Any]:
     """Every part of a state, by name."""
-    return {spec.name: np.asarray(getattr(state, spec.name)) for spec in fields(State)}
+    return {name: np.asarray(part) for name, part in state.parts.items()}
 
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
@@ -59,7 +59,8 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
     """The reusable data of the solver, from the arrays of a checkpoint."""
     at = None
     if arrays["factorised"]:
-        made = state_of({spec.name: arrays[f"factor_{spec.name}"] for spec in fields(State)})
+        parts = {name.removeprefix("factor_"): part for name, part in arrays.items()}
+        made = state_of({name: part for name, part in parts.items() if f"factor_{name}" in arrays})
         past = Past(float(arrays["past_seconds"]), arrays["past_rates"])
         begun = arrays["begun_u"], float(arrays["begun_seconds"]), arrays["begun_inner"], past
         at = TangentPoint(made, arrays["touched"], bool(arrays["frozen"]), *begun)
@@ -124,8 +125,9 @@ def _unusable(name: str) -> InputError:
 
 def state_of(arrays: Mapping[str, np.ndarray]) -> State:
     """The state in the arrays of a checkpoint."""
-    parts: dict[str, Any] = {spec.name: arrays[spec.name] for spec in fields(State)}
-    return State(**parts | {name: float(arrays[name]) for name in ("voltage", "seconds")})
+    own: dict[str, Any] = {spec.name: arrays[spec.name] for spec in fields(State) if spec.name in arrays}
+    state = State(**own | {name: float(arrays[name]) for name in ("voltage", "seconds")})
+    return state.with_parts({name: part for name, part in arrays.items() if name.startswith("memory.")})
 
 
 @dataclass(frozen=True)

@@ -255,8 +255,7 @@ class Loop:
     def _start(self) -> Start:
         run = self._run
         start = run.start_of(len(run.rows))
-        if self.scene.hand is not None:
-            start |= dict(zip(("position", "position_z"), run.state.hand[0].tolist(), strict=False))
+        start |= run.model.drive.place(run.state)
         return start if self._load is None else start | {"applied_force": self._load}
 
     def _course(self, asked: Asked, start: Start) -> Course:

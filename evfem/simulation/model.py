@@ -20,6 +20,7 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.factorised import FactorisedBody
+from evfem.newton.hand import Drive, drive_of
 from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits, State
 from evfem.planning.core import Closing
@@ -32,7 +33,7 @@ from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.skin import Skin, make_skin
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import make_dynamics
+from evfem.tissue.dynamics import TimeTerm, make_dynamics
 from evfem.tissue.space import make_space
 from evfem.tissue.splitlaw import split
 from evfem.tissue.userforms import make_term
@@ -52,6 +53,17 @@ class Model:
     equilibrium: Equilibrium
     first_gap: float
     closing: Closing
+
+    @cached_property
+    def drive(self) -> Drive:
+        """What moves the bone along the display."""
+        return drive_of(self.scene.hand)
+
+    @cached_property
+    def terms(self) -> tuple[Any, ...]:
+        """What has energies of its own beside tissue, contact and attraction (`evfem.protocols.EnergyTerm`)."""
+        dynamics = () if self.body.dynamics is None else (TimeTerm(self.body.dynamics),)
+        return (*dynamics, *([] if self.scene.hand is None else [self.scene.hand]))
 
     @cached_property
     def shear_modulus(self) -> Floats:

@@ -35,7 +35,6 @@ from evfem.newton.control import (
     Unsupported,
     VoltageControl,
 )
-from evfem.newton.hand import HandControl, at_rest
 from evfem.newton.state import State, StepFailed
 from evfem.planning.resolution import allowed_error
 from evfem.protocols import Observer, TimeSignal
@@ -187,8 +186,7 @@ class Run:
         self.frames: list[Frame] = []
         self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
-        if scene.hand is not None:
-            self.state = replace(self.state, hand=at_rest(self.state.bone.size))
+        self.state = self.state.remembering(**self.model.drive.memory(self.state.bone.size))
         if resume is not None:
             self._restore(resume)
 
@@ -279,17 +277,17 @@ class Run:
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
         pulled = row["electrostatic_force"] != 0.0 or row["adhesive_force"] != 0.0
         start["loose"] = float(row["normal_force"] <= least and not pulled)
-        return start if self.scene.hand is None else start | self._driven(rows_before)
+        return self.model.drive.begin_at(start, self._travelled(rows_before))
 
-    def _driven(self, rows_before: int) -> dict[str, float]:
-        """x and z of the drive (mm) at the end of the motions of so many rows; the bone's are others."""
+    def _travelled(self, rows_before: int) -> tuple[float, float]:
+        """x and z of the drive (mm) at the end of the motions of so many rows."""
         x = z = 0.0
         done = 0
         for motion in self.scene.motion:
             done += motion.steps
             if done <= rows_before:
                 x, z = x + motion.course.travel[0], z + motion.course.travel[1]
-        return {"position": x, "position_z": z}
+        return x, z
 
     def _target(self, course: Course, start: Start, fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
@@ -318,8 +316,7 @@ class Run:
             way = course.direction if bone.size == 3 else (1.0,)
             wish = float(self.voltage(position * way[0] + sum(way[1:]) * position_z))
             drive = FollowFriction(wish, self.voltage.largest_voltage, way)
-        hand = None if self.scene.hand is None else HandControl(self.scene.hand)
-        return Target(position, height, drive, z=along, hand=hand)
+        return Target(position, height, drive, z=along, drive=self.model.drive)
 
     def _loose(self, course: Course, start: Start, voltage: float, time: float) -> bool:
         """Whether a held force is that of any height: the finger is loose, not attracted at `time` (s)."""

@@ -143,12 +143,10 @@ class SubstepWork:
         """Energies at the end of the part, its loads held."""
         body, new = self.model.body, self.new
         given = body.given_forces(new.u)
-        kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
         springs = float(0.5 * np.sum(self.compliance * new.contact_force**2) + self.yielded[-1])
-        if (hand := self.model.scene.hand) is not None:
-            springs, kinetic = springs + hand.stored(new), kinetic + hand.kinetic(new)
-        stored = body.energy(new.u) + (0.0 if body.dynamics is None else body.dynamics.branch_energy(new.u))
-        return Books(body.forces(new.u) - given, given, stored, springs, kinetic)
+        springs += float(sum(term.stored(new) for term in self.model.terms))
+        kinetic = float(sum(term.kinetic(new) for term in self.model.terms))
+        return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
         """Contributions of the part to `SUMS`, N mm per mm of depth."""
@@ -157,12 +155,10 @@ class SubstepWork:
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone) + turned
         given -= _mean_work(begin.given, end.given, moved)
         (electrostatic, adhesive), friction = self.pulled(), self.friction()
-        viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
-        lost = turned + electrostatic + adhesive - friction
-        if (hand := self.model.scene.hand) is not None:
-            driven = hand.given(old, new)
-            given, lost = given + driven, lost + driven
-            viscous += hand.dissipation(old, new, self._seconds)
+        driven = float(sum(term.work(old, new) for term in self.model.terms))
+        viscous = float(sum(term.dissipation(old, new, self._seconds) for term in self.model.terms))
+        given += driven
+        lost = turned + electrostatic + adhesive - friction + driven
         lost += _mean_work(begin.forces, end.forces, moved) - (end.energy - begin.energy) - viscous
         lost -= _mean_work(*self._on_surface, moved[self.model.pad.nodes])
         lost -= (drag := body.drag_dissipation(new.u))
@@ -390,11 +386,8 @@ class SubstepWork:
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
         """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
-        dynamics, new, old = self.model.body.dynamics, self.new, self.old
-        hand = self.model.scene.hand
-        if dynamics is not None and dynamics.step > 0.0:
-            return False
-        if hand is not None and hand.timed and self._seconds > 0.0:
+        new, old = self.new, self.old
+        if any(term.takes_time(self._seconds) for term in self.model.terms):
             return False
         moved = new.u - old.u
         along = moved - (new.bone - old.bone)

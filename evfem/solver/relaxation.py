@@ -94,7 +94,7 @@ class Relaxation:
                 continue
             accept(state, new)
             if held.duration > 0.0:
-                held, end = (_at_once(new.bone, each) for each in (held, end))
+                held, end = (each.at_once(new.bone) for each in (held, end))
             _refuse_flight(new, held)
             drag.moved(float(np.abs(new.u - state.u).max()))
             state, begin = new, new.u
@@ -113,8 +113,7 @@ class Relaxation:
         """The loads of the steps with drag: a snap takes no time, but where hand or charge have their own."""
         if target.voltage.follows:
             target = replace(target, voltage=GivenVoltage(state.voltage))
-        timed = self.charged or (target.hand is not None and target.hand.hand.timed)
-        return target if timed else replace(target, duration=0.0)
+        return target if self.charged or target.drive.timed else replace(target, duration=0.0)
 
     def _dragged(self, state: State, target: Target, begin: Floats, drag: DragSchedule) -> State | None:
         """The equilibrium with drag that holds the body at `begin` (N, dim); None, and slower, if failed."""
@@ -145,14 +144,6 @@ class Relaxation:
             return self.solve(state, target)
         except StepFailed:
             return None
-
-
-def _at_once(bone: Floats, target: Target) -> Target:
-    """The target while no time passes: below a hand the bone (dim,) stays where it is."""
-    if target.hand is None:
-        return replace(target, duration=0.0)
-    z = None if target.z is None else float(bone[2])
-    return replace(target, x=float(bone[0]), z=z, duration=0.0, hand=None)
 
 
 def _refuse_flight(state: State, target: Target) -> None:

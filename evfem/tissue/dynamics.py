@@ -301,6 +301,32 @@ class Dynamics:
 DYNAMICS["viscous"] = Dynamics
 
 
+@dataclass(frozen=True, eq=False)
+class TimeTerm:
+    """The books of `dynamics` (`evfem.protocols.EnergyTerm`)."""
+
+    dynamics: Dynamics
+
+    def stored(self, state: Any) -> float:
+        return self.dynamics.branch_energy(state.u)
+
+    def kinetic(self, state: Any) -> float:
+        return self.dynamics.kinetic_energy(state.velocity)
+
+    def work(self, old: Any, new: Any) -> float:
+        return 0.0
+
+    def dissipation(self, old: Any, new: Any, seconds: float) -> float:
+        return self.dynamics.dissipation(new.u)
+
+    def potential(self, old: Any, new: Any, places: Floats) -> Floats:
+        held = self.dynamics.potential(old.u, new.u - old.u, places)
+        return held - held[0]
+
+    def takes_time(self, seconds: float) -> bool:
+        return self.dynamics.step > 0.0
+
+
 class Inertial(Dynamics, name="inertial"):
     """Dynamics with mass: backward differences of second order, and a pad whose nodes have no mass."""
 
