@@ -13,14 +13,15 @@ surface by less than the strain of the finger over the number of its nodes; no f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
-from evfem.surface.pad import Pad
+from evfem.common.arrays import Floats, Ints, block
+from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
 #: nodes with no force below which the surface counts, up to so many node distances above it; in space also
@@ -64,16 +65,174 @@ class Yielding:
         return found
 
 
-class Bed:
-    """An elastic surface, `elastic`, below a `pad` with this `spacing` (mm); `least` is the smallest length
-    (mm), in space area, of a node. Below nodes without force that are high above it is left out; under an
-    attraction there are none.
+class Rigid:
+    """A surface that does not give way: what every surface below the pad answers (P nodes, C candidates).
+
+    `given` (P, dim) in mm is what the surface adds to the places of the pad's nodes relative to it, `strain`
+    (P, d, dim) its derivatives along x[, z]; both are kept in a `State`.
     """
 
-    def __init__(self, elastic: Any, pad: Pad | Skin, spacing: float, least: float) -> None:
-        self.elastic, self.pad, self.least = elastic, pad, least
+    reach, yields = 0.0, False
+
+    def memory(self, nodes: int, dim: int) -> dict[str, Floats]:
+        """What a `State` keeps of it at the beginning of a run."""
+        return {}
+
+    def places(self, position: Floats, state: Any) -> Floats:
+        """Places (P, dim) relative to the surface of nodes at `position`, as if it were rigid."""
+        return position
+
+    def sloped(self, found: SurfaceState, state: Any) -> SurfaceState:
+        """The rigid surface as it lies in `state`."""
+        return found
+
+    def tilted(self, state: Any, force: Floats) -> Floats:
+        """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
+        return force
+
+    def untilted(self, state: Any, force: Floats) -> Floats:
+        """The same attraction as above a surface that has not sunk, whose work is that of the field."""
+        return force
+
+    def missed(self, position: Floats, state: Any, force: Floats) -> float:
+        """By how much, relative, the surface misses what forces on the nodes (P, dim) sink it by."""
+        return 0.0
+
+    def of(self, position: Floats, state: Any, c: Ints) -> RigidBelow:
+        """The surface below the candidates c (C,) of a linear step."""
+        return RIGID_BELOW
+
+    def sunk(
+        self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
+    ) -> dict[str, Floats]:
+        """Fields of the next iterate: the surface gives way to `force` (P, dim), below the candidates of an
+        `update` (C,) by the fraction of what the linear step found.
+        """
+        return {}
+
+    def energies(self, part: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
+        """Energy before, between (forces of one end, places of the other) and after a part, N mm."""
+        return np.zeros(3)
+
+    def way(self, part: tuple[Any, Any], moved: Floats) -> Floats:
+        """How far nodes that `moved` (P, dim) did so relative to the surface."""
+        return moved
+
+    def stretched(self, part: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
+        """Slips (P,) along the surface, as long as it is stretched, of nodes that went a `way` (P, d)."""
+        return length
+
+
+class RigidBelow:
+    """A rigid surface below the candidates of a linear step."""
+
+    def relative(self, compliance: Floats) -> Floats:
+        """Compliance of the candidates' places relative to the surface."""
+        return compliance
+
+    def among(self, among: Floats, rows: Ints) -> Floats:
+        """The same of some rows."""
+        return among
+
+    def freed(self, free: Floats) -> Floats:
+        """Motion (dim C, 1 + p) relative to the surface, without contact forces."""
+        return free
+
+    def gives(self, whole: Floats) -> Any:
+        """By how much more it gives way (dim C,) under contact forces `whole` (dim C,)."""
+        return 0.0
+
+
+RIGID_BELOW = RigidBelow()
+
+
+@dataclass(frozen=True, eq=False)
+class BelowCandidates(RigidBelow):
+    """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
+    what it lacks without contact forces of what the present attraction asks for, `pulled` (2 c,) in mm.
+    """
+
+    compliance: Floats
+    pulled: Floats
+
+    def relative(self, compliance: Floats) -> Floats:
+        return compliance + self.compliance
+
+    def among(self, among: Floats, rows: Ints) -> Floats:
+        return among + block(self.compliance, rows, rows)
+
+    def freed(self, free: Floats) -> Floats:
+        return free + np.pad(self.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
+
+    def gives(self, whole: Floats) -> Any:
+        return self.pulled + self.compliance @ whole
+
+
+class Bed(Rigid):
+    """An elastic surface, `elastic`, below a `pad` with this `spacing` (mm); `least` is the smallest length
+    (mm), in space area, of a node; `surface` the same at rest. Below nodes without force that are high above
+    it is left out; under an attraction there are none.
+    """
+
+    yields = True
+
+    def __init__(self, surface: Any, pad: Pad | Skin, spacing: float, least: float) -> None:
+        self.surface, self.elastic, self.pad, self.least = surface, surface.elastic, pad, least
         self.spacing, self.reach = spacing, NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
+
+    def memory(self, nodes: int, dim: int) -> dict[str, Floats]:
+        return {"given": np.zeros((nodes, dim)), "strain": np.zeros((nodes, dim - 1, dim))}
+
+    def places(self, position: Floats, state: Any) -> Floats:
+        return np.asarray(position + state.given)
+
+    def sloped(self, found: SurfaceState, state: Any) -> SurfaceState:
+        slope = np.linalg.solve(_kept(state), (found.slope - state.strain[:, :, 1])[:, :, None])
+        return replace(found, slope=np.asarray(slope[:, :, 0]))
+
+    def tilted(self, state: Any, force: Floats) -> Floats:
+        found, pushed = force.copy(), force[:, ::2] + state.strain[:, :, 1] * force[:, 1:2]
+        found[:, ::2] = np.linalg.solve(_kept(state), pushed[:, :, None])[:, :, 0]
+        return found
+
+    def untilted(self, state: Any, force: Floats) -> Floats:
+        found, along = force.copy(), np.einsum("pkj,pj->pk", _kept(state), force[:, ::2])
+        found[:, ::2] = along - state.strain[:, :, 1] * force[:, 1:2]
+        return found
+
+    def under(self, position: Floats, state: Any) -> Yielding:
+        """The surface below nodes at `position` (P, dim) in a state."""
+        return self.below(self.places(position, state), surface_state(self.surface, position).gap)
+
+    def missed(self, position: Floats, state: Any, force: Floats) -> float:
+        below = self.under(position, state)
+        missing = np.abs(below.given(force) - state.given).max() / self.spacing
+        return float(max(missing, np.abs(below.change(force) - state.strain).max()))
+
+    def of(self, position: Floats, state: Any, c: Ints) -> RigidBelow:
+        below = self.under(position, state)
+        return BelowCandidates(below.among(c), (below.given(state.attraction) - state.given)[c].ravel())
+
+    def sunk(
+        self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
+    ) -> dict[str, Floats]:
+        below, (c, gives, fraction), force = self.under(position, state), update, force()
+        given = below.given(force)
+        given[c] = state.given[c] + fraction * np.asarray(gives).reshape(c.size, -1)
+        return {"given": given, "strain": below.change(force)}
+
+    def energies(self, part: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
+        found = [[0.5 * float(np.sum(force * state.given)) for state in part] for force in forces]
+        return np.array([found[0][0], found[0][1] + found[1][0], found[1][1]])
+
+    def way(self, part: tuple[Any, Any], moved: Floats) -> Floats:
+        return np.asarray(moved + part[1].given - part[0].given)
+
+    def stretched(self, part: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
+        along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        stretch = 0.5 * (part[0].strain + part[1].strain)[:, :, ::2]
+        return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
     def below(self, position: Floats, height: Floats) -> Yielding:
         """The surface below nodes at (P, dim), `height` (P,) above it at rest; kept, as many ask."""
@@ -91,6 +250,17 @@ class Bed:
         given, changed = self.elastic.compliance(x, length), slopes(self.elastic, x, length)
         compliance, *slope = (_by_nodes(np.asarray(each), dim) for each in (given, *changed))
         return Yielding(over, compliance, np.stack(slope))
+
+
+def bed_of(surface: Any, pad: Pad | Skin, spacing: float, least: float) -> Rigid:
+    """What is below a pad: the surface's own elasticity, or none."""
+    elastic = getattr(surface, "elastic", None)
+    return Rigid() if elastic is None else Bed(surface, pad, spacing, least)
+
+
+def _kept(state: Any) -> Floats:
+    """How long lengths on an elastic surface along x[, z] are for what they were, (P, d, d)."""
+    return np.asarray(np.eye(state.strain.shape[1]) - state.strain[:, :, ::2])
 
 
 def _by_nodes(found: Floats, dim: int) -> Floats:

@@ -26,6 +26,7 @@ import numpy as np
 
 from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
 from evfem.common.constants import DISC_OWN, LARGE_SYSTEM, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
+from evfem.contact.bed import RIGID_BELOW, RigidBelow
 from evfem.contact.follower import Candidates, FollowerStiffness, local
 from evfem.contact.signorini import (
     OPEN,
@@ -53,7 +54,7 @@ Settled = tuple[Floats, Floats, Floats, Ints, Floats, int, bool]
 @dataclass(frozen=True, eq=False)
 class StepSolution:
     """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns; by how
-    much more an elastic surface has `given` way (dim c,), None of a rigid one.
+    much more an elastic surface has `given` way (dim c,), 0 of a rigid one.
     """
 
     moved: Floats
@@ -62,17 +63,7 @@ class StepSolution:
     extra: Floats
     solves: int
     reduced: bool
-    given: Floats | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class CandidatesBed:
-    """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
-    what it lacks without contact forces of what the present attraction asks for, `pulled` (2 c,) in mm.
-    """
-
-    compliance: Floats
-    pulled: Floats
+    given: Any = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,19 +145,18 @@ class LinearContactStep:
     residual: Floats
     bone: Floats
     unknowns: tuple[ExtraUnknown, ...] = ()
-    bed: CandidatesBed | None = None
+    bed: RigidBelow = RIGID_BELOW
     tolerance: float = ROUNDING
 
     @cached_property
     def seen(self) -> Floats:
         """Compliance of the candidates' places relative to the surface."""
-        return self.body.compliance if self.bed is None else self.body.compliance + self.bed.compliance
+        return self.bed.relative(self.body.compliance)
 
     def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
-        free = alone = self._free_motion()
-        if self.bed is not None:
-            free = free + np.pad(self.bed.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
+        alone = self._free_motion()
+        free = self.bed.freed(alone)
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(free[:, 0] + self.seen @ self._present)
@@ -182,11 +172,8 @@ class LinearContactStep:
         horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
-        given = None
-        if self.bed is not None:
-            given = self.bed.pulled + self.bed.compliance @ whole
-            moved = moved - given
-        return StepSolution(moved, force, status, extra, solves, reduced, given)
+        given = self.bed.gives(whole)
+        return StepSolution(moved - given, force, status, extra, solves, reduced, given)
 
     def _settled(self, near: Any, free: Floats, alone: Floats) -> Settled:
         """Contact of the `near` nodes (c,) bool, which others join that sink in, until none does."""
@@ -243,10 +230,7 @@ class LinearContactStep:
 
     def among(self, near: Ints) -> Floats:
         """`seen` among these candidates, in the order of `CondensedTangent.rows`."""
-        if self.bed is None:
-            return self.body.among(near)
-        rows = self.body.rows(near)
-        return self.body.among(near) + block(self.bed.compliance, rows, rows)
+        return self.bed.among(self.body.among(near), self.body.rows(near))
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
         """Force (N/mm) that the bone lacks along the first unknown's axis, were its `travel` given."""

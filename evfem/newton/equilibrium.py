@@ -33,7 +33,7 @@ from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
-from evfem.newton.state import NO_AGE, NO_BED, NO_CHARGES, Balance, Folded, Limits, State, StepFailed
+from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
 from evfem.surface.adhesion import ON
 
@@ -71,8 +71,7 @@ class Equilibrium:
             age=NO_AGE if self.interface.law is None else np.zeros(nodes),
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
             inner=self.body.body.at_rest,
-            given=NO_BED if self.interface.bed is None else zero,
-            strain=NO_BED if self.interface.bed is None else np.zeros((nodes, dim - 1, dim)),
+            **self.interface.bed.memory(nodes, dim),
             rates=np.zeros_like(self.body.body.rates(still)),
         )
         attraction = self.attraction_at(state, state, voltage)

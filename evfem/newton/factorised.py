@@ -117,7 +117,8 @@ class FactorisedBody:
         forces = self.body.reduce(nodal)
         state = replace(state, attraction=attraction, reaction=forces[self.body.bone])
         residual, mixed = self._largest(state, target, forces), self._with_pressure(state, target, forces)
-        residual = max(residual, self.interface.unyielded(state, pad))
+        place = self.interface.positions(state.u)
+        residual = max(residual, self.interface.bed.missed(place, state, pad))
         return state, Balance(forces, residual, attraction, mixed)
 
     def _with_pressure(self, state: State, target: Target, forces: Floats) -> MixedBalance | None:
@@ -237,7 +238,7 @@ class FactorisedBody:
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
             unknowns=target.unknowns(tangent, state.bone),
-            bed=None if self.interface.bed is None else self.interface.bed_of(state, c),
+            bed=self.interface.bed.of(self.interface.positions(state.u), state, c),
             tolerance=max(constants.ROUNDING, inner),
         )
 
@@ -285,18 +286,11 @@ class FactorisedBody:
             bone=target.bone(state.bone) if whole else state.bone + fraction * update.bone,
             voltage=voltage,
         )
-        return after if update.contact.given is None else self._sunk(state, after, update)
-
-    def _sunk(self, state: State, after: State, update: Update) -> State:
-        """The iterate `after` with what the elastic surface gives way by: below the candidates that of the
-        linear step, which knows how the attraction changed.
-        """
-        below = self.interface.below(state)
-        force = self.interface.contact_forces(replace(after, u=state.u)) + state.attraction
-        given, c = below.given(force), self.linearisation.candidates
-        changed = np.asarray(update.contact.given).reshape(c.size, -1)
-        given[c] = state.given[c] + update.fraction * changed
-        return replace(after, given=given, strain=below.change(force))
+        # below the candidates an elastic surface gives way as the linear step found, which knows how the
+        # attraction changed
+        force = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
+        given = c, update.contact.given, fraction
+        return replace(after, **self.interface.bed.sunk(self.interface.positions(state.u), state, force, given))
 
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:
         """Largest fraction 1, 1/2, 1/4 ... of an update that keeps every sampled volume."""
@@ -332,8 +326,7 @@ class FactorisedBody:
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
-        timed = dynamics is not None and dynamics.step > 0.0
-        if timed or state.bone.size == 3 or not crests.any():
+        if dynamics.step > 0.0 or state.bone.size == 3 or not crests.any():
             return None
         if linearisation.refused:
             linearisation.factorise(state)
@@ -374,9 +367,8 @@ class FactorisedBody:
 
     def reusable(self) -> Reusable:
         """Candidates, where the factorisation was made, and the last time step."""
-        dynamics, linearisation = self.body.dynamics, self.linearisation
-        duration = 0.0 if dynamics is None else dynamics.step
-        return Reusable(linearisation.candidates, linearisation.reusable, duration)
+        linearisation = self.linearisation
+        return Reusable(linearisation.candidates, linearisation.reusable, self.body.dynamics.step)
 
     def resume(self, carried: Reusable) -> None:
         """Make the factorisation again that the interrupted run had at hand."""
@@ -384,5 +376,4 @@ class FactorisedBody:
         if (at := carried.tangent_point) is not None:
             self.pressure.check(at.state.pressure)
             self.linearisation.restore(at)
-        if self.body.dynamics is not None:
-            self.body.dynamics.step = carried.duration
+        self.body.dynamics.step = carried.duration

@@ -19,7 +19,7 @@ cut-off frequency of the friction by 13.8 Hz. In the plane all three are per mm 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -111,6 +111,8 @@ class Drive:
     """
 
     free = timed = False
+    #: further terms of the books
+    books: ClassVar[tuple[Any, ...]] = ()
 
     def memory(self, dim: int) -> dict[str, Floats]:
         """What `State.memory` has of it at the beginning of a run."""
@@ -186,6 +188,10 @@ class HandControl(Drive):
     @property
     def timed(self) -> bool:  # type: ignore[override]
         return self.hand.timed
+
+    @property
+    def books(self) -> tuple[Any, ...]:  # type: ignore[override]
+        return (self.hand,)
 
     def memory(self, dim: int) -> dict[str, Floats]:
         return {"hand": np.zeros((6, dim - 1))}

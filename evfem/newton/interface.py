@@ -18,8 +18,8 @@ import numpy as np
 
 from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.bed import Bed, Yielding
-from evfem.contact.condensed import COMPONENTS, Candidates, CandidatesBed
+from evfem.contact.bed import bed_of
+from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.contact.slipping import OscillatingNodes
 from evfem.newton.state import State
@@ -122,9 +122,8 @@ class Interface:
         self.jumps = FrictionJumps(
             surface.friction_steps(constants.SHORT_RAMP * self.length), self.points[:, ::2]
         )
-        elastic = getattr(surface, "elastic", None)
         self._least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
-        self.bed = None if elastic is None else Bed(elastic, pad, self.length, self._least)
+        self.bed = bed_of(surface, pad, self.length, self._least)
         self.law: FrictionLaw | None = None
         self._oscillating = OscillatingNodes(pad.nodes.size)
         self.duration = 0.0
@@ -142,7 +141,7 @@ class Interface:
 
     def places(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, dim) relative to the surface, as if it were rigid."""
-        return self.positions(state.u) if self.bed is None else self.positions(state.u) + state.given
+        return self.bed.places(self.positions(state.u), state)
 
     def on_display(self, state: State) -> Floats:
         """x of `places` (P, 1), in space x and z (P, 2)."""
@@ -153,51 +152,13 @@ class Interface:
         for u, given, found in self._surfaces:
             if u is state.u and given is state.given:
                 return found
-        found = surface_state(self.surface, self.places(state))
-        if self.bed is not None:
-            slope = np.linalg.solve(self._kept(state), (found.slope - state.strain[:, :, 1])[:, :, None])
-            found = replace(found, slope=np.asarray(slope[:, :, 0]))
+        found = self.bed.sloped(surface_state(self.surface, self.places(state)), state)
         self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
         return found
 
-    def below(self, state: State) -> Yielding:
-        """The elastic surface below the pad."""
-        assert self.bed is not None
-        position = self.positions(state.u)
-        return self.bed.below(self.places(state), surface_state(self.surface, position).gap)
-
-    def bed_of(self, state: State, c: Ints) -> CandidatesBed:
-        """The same below the candidates c."""
-        below = self.below(state)
-        return CandidatesBed(below.among(c), (below.given(state.attraction) - state.given)[c].ravel())
-
     def tilted(self, state: State, force: Floats) -> Floats:
-        """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
-        if self.bed is None:
-            return force
-        found, pushed = force.copy(), force[:, ::2] + state.strain[:, :, 1] * force[:, 1:2]
-        found[:, ::2] = np.linalg.solve(self._kept(state), pushed[:, :, None])[:, :, 0]
-        return found
-
-    def untilted(self, state: State, force: Floats) -> Floats:
-        """The same attraction as above a surface that has not sunk, whose work is that of the field."""
-        if self.bed is None:
-            return force
-        found, along = force.copy(), np.einsum("pkj,pj->pk", self._kept(state), force[:, ::2])
-        found[:, ::2] = along - state.strain[:, :, 1] * force[:, 1:2]
-        return found
-
-    def _kept(self, state: State) -> Floats:
-        """How long lengths on an elastic surface along x[, z] are for what they were, (P, d, d)."""
-        return np.asarray(np.eye(self.dim - 1) - state.strain[:, :, ::2])
-
-    def unyielded(self, state: State, force: Floats) -> float:
-        """By how much, relative, an elastic surface misses what forces on the nodes (P, 2) sink it by."""
-        if self.bed is None:
-            return 0.0
-        below = self.below(state)
-        missing = np.abs(below.given(force) - state.given).max() / self.length
-        return float(max(missing, np.abs(below.change(force) - state.strain).max()))
+        """Attraction (P, dim) above the surface of `state`, along the normal of what it has sunk."""
+        return self.bed.tilted(state, force)
 
     def resting(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""

@@ -96,11 +96,8 @@ class Linearisation:
         """Start the clock of a step; a factorisation for a much different duration is outdated."""
         dynamics = self.body.dynamics
         self._outdated |= self.body.drag_rate != self._drag_rate
-        if dynamics is None:
-            return
         if self._made_at is not None:
-            made_for = self._made_at.duration
-            self._outdated |= not constants.SHORTER * made_for <= duration <= constants.LONGER * made_for
+            self._outdated |= dynamics.outdates(self._made_at.duration, duration)
         dynamics.begin(old.u, old.velocity, duration, old.inner, old.past)
 
     def choose_candidates(self, state: State, reach: float) -> None:
@@ -208,8 +205,7 @@ class Linearisation:
     def restore(self, at: TangentPoint) -> None:
         """Repeats the factorisation that the run that is resumed made at `at`."""
         self.touching, self.frozen = at.touched, at.frozen
-        if self.body.dynamics is not None:
-            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner, at.past)
+        self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner, at.past)
         self.factorise(at.state)
 
     def _too_old(self, history: list[float]) -> bool:

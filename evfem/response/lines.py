@@ -256,7 +256,7 @@ class Line:
 
     def _sunk(self, part: Accepted, equations: list[Equations]) -> list[Any]:
         """Derivatives by the parameter alone of what an elastic surface gives way by, none of a rigid one."""
-        if self.centre.run.model.equilibrium.interface.bed is None:
+        if not self.centre.run.model.equilibrium.interface.bed.yields:
             return []
         found = zip(*(one.sunk(part.new) for one in equations), strict=True)
         return [difference(each, self.step) for each in found]

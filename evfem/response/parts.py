@@ -47,8 +47,7 @@ class Equations:
         interface, attraction = model.equilibrium.interface, model.attraction
         interface.begin(old, target.duration)
         interface.jumps.place = pins
-        if model.body.dynamics is not None:
-            model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
+        model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
         if attraction is not None and attraction.charging is not None:
             pressing = old.contact_force[:, 0]
             charged = attraction.charged(interface.resting(old), old.voltage, pressing, old.charges)
@@ -68,7 +67,7 @@ class Equations:
     def sunk(self, state: State) -> tuple[Floats, Floats]:
         """What an elastic surface adds to the nodes' places, as `State.given` and `strain`."""
         force = self.interface.contact_forces(state) + self._attracted(state).attraction
-        below = self.interface.below(state)
+        below = self.interface.bed.under(self.interface.positions(state.u), state)
         return below.given(force), below.change(force)
 
     def ended(self, state: State) -> State:

@@ -62,7 +62,7 @@ class Tangent:
         below[closed] = kept.size + np.arange(closed.size)
         _add(matrix, self._pad_forces(), place, place)
         _add(matrix, self._contact_rows(), below, place)
-        if self.equations.interface.bed is not None:
+        if self.equations.interface.bed.yields:
             self._add_bed(matrix, place)
         matrix[: kept.size, : kept.size] += self.factor.schur
         for axis in range(self.state.bone.size):
@@ -77,7 +77,9 @@ class Tangent:
         moves = self._columns()[0]
         near = np.flatnonzero((place[moves] >= 0).all(axis=1))
         moved = place[moves[near]].ravel()
-        given = self.equations.interface.below(self.state).among(near) @ -matrix[moved]
+        interface = self.equations.interface
+        below = interface.bed.under(interface.positions(self.state.u), self.state)
+        given = below.among(near) @ -matrix[moved]
         matrix += matrix[:, moved] @ np.linalg.solve(np.eye(moved.size) - given[:, moved], given)
 
     def _bone_row(self, balance: Floats, row: int, axis: int) -> Floats:

@@ -215,7 +215,7 @@ def _gone(model: Model, failed: StepFailed) -> str:
     # a trial far from equilibrium may give way too: alone that shows nothing
     if margin is None or margin.ratio < (SOFTENED if failed.unstable else CRITICAL):
         return ""
-    passing = model.body.dynamics is not None and target.duration > 0.0
+    passing = not model.body.dynamics.still(target.duration)
     rest = "within a time step as short as this" if passing else "at rest"
     released = ", and released there it does not come to rest" if failed.released else ""
     return (

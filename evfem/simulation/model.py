@@ -33,7 +33,7 @@ from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.skin import Skin, make_skin
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import TimeTerm, make_dynamics
+from evfem.tissue.dynamics import make_dynamics
 from evfem.tissue.space import make_space
 from evfem.tissue.splitlaw import split
 from evfem.tissue.userforms import make_term
@@ -62,8 +62,7 @@ class Model:
     @cached_property
     def terms(self) -> tuple[Any, ...]:
         """What has energies of its own beside tissue, contact and attraction (`evfem.protocols.EnergyTerm`)."""
-        dynamics = () if self.body.dynamics is None else (TimeTerm(self.body.dynamics),)
-        return (*dynamics, *([] if self.scene.hand is None else [self.scene.hand]))
+        return (*self.body.dynamics.books, *self.drive.books)
 
     @cached_property
     def shear_modulus(self) -> Floats:
@@ -127,7 +126,7 @@ def linearised(model: Model, state: State) -> Model:
     scene, attraction, limits = model.scene, model.attraction, model.equilibrium.body.limits
     if model.mesh.dim == 3:  # all of the skin would be kept, and was not tried
         raise InputError("linearised", "a finger in three dimensions", "a finger in the plane")
-    if scene.forms or model.body.dynamics is not None:
+    if scene.forms or model.body.dynamics.acts:
         given = "a form of its own" if scene.forms else f"dynamics = {scene.solver.dynamics}"
         raise InputError("linearised", f"a scene with {given}", "tissue without forms, at rest")
     body = LinearBody(model.body, model.pad.nodes, state.u, scene.solver.threads)
@@ -147,7 +146,7 @@ def make_interface(
         interface = PenaltyInterface(pad, points, surface, solver.tolerance)
         normal = float(solver.penalty_normal or 0.0)
         interface.penalties = (normal, solver.penalty_tangential or normal)
-    if interface.bed is not None and attraction is not None:
+    if attraction is not None:
         interface.bed.reach = np.inf
     cored = closing.core is not None or scene.adhesion is not None
     if cored and attraction is not None:

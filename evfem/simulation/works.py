@@ -88,6 +88,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.quadrature import ENDS, FINE_SHARE, FINE_WAY, LEGENDRE, PART, SEEN, SHARE, SLIDE, WAY
 from evfem.contact.attraction import Attraction
+from evfem.contact.bed import Rigid
 from evfem.contact.charging import Charging
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.newton.interface import slipped
@@ -184,7 +185,7 @@ class SubstepWork:
         """Works of the attraction by a voltage W_e and of adhesion, N mm per mm of depth."""
         attraction, states = self.model.attraction, (self.old, self.new)
         equilibrium = self.model.equilibrium
-        untilted = equilibrium.interface.untilted
+        untilted = equilibrium.interface.bed.untilted
         before, after = (untilted(state, state.attraction) for state in states)
         if attraction is None:
             return 0.0, 0.0
@@ -311,16 +312,8 @@ class SubstepWork:
         part, places = (self.old, self.new), begin + way[..., None] * (end - begin)
         resists = self.model.equilibrium.interface.resistance
         limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
-        return float(PART @ np.sum(limit * self._stretched(length), axis=1))
-
-    def _stretched(self, length: Floats) -> Floats:
-        """Ways (P,) along an elastic surface, as long as it is stretched."""
-        if not self.new.strain.size:
-            return length
-        way = self.places[1] - self.places[0]
-        along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
-        stretch = 0.5 * (self.old.strain + self.new.strain)[:, :, ::2]
-        return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
+        slips = self._bed.stretched((self.old, self.new), end - begin, length)
+        return float(PART @ np.sum(limit * slips, axis=1))
 
     @property
     def _seconds(self) -> float:
@@ -336,16 +329,16 @@ class SubstepWork:
     def way(self) -> Floats:
         """How far the pad's nodes have moved relative to the surface (P, dim) in mm."""
         moved = (self.new.u - self.old.u)[self.model.pad.nodes]
-        return moved if not self.new.given.size else moved + self.new.given - self.old.given
+        return self._bed.way((self.old, self.new), moved)
 
     @cached_property
     def yielded(self) -> Floats:
         """Energy of an elastic surface before, between (forces of one end, places of the other) and after."""
-        (old, new), forces = (self.old, self.new), self._on_surface
-        if not new.given.size:
-            return np.zeros(3)
-        found = [[0.5 * float(np.sum(force * state.given)) for state in (old, new)] for force in forces]
-        return np.array([found[0][0], found[0][1] + found[1][0], found[1][1]])
+        return self._bed.energies((self.old, self.new), self._on_surface)
+
+    @property
+    def _bed(self) -> Rigid:
+        return self.model.equilibrium.interface.bed
 
     @property
     def _on_surface(self) -> tuple[Floats, Floats]:

@@ -72,7 +72,7 @@ class Relaxation:
 
     def applies(self, target: Target) -> bool:
         """Whether the tissue takes no time on its way to `target`: only an equilibrium is asked for."""
-        return target.duration == 0.0 or self.body.dynamics is None
+        return self.body.dynamics.still(target.duration)
 
     def follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
         """The equilibrium at `target` where the body comes to rest when released at `state`;

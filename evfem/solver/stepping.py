@@ -191,7 +191,7 @@ class Stepper:
     def _restart(self, old: State, target: Target) -> None:
         """Start the clocks from `old` to `target` again: others were tried, works are booked by the last."""
         self.equilibrium.interface.begin(old, target.duration)
-        if self.body is not None and self.body.dynamics is not None:
+        if self.body is not None:
             self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
 
     def _relaxation(self, body: Body) -> Relaxation:
@@ -227,7 +227,7 @@ class Stepper:
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return
         relaxation = self._relaxation(self.body)
-        if relaxation.applies(target) or self.body.dynamics is None or self.body.dynamics.mass is not None:
+        if relaxation.applies(target) or self.body.dynamics.mass is not None:
             return
         if pull(state, target) <= 0.0:
             return

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES, Dynamics, Past
+from evfem.tissue.dynamics import Dynamics, Past, Static
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
@@ -28,13 +28,13 @@ class Body:
         space: Space,
         laws: Mapping[str, Any],
         terms: Sequence[Any] = (),
-        dynamics: Dynamics | None = None,
+        dynamics: Dynamics | Static | None = None,
     ) -> None:
         self.space = space
         self.tissue = Tissue(space, laws)
-        self.dynamics = dynamics
+        self.dynamics = dynamics or Static(space)
         self.given = tuple(terms)
-        self.terms = self.given if dynamics is None else (*terms, dynamics)
+        self.terms = (*terms, *self.dynamics.forms)
         self.drag_rate = 0.0
         bone, dim = space.mesh.node_sets["bone"], space.mesh.dim
         held = np.zeros(space.size, dtype=bool)
@@ -121,34 +121,32 @@ class Body:
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) at the end of a step that ends at u."""
-        return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
+        return self.dynamics.velocity(u)
 
     @property
     def beginning(self) -> tuple[Floats, float, Floats, Past]:
         """Displacements (N, dim) that the step began with, its seconds, what branches had kept, and the part
         before.
         """
-        if self.dynamics is None:
-            return np.zeros((self.space.size, self.space.dim)), 0.0, NO_BRANCHES, Past()
         return self.dynamics.beginning
 
     def rates(self, u: Floats) -> Floats:
         """Mean velocities and accelerations (2, N, dim) over the step that ends at u (N, dim), with mass."""
-        return NO_RATES if self.dynamics is None else self.dynamics.rates(u)
+        return self.dynamics.rates(u)
 
     @property
     def branches(self) -> Any:
         """The Maxwell branches of the tissue, or None."""
-        return None if self.dynamics is None else self.dynamics.branches
+        return self.dynamics.branches
 
     @property
     def at_rest(self) -> Floats:
         """What branches keep of the undeformed body."""
-        return NO_BRANCHES if self.dynamics is None else self.dynamics.at_rest
+        return self.dynamics.at_rest
 
     def inner(self, u: Floats) -> Floats:
         """What branches keep of a step that ends at u (N, dim)."""
-        return NO_BRANCHES if self.dynamics is None else self.dynamics.inner(u)
+        return self.dynamics.inner(u)
 
     def energy(self, u: Floats) -> float:
         """Stored energy of the tissue: N mm, in the plane per mm of depth."""

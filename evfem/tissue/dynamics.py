@@ -38,6 +38,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.constants import LONGER, SHORTER
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
 from evfem.tissue.branches import Branches, branches_of, make_branches
@@ -88,6 +89,46 @@ class Difference:
         return cls((1.0 + 2.0 * ratio) / (1.0 + ratio), ratio / (1.0 + ratio))
 
 
+class Static:
+    """Tissue without viscosity and mass: no time passes in it. Answers what `Dynamics` does."""
+
+    acts, mass, branches, at_rest, step = False, None, None, NO_BRANCHES, 0.0
+    #: further terms of the internal forces, and of the books
+    forms: tuple[Any, ...] = ()
+    books: tuple[Any, ...] = ()
+
+    def __init__(self, space: Space) -> None:
+        self._still = np.zeros((space.size, space.dim))
+
+    def begin(self, *begun: Any) -> None:
+        """A step begins: nothing counts from there."""
+
+    @property
+    def beginning(self) -> tuple[Floats, float, Floats, Past]:
+        """As of `Dynamics`."""
+        return self._still, 0.0, NO_BRANCHES, Past()
+
+    def still(self, duration: float) -> bool:
+        """Whether tissue takes no time in a step of `duration` seconds."""
+        return True
+
+    def outdates(self, made_for: float, duration: float) -> bool:
+        """Whether a tangent made for a step of `made_for` seconds is too old for one of `duration`."""
+        return False
+
+    def velocity(self, u: Floats) -> Floats:
+        """Nodal velocities (N, dim) in mm/s."""
+        return np.zeros_like(u)
+
+    def rates(self, u: Floats) -> Floats:
+        """None count."""
+        return NO_RATES
+
+    def inner(self, u: Floats) -> Floats:
+        """No branches keep anything."""
+        return NO_BRANCHES
+
+
 class Dynamics:
     """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other
     term of the internal forces.
@@ -95,7 +136,7 @@ class Dynamics:
     A class with a `name` is one of `DYNAMICS`. `inertia`: whether tissue has mass; `difference` of the step.
     """
 
-    inertia, scheme, difference = False, "backward Euler", Difference()
+    inertia, scheme, difference, acts = False, "backward Euler", Difference(), True
 
     def __init_subclass__(cls, name: str) -> None:
         DYNAMICS[name] = cls
@@ -129,6 +170,24 @@ class Dynamics:
     def at_rest(self) -> Floats:
         """What the branches keep of the undeformed body."""
         return NO_BRANCHES if self.branches is None else self.branches.at_rest
+
+    @property
+    def forms(self) -> tuple[Any, ...]:
+        """Further terms of the internal forces."""
+        return (self,)
+
+    @property
+    def books(self) -> tuple[Any, ...]:
+        """Further terms of the books."""
+        return (TimeTerm(self),)
+
+    def still(self, duration: float) -> bool:
+        """Whether tissue takes no time in a step of `duration` seconds."""
+        return duration == 0.0
+
+    def outdates(self, made_for: float, duration: float) -> bool:
+        """Whether a tangent made for a step of `made_for` seconds is too old for one of `duration`."""
+        return not SHORTER * made_for <= duration <= LONGER * made_for
 
     def begin(
         self,
@@ -373,13 +432,13 @@ def without_pad(space: Space, matrices: Floats) -> Floats:
     return np.asarray(moved * (matrices.sum(axis=(1, 2)) / moved.sum(axis=(1, 2)))[:, None, None])
 
 
-def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str) -> Dynamics | None:
-    """The time-dependent terms of `DYNAMICS` that the laws ask for, or None if there are none; `viscosity`
+def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str) -> Dynamics | Static:
+    """The time-dependent terms of `DYNAMICS` that the laws ask for, `Static` if there are none; `viscosity`
     (s) and `relaxation` of the `finger` are those of laws without their own.
     """
     kind: type[Dynamics] | None = DYNAMICS[name]
     if kind is None:
-        return None
+        return Static(space)
     eta, density = np.zeros(len(space.nodes)), np.zeros(len(space.nodes))
     for region, law in laws.items():
         cells = space.mesh.cells_of(region)
@@ -390,6 +449,6 @@ def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str)
         density[cells] = getattr(law, "density", 1e-9)
     rows = branches_of(space, laws, finger)
     if not (eta.any() or rows or kind.inertia):
-        return None
+        return Static(space)
     branches = make_branches(space, rows) if rows else None
     return kind(space, eta if eta.any() else None, density if kind.inertia else None, branches)

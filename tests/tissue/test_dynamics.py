@@ -116,7 +116,7 @@ def test_only_what_is_asked_for():
         "lower": NeoHookean(E=0.26, nu=0.3, viscosity=0.0, density=2e-9),
         "upper": NeoHookean(E=2.6, nu=0.3),
     }
-    assert make_dynamics(space, laws, SimpleNamespace(viscosity=0.0), "viscous") is None
+    assert make_dynamics(space, laws, SimpleNamespace(viscosity=0.0), "viscous").acts is False
     viscous = make_dynamics(space, laws, SimpleNamespace(viscosity=0.5), "viscous")
     np.testing.assert_allclose(viscous.viscosity, [0.0, 0.0, 0.5, 0.5])  # tau times mu = 1 MPa
     assert viscous.mass is None
