@@ -1,78 +1,76 @@
-"""Attraction by a voltage and by adhesion together: the sum of both, each of its own law.
-
-The solver sees one attraction. Adhesion is always on: its law takes the strength `ON` in the place of a
-voltage.
-"""
+"""Several attractions of a pad: their sum, which the solver sees as one."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import Attraction, Entries
-from evfem.surface.adhesion import ON
+from evfem.contact.attraction import Attraction, Entries, NoAttraction
+
+
+def sum_of(parts: Sequence[Attraction]) -> Attraction | NoAttraction:
+    """The sum of attractions on one pad."""
+    if not parts:
+        return NoAttraction()
+    one = parts[0]
+    return one if len(parts) == 1 and not one.always else Attractions.of(parts)
 
 
 @dataclass(frozen=True, eq=False)
-class WithAdhesion(Attraction):
-    """The `electric` attraction (None: none) and the `adhesive` one; law and charges are the voltage's."""
+class Attractions(Attraction):
+    """The sum of its `parts`; law, layers and charges are those of the first, the voltage's."""
 
-    electric: Attraction | None = None
-    adhesive: Attraction | None = None
+    parts: tuple[Attraction, ...] = ()
 
     @classmethod
-    def of(cls, electric: Attraction | None, adhesive: Attraction) -> WithAdhesion:
-        """Both, on the same pad."""
-        a, law, layers, charging = adhesive, None, None, None
-        if electric is not None:
-            law, layers, charging = electric.law, electric.layers, electric.charging
-        common = (a.pad, a.surface, a.direction, True, a.roughness)
-        return cls(law, layers, *common, charging, electric, adhesive)
+    def of(cls, parts: Sequence[Attraction]) -> Attractions:
+        """Attractions on the same pad, that of a voltage first."""
+        one = parts[0]
+        common = (one.pad, one.surface, one.direction, True, one.roughness)
+        always = any(part.always for part in parts)
+        return cls(one.law, one.layers, *common, one.charging, always=always, parts=tuple(parts))
 
-    def acts(self, voltage: float) -> bool:
-        """Always."""
-        return True
+    def load(self, voltage: float) -> float:
+        return voltage
 
-    def _parts(self, voltage: float) -> Iterator[tuple[Attraction, float]]:
-        """What attracts at a voltage (V), and the voltage that it takes."""
-        if self.electric is not None and self.electric.acts(voltage):
-            yield self.electric, voltage
-        assert self.adhesive is not None
-        yield self.adhesive, ON
+    def _sum(self, voltage: float, of: Callable[[Attraction, float], Any]) -> Any:
+        """The sum over the parts that act at a voltage (V), each at what its law takes."""
+        return sum(of(part, part.load(voltage)) for part in self.parts if part.acts(voltage))
 
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        assert self.adhesive is not None
-        on = np.full(voltages.shape, ON)
-        found = self.adhesive.forces_along(positions, on, touching, pressing)
-        if self.electric is None:
-            return found
-        return found + self.electric.forces_along(positions, voltages, touching, pressing)
+        loads = [np.array([part.load(one) for one in voltages.tolist()]) for part in self.parts]
+        each = zip(self.parts, loads, strict=True)
+        return np.asarray(sum(part.forces_along(positions, at, touching, pressing) for part, at in each))
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
-        found = [one for part, at in self._parts(voltage) if (one := part.restored(at)) is not None]
+        found = [one for part in self.parts if (one := part.restored(part.load(voltage))) is not None]
         if not found:
             return None
         withheld, left = np.sum(found, axis=0)
         return withheld, left
 
     def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
-        each = (part.gain_on_pressing(position, at, touching, pressing) for part, at in self._parts(voltage))
-        return np.asarray(sum(each))
+        return np.asarray(
+            self._sum(voltage, lambda part, at: part.gain_on_pressing(position, at, touching, pressing))
+        )
 
     def negative_stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        each = (
-            part.negative_stiffness(position, at, touching, pressing) for part, at in self._parts(voltage)
+        return np.asarray(
+            self._sum(voltage, lambda part, at: part.negative_stiffness(position, at, touching, pressing))
         )
-        return np.asarray(sum(each))
 
     def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Entries:
-        found = [part.stiffness(position, at, touching, pressing) for part, at in self._parts(voltage)]
+        found = [
+            part.stiffness(position, part.load(voltage), touching, pressing)
+            for part in self.parts
+            if part.acts(voltage)
+        ]
         return Entries.of(position.size, [one[1:] for one in found])

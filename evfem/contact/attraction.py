@@ -19,7 +19,7 @@ pressed by d lam_n more is pulled by :math:`p'(s)\,s'(p)\,d\lambda_n` more (`gai
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,6 +67,34 @@ class Entries(NamedTuple):
         return flat.reshape(self.size, self.size)
 
 
+#: adhesion, in the place of a voltage: it is always on
+ON = 1.0
+
+
+class NoAttraction:
+    """Nothing attracts: the empty sum of attractions."""
+
+    law = layers = roughness = charging = None
+    direction, parts, rounding = "vertical", (), 0.0
+    has_energy = has_fringes = False
+    no_charges = np.zeros((2, 0))
+
+    def acts(self, voltage: float) -> bool:
+        """Never."""
+        return False
+
+    def forces(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
+        """Nodal forces on the finger (P, dim)."""
+        return np.zeros_like(position)
+
+    def weights(self, position: Floats) -> Floats:
+        """By what its forces (P,), which are 0, are tractions."""
+        return np.ones(len(position))
+
+    def restored(self, voltage: float) -> None:
+        """Nothing is withheld."""
+
+
 @dataclass(frozen=True, eq=False)
 class Attraction:
     """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface`
@@ -83,20 +111,23 @@ class Attraction:
     air_layer: bool = True
     roughness: Any = None
     charging: Charging | None = None
+    #: of its columns in the history
+    name: str = field(default="electrostatic", kw_only=True)
+    #: whether it acts without a voltage; its law then takes the strength `ON` in the place of one
+    always: bool = field(default=False, kw_only=True)
 
     @property
-    def electric(self) -> Attraction | None:
-        """That part of it which is a voltage's: all."""
-        return self
+    def parts(self) -> tuple[Attraction, ...]:
+        """The attractions of which this is the sum."""
+        return (self,)
 
-    @property
-    def adhesive(self) -> Attraction | None:
-        """That part of it which is adhesion: none."""
-        return None
+    def load(self, voltage: float) -> float:
+        """What its law takes as a voltage (V) when that of the display is `voltage`."""
+        return ON if self.always else voltage
 
     def acts(self, voltage: float) -> bool:
         """Whether anything attracts at this voltage: charges may without it."""
-        return voltage != 0.0 or self.charging is not None
+        return voltage != 0.0 or self.always or self.charging is not None
 
     @property
     def no_charges(self) -> Floats:

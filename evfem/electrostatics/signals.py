@@ -234,7 +234,7 @@ class PadState:
     @property
     def unit(self) -> Floats:
         """Attraction (P, dim) of a kV."""
-        return replace(self, attraction=self.attraction.electric).forces(KILOVOLT)
+        return replace(self, attraction=self.attraction.parts[0]).forces(KILOVOLT)
 
     @property
     def slope(self) -> Floats:

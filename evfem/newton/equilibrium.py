@@ -21,21 +21,21 @@ state; nothing is committed before acceptance.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
-from evfem.contact.attraction import TOUCHING, Attraction
+from evfem.contact.attraction import TOUCHING, Attraction, NoAttraction
 from evfem.contact.charging import Charged
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
-from evfem.newton.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, State, StepFailed
+from evfem.newton.state import NO_AGE, Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
-from evfem.surface.adhesion import ON
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
@@ -47,9 +47,9 @@ class Equilibrium:
     """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
 
     def __init__(
-        self, body: FactorisedBody, interface: Interface, attraction: Attraction | None, limits: Limits
+        self, body: FactorisedBody, interface: Interface, attraction: Any, limits: Limits
     ) -> None:
-        self.interface, self.attraction, self._size = interface, attraction, body.size
+        self.interface, self.attraction, self._size = interface, attraction or NoAttraction(), body.size
         self.body, self.record = body, body.record
         self.tolerance, self.strategy = limits.tolerance, limits.strategy
         self._iterate: tuple[State, Balance] | None = None
@@ -69,7 +69,7 @@ class Equilibrium:
             velocity=still,
             last_increment=still,
             age=NO_AGE if self.interface.law is None else np.zeros(nodes),
-            charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
+            charges=self.attraction.no_charges,
             inner=self.body.body.at_rest,
             **self.interface.bed.memory(nodes, dim),
             rates=np.zeros_like(self.body.body.rates(still)),
@@ -79,21 +79,16 @@ class Equilibrium:
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
-        if self.attraction is None:
-            return np.zeros_like(state.contact_force)
         found = PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
         return self.interface.tilted(state, found)
 
-    def adhesion_at(self, state: State, strength: float = ON) -> Floats:
-        """Adhesion alone on the pad nodes (P, dim) in `state`, 0 without any."""
-        adhesive = None if self.attraction is None else self.attraction.adhesive
-        if adhesive is None:
-            return np.zeros_like(state.contact_force)
-        return PadState.of(adhesive, self.interface, state, state.touching).forces(strength)
+    def pull_of(self, part: Attraction, state: State) -> Floats:
+        """One part of the attraction alone on the pad nodes (P, dim) in `state`, above a rigid surface."""
+        pad = PadState.of(part, self.interface, state, state.touching)
+        return pad.forces(part.load(state.voltage))
 
     def charged(self, state: State, *, kept: bool = True) -> Charged:
         """The electric state in `state`: with its charges, or with those that flow up to the step's end."""
-        assert self.attraction is not None
         position, pressing = self.interface.resting(state), state.contact_force[:, 0]
         return self.attraction.charged(position, state.voltage, pressing, state.charges if kept else None)
 

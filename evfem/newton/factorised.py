@@ -23,7 +23,7 @@ import numpy as np
 
 from evfem.common import constants
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import Attraction
+from evfem.contact.attraction import Attraction, NoAttraction
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
@@ -62,11 +62,12 @@ class FactorisedBody:
     """The finger's finite elements: contact is solved on their condensed tangent."""
 
     def __init__(
-        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
+        self, body: Body, interface: Interface, attraction: Any, limits: Limits
     ) -> None:
-        self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
+        self.body, self.interface, self.limits = body, interface, limits
+        self.attraction: Attraction | NoAttraction = attraction or NoAttraction()
         self.size, self.pad = body.space.size, interface.pad
-        self.linearisation = Linearisation(body, interface, attraction, limits)
+        self.linearisation = Linearisation(body, interface, self.attraction, limits)
         self.pressure, self.record = Pressure(body.tissue, self.linearisation), self.linearisation.record
         longest = constants.LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self.travel = Travel(interface, longest)
@@ -148,7 +149,7 @@ class FactorisedBody:
         epsilon = float(np.finfo(float).eps)
         travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
         rounding = epsilon * self.linearisation.stiffest * travel
-        if self.attraction is None or not self.attraction.rounding:
+        if not self.attraction.rounding:
             return rounding
         return max(rounding, self.attraction.rounding * float(np.abs(state.attraction).max()))
 

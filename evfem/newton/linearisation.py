@@ -62,7 +62,7 @@ class Linearisation:
     """Candidates, factorisation and condensed tangent of a body under an attraction."""
 
     def __init__(
-        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
+        self, body: Body, interface: Interface, attraction: Any, limits: Limits
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.pad = interface.pad
@@ -157,8 +157,7 @@ class Linearisation:
 
     def _acting(self, state: State) -> Attraction | None:
         """The attraction if it follows the gap at `state`, else None."""
-        acts = self.attraction is not None and not self.frozen and self.attraction.acts(state.voltage)
-        return self.attraction if acts else None
+        return self.attraction if not self.frozen and self.attraction.acts(state.voltage) else None
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""

@@ -295,7 +295,7 @@ class Contact:
         felt[:, 0] = 1.0
         felt[:, 1:] = self.by_normal[:, None] * self.known.shear_direction
         attraction, state = self.model.attraction, self.state
-        if attraction is None or not attraction.acts(state.voltage):
+        if not attraction.acts(state.voltage):
             return felt
         at = (self.interface.resting(state), state.voltage, state.touching, state.contact_force[:, 0])
         gain, surface = attraction.gain_on_pressing(*at)[self.nodes], self.known.surface
@@ -308,7 +308,7 @@ class Contact:
     def _attraction(self) -> Any:
         attraction: Any = self.model.attraction
         state, u = self.state, self.unknowns.ravel()
-        if attraction is None or not attraction.acts(state.voltage):
+        if not attraction.acts(state.voltage):
             return self._matrix(np.zeros(0), u[:0], u[:0])
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         if attraction.has_fringes:

@@ -407,6 +407,6 @@ def _shifts(one: Beside, model: Model) -> tuple[float, float]:
     if own.shape != points.shape:
         return 0.0, 0.0
     moves = np.abs(own - points).max(axis=1)
-    plain = model.attraction is None and model.surface.is_flat
+    plain = not model.attraction.parts and model.surface.is_flat
     below = 0.0 if plain else float(moves[model.pad.nodes].max()) / SHIFT
     return float(moves.max()) / (INSIDE * model.equilibrium.interface.length), below

@@ -48,7 +48,7 @@ class Equations:
         interface.begin(old, target.duration)
         interface.jumps.place = pins
         model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
-        if attraction is not None and attraction.charging is not None:
+        if attraction.charging is not None:
             pressing = old.contact_force[:, 0]
             charged = attraction.charged(interface.resting(old), old.voltage, pressing, old.charges)
             attraction.charging.begin(charged, target.duration)
@@ -75,7 +75,7 @@ class Equations:
         state, attraction = self._attracted(state), self.model.attraction
         state = self.interface.aged(self.old, self.model.equilibrium.body.accepted(self.old, state))
         state = self.target.drive.settled(state)
-        if attraction is None or attraction.charging is None:
+        if attraction.charging is None:
             return state
         resting, pressing = self.interface.resting(state), state.contact_force[:, 0]
         return replace(state, charges=attraction.charged(resting, state.voltage, pressing).charges)

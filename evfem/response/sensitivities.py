@@ -118,7 +118,7 @@ class _Differentiated:
         model = self.run.model
         gap, attraction = model.equilibrium.interface.surface_at(state).gap, model.attraction
         found, core = NEAR * np.abs(gap), model.closing.core
-        if attraction is not None and state.voltage != 0.0:
+        if attraction.law is not None and state.voltage != 0.0:
             apart = np.maximum(gap, 0.0)
             pull = np.asarray(attraction.law.traction(apart, state.voltage, attraction.layers))
             rate = np.asarray(traction_derivative(attraction.law, apart, state.voltage, attraction.layers))

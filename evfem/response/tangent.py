@@ -123,7 +123,7 @@ class Tangent:
             for b in range(state.bone.size - 1):
                 found.append((moves[:, axis], moves[:, 2 * b], -turned[:, row, b]))
         attraction = self.equations.model.attraction
-        if attraction is None or not attraction.acts(state.voltage):
+        if not attraction.acts(state.voltage):
             return found
         resting, touched = self.equations.interface.resting(state), self.equations.old.touching
         seen = (resting, state.voltage, touched, force[:, 0])

@@ -29,6 +29,7 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.contact.attraction import Attraction
 from evfem.newton.control import Target
 from evfem.simulation.works import SubstepWork
 from evfem.surface.pad import surface_state
@@ -62,37 +63,31 @@ def _carried(part: SubstepWork, target: Target) -> Floats:
     """Displacements (P, dim) of pad nodes with a bone that is not loaded; 0 where they keep touching."""
     travel = part.new.bone - part.old.bone
     travel[target.free] = 0.0
-    attraction = part.model.attraction
-    sticks = attraction is not None and attraction.adhesive is not None  # what adheres is not carried off
+    sticks = any(one.always for one in part.model.attraction.parts)  # what adheres is not carried off
     return np.where((part.old.touching & (part.new.touching | sticks))[:, None], 0.0, travel)
 
 
 def _pulled(part: SubstepWork, carried: Floats) -> Floats:
     """Work of the attraction up to `PLACES` under the end's voltage or charges, after `carried`."""
     attraction, old, new = part.model.attraction, part.old, part.new
-    if attraction is None or not attraction.acts(new.voltage):
+    if not attraction.acts(new.voltage):
         return np.zeros_like(PLACES)
     along = part.way - carried
     begin = part.model.equilibrium.interface.resting(old) + carried
     begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
     with part.charges_held():
-        exact = attraction.adhesive is not None and part.model.surface.is_flat
-        one = attraction.electric if exact else attraction
-        power = np.zeros_like(FINE)
-        if one is not None:
-            power = part.pulls(along, FINE, (new.voltage, new.voltage), begin, one)
+        flat, power = part.model.surface.is_flat, np.zeros_like(FINE)
+        for one in (each for each in attraction.parts if not (each.always and flat)):
+            load = one.load(new.voltage)
+            power = power + part.pulls(along, FINE, (load, load), begin, one)
     work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(FINE)))
-    if exact:
-        work = work + _adhered(part, begin)
+    work = work + sum(_adhered(part, begin, one) for one in attraction.parts if one.always and flat)
     fringes = float(np.sum(new.attraction * along)) - float(power[-1]) if attraction.has_fringes else 0.0
     return np.interp(PLACES, FINE, work) + fringes * PLACES
 
 
-def _adhered(part: SubstepWork, begin: Floats) -> Floats:
+def _adhered(part: SubstepWork, begin: Floats, adhesive: Attraction) -> Floats:
     """Work of adhesion up to `FINE` above a flat surface, by its potential: its reach may be short."""
-    assert part.model.attraction is not None
-    adhesive = part.model.attraction.adhesive
-    assert adhesive is not None
     end = part.model.equilibrium.interface.resting(part.new)
     ends = [surface_state(part.model.surface, place).gap for place in (begin, end)]
     gaps = np.maximum(np.outer(1.0 - FINE, ends[0]) + np.outer(FINE, ends[1]), 0.0)

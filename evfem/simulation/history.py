@@ -151,6 +151,8 @@ ABOUT: Mapping[str, Mapping[str, Any]] = {**{spec.name: spec.metadata for spec i
 UNITS, WHOLE_UNITS, MEANINGS = (
     {name: str(ABOUT[name][told]) for name in COLUMNS} for told in ("unit", "whole", "meaning")
 )
+#: attractions that have columns of their own
+PULLS = ("electrostatic", "adhesive")
 #: columns that a finger in three dimensions leaves empty
 WIDTHS = tuple(name for name in COLUMNS if WHOLE_UNITS[name] == "mm2")
 SPATIAL_UNITS: Mapping[str, str] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from operator import or_
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,10 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.newton.state import State
-from evfem.simulation.history import SUMS, WIDTHS
+from evfem.simulation.history import PULLS, SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import Books, SubstepWork, source_of
-from evfem.surface.adhesion import ON
 from evfem.surface.pad import Pad, reach, surface_state
 
 
@@ -58,7 +58,9 @@ class Ledger:
         """Remember the pull at which a finger that adhesion holds comes off: that of the last equilibrium."""
         if self.model.scene.adhesion is None:
             return
-        holds = -float(self.model.equilibrium.adhesion_at(new)[:, 1].sum())
+        equilibrium = self.model.equilibrium
+        always = [part for part in self.model.attraction.parts if part.always]
+        holds = -float(sum(equilibrium.pull_of(part, new)[:, 1].sum() for part in always))
         if not new.touching.any() and self.pull > 0.0 and holds < LEFT * self.pull:
             self.let_go, self.pull = self.pull, 0.0
         elif self.model.body.drag_rate == 0.0:
@@ -80,9 +82,8 @@ class Ledger:
             self.came_off, self.let_go = np.vstack([self.came_off, [step, self.let_go]]), 0.0
         position = model.equilibrium.interface.places(state)
         contact = model.equilibrium.interface.contact_forces(state).sum(axis=0)
-        attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
-        adhesion, kept = self._adhesion(state, withheld)
+        pulls = self._pulls(state, withheld)
         real, extent = _extent(model, state, position, contact)
         source = source_of(model)
         pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
@@ -98,10 +99,8 @@ class Ledger:
             "applied_tangential_force": float(state.reaction[along] @ forward),
             "normal_force": float(contact[1] + withheld.sum()),
             "tangential_force": float(0.0 - contact[along] @ forward),
-            "electrostatic_force": float((withheld - kept).sum() - attraction[1] + adhesion[1]),
-            "adhesive_force": float(kept.sum() - adhesion[1]),
-            **_components("electrostatic_force", attraction - adhesion),
-            **_components("adhesive_force", adhesion),
+            **{f"{name}_force": float(kept - pull[1]) for name, (pull, kept) in pulls.items()},
+            **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
             "surface_sink": max(0.0, float(state.given[:, 1].max(initial=0.0))),
@@ -113,18 +112,22 @@ class Ledger:
             "field_energy": 0.0 if source is None else source.field_energy(model.equilibrium.charged(state)),
         }
 
-    def _adhesion(self, state: State, withheld: Floats) -> tuple[Floats, Floats]:
-        """Adhesion on the whole pad (dim,), and its part (P,) of what cores withhold."""
-        model = self.model
-        if model.attraction is None or (adhesive := model.attraction.adhesive) is None:
-            return np.zeros(state.bone.size), np.zeros_like(withheld)
-        electric = model.attraction.electric
-        found = state.attraction  # where nothing else attracts: staggered rounds end within the tolerance
-        if electric is not None and electric.acts(state.voltage):
-            found = model.equilibrium.interface.tilted(state, model.equilibrium.adhesion_at(state))
-        own, both = adhesive.restored(ON), model.attraction.restored(state.voltage)
-        share = 0.0 if own is None or both is None else own[0] / np.where(both[0] > 0.0, both[0], np.inf)
-        return found.sum(axis=0), np.asarray(share * withheld)
+    def _pulls(self, state: State, withheld: Floats) -> dict[str, tuple[Floats, float]]:
+        """Of every attraction by name: its force on the whole pad (dim,), and its part of what cores withhold."""
+        model, none = self.model, np.zeros(state.bone.size)
+        found: dict[str, tuple[Floats, float]] = {name: (none, 0.0) for name in PULLS}
+        rest, kept = state.attraction, withheld
+        acting = [part for part in model.attraction.parts if part.acts(state.voltage)]
+        both = model.attraction.restored(state.voltage)
+        for part in acting[:0:-1]:
+            own, left = model.equilibrium.pull_of(part, state), part.restored(part.load(state.voltage))
+            share = 0.0 if left is None or both is None else left[0] / np.where(both[0] > 0.0, both[0], np.inf)
+            pull = model.equilibrium.interface.tilted(state, own)
+            found[part.name] = pull.sum(axis=0), float(np.sum(share * withheld))
+            rest, kept = rest - pull, kept - share * withheld
+        for part in acting[:1]:  # the rest is its own: staggered rounds end within the tolerance
+            found[part.name] = rest.sum(axis=0), float(kept.sum())
+        return found
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
         """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""
@@ -176,7 +179,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
     position, withheld = interface.places(state), interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
-    pulled = share if model.attraction is None else _positive(model.attraction.weights(position))
+    pulled = _positive(model.attraction.weights(position))
 
     def on_pad(values: Any, off: float) -> Any:
         field = np.full(size, off)

@@ -10,8 +10,8 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.common.arrays import Floats
-from evfem.contact.adhesive import WithAdhesion
-from evfem.contact.attraction import Attraction
+from evfem.contact.adhesive import sum_of
+from evfem.contact.attraction import Attraction, NoAttraction
 from evfem.contact.charging import Charging
 from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.roughness import roughness_of
@@ -49,7 +49,7 @@ class Model:
     body: Body
     pad: Pad | Skin
     surface: Any
-    attraction: Attraction | None
+    attraction: Attraction | NoAttraction
     equilibrium: Equilibrium
     first_gap: float
     closing: Closing
@@ -97,9 +97,10 @@ def make_model(scene: Scene) -> Model:
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     closing = needed.closing
-    attraction = make_attraction(closing, pad, surface) if needed.has("electricity") else None
+    parts = [make_attraction(closing, pad, surface)] if needed.has("electricity") else []
     if scene.adhesion is not None:
-        attraction = with_adhesion(closing, pad, surface, attraction)
+        parts.append(make_adhesion(closing, pad, surface))
+    attraction = sum_of(parts)
     solver, laws = scene.solver, scene.finger.materials
     terms = [
         make_term(space, term.form, term.on.name, isinstance(term.on, Boundary), laws.get(term.on.name))
@@ -137,7 +138,7 @@ def linearised(model: Model, state: State) -> Model:
 
 
 def make_interface(
-    closing: Closing, pad: Pad | Skin, surface: Any, attraction: Attraction | None
+    closing: Closing, pad: Pad | Skin, surface: Any, attraction: Attraction | NoAttraction
 ) -> Interface:
     """The contact interface: exact or penalty."""
     scene, points, solver = closing.scene, closing.mesh.points, closing.scene.solver
@@ -146,10 +147,10 @@ def make_interface(
         interface = PenaltyInterface(pad, points, surface, solver.tolerance)
         normal = float(solver.penalty_normal or 0.0)
         interface.penalties = (normal, solver.penalty_tangential or normal)
-    if attraction is not None:
+    if attraction.parts:
         interface.bed.reach = np.inf
     cored = closing.core is not None or scene.adhesion is not None
-    if cored and attraction is not None:
+    if cored:
         interface.restored = attraction.restored
     if cored or not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
@@ -198,11 +199,11 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
     return DrivenFieldAttraction(*full, harmonics=harmonics)
 
 
-def with_adhesion(closing: Closing, pad: Any, surface: Any, attraction: Attraction | None) -> WithAdhesion:
-    """The attraction of the voltage, if there is one, and the scene's adhesion as the mesh resolves it."""
+def make_adhesion(closing: Closing, pad: Any, surface: Any) -> Attraction:
+    """The scene's adhesion as the mesh resolves it."""
     scene, rough = closing.scene, roughness_of(closing.scene.roughness_gap)
-    law = closing.adhesion
-    return WithAdhesion.of(attraction, Attraction(law, None, pad, surface, scene.direction, roughness=rough))
+    common = (pad, surface, scene.direction)
+    return Attraction(closing.adhesion, None, *common, roughness=rough, name="adhesive", always=True)
 
 
 def _check_quadratic(scene: Scene) -> None:

@@ -93,9 +93,8 @@ from evfem.contact.charging import Charging
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
-from evfem.simulation.history import SUMS
+from evfem.simulation.history import PULLS, SUMS
 from evfem.simulation.model import Model
-from evfem.surface.adhesion import ON
 
 #: share of the work of the change of internal forces or shear that no small smooth part sets free
 SNAP = 0.5
@@ -127,8 +126,7 @@ class Books:
 
 def source_of(model: Model) -> Charging | None:
     """The charges whose source's work is known: of a voltage resolved in time and Strong and Troxel's law."""
-    known = model.attraction is not None and getattr(model.attraction.law, "of_a_field", False)
-    return model.attraction.charging if model.attraction is not None and known else None
+    return model.attraction.charging if getattr(model.attraction.law, "of_a_field", False) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +153,12 @@ class SubstepWork:
         moved, turned = new.u - old.u, self._turned()
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone) + turned
         given -= _mean_work(begin.given, end.given, moved)
-        (electrostatic, adhesive), friction = self.pulled(), self.friction()
+        pulled, friction = self.pulled(), self.friction()
+        attracted = [pulled.get(name, 0.0) for name in PULLS]
         driven = float(sum(term.work(old, new) for term in self.model.terms))
         viscous = float(sum(term.dissipation(old, new, self._seconds) for term in self.model.terms))
         given += driven
-        lost = turned + electrostatic + adhesive - friction + driven
+        lost = turned + sum(attracted) - friction + driven
         lost += _mean_work(begin.forces, end.forces, moved) - (end.energy - begin.energy) - viscous
         lost -= _mean_work(*self._on_surface, moved[self.model.pad.nodes])
         lost -= (drag := body.drag_dissipation(new.u))
@@ -168,7 +167,7 @@ class SubstepWork:
         source = (0.0, 0.0, 0.0)
         if (charging := source_of(self.model)) is not None:
             source = (*self._flow(charging), self._stretching(charging))
-        added = (given, electrostatic, adhesive, friction, viscous, *snapped, *source)
+        added = (given, *attracted, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
 
     def _turned(self) -> float:
@@ -181,23 +180,22 @@ class SubstepWork:
         begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > 0.0))
         return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
 
-    def pulled(self) -> tuple[float, float]:
-        """Works of the attraction by a voltage W_e and of adhesion, N mm per mm of depth."""
+    def pulled(self) -> dict[str, float]:
+        """Works of the attractions by name, N mm per mm of depth."""
         attraction, states = self.model.attraction, (self.old, self.new)
         equilibrium = self.model.equilibrium
         untilted = equilibrium.interface.bed.untilted
-        before, after = (untilted(state, state.attraction) for state in states)
-        if attraction is None:
-            return 0.0, 0.0
-        voltages = (self.old.voltage, self.new.voltage)
-        if (adhesive := attraction.adhesive) is None:
-            return self._work_of(attraction, before, after, voltages), 0.0
-        on = (0.0 if self.first else ON, ON)
-        held, holds = (equilibrium.adhesion_at(*each) for each in zip(states, on, strict=True))
-        work = self._work_of(adhesive, held, holds, on)
-        if attraction.electric is None:
-            return 0.0, work
-        return self._work_of(attraction.electric, before - held, after - holds, voltages), work
+        rest, found = [untilted(state, state.attraction) for state in states], {}
+        for part in attraction.parts[::-1]:
+            loads = [part.load(state.voltage) for state in states]
+            own = rest
+            if part is not attraction.parts[0]:
+                own = [equilibrium.pull_of(part, state) for state in states]
+            if self.first and part.always:  # raised within the first part
+                own, loads = [np.zeros_like(own[0]), own[1]], [0.0, loads[1]]
+            found[part.name] = self._work_of(part, *own, (loads[0], loads[1]))
+            rest = [all_of - one for all_of, one in zip(rest, own, strict=True)]
+        return found
 
     def _work_of(
         self, attraction: Attraction, before: Floats, after: Floats, voltages: tuple[float, float]
@@ -244,8 +242,7 @@ class SubstepWork:
     @contextmanager
     def charges_held(self) -> Iterator[None]:
         """Within, the charges are those of the end."""
-        attraction = self.model.attraction
-        if attraction is None or (charging := attraction.charging) is None:
+        if (charging := self.model.attraction.charging) is None:
             yield
             return
         begin, seconds = charging.old, charging.seconds
@@ -263,8 +260,8 @@ class SubstepWork:
 
     def _stretching(self, charging: Charging) -> float:
         """Work of the field on the tributary lengths on the way of `_work_of_charged`."""
-        attraction, interface = self.model.attraction, self.model.equilibrium.interface
-        assert attraction is not None
+        attraction: Any = self.model.attraction
+        interface = self.model.equilibrium.interface
         begin, end = (interface.resting(state) for state in (self.old, self.new))
         lengths = attraction.pad.tributary
         grown = lengths(end) - lengths(begin)
@@ -289,8 +286,8 @@ class SubstepWork:
         the parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
         growing evenly; of what has fringes that of the columns.
         """
-        attraction, old, new = attraction or self.model.attraction, self.old, self.new
-        assert attraction is not None
+        old, new = self.old, self.new
+        attraction = attraction or self.model.attraction
         begin = self.model.equilibrium.interface.resting(old) if begin is None else begin
         end = self.model.equilibrium.interface.resting(new)
         volts = np.sqrt((1.0 - ways) * voltages[0] ** 2 + ways * voltages[1] ** 2)
@@ -396,10 +393,9 @@ class SubstepWork:
     def _pulled(self, begin: State) -> float:
         """Work of what attraction and friction grow by from `begin` to the end, under the end loads."""
         model, old, new = self.model, self.old, self.new
-        along, work = (new.u - begin.u)[model.pad.nodes], 0.0
-        if model.attraction is not None:
-            at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (begin, new)]
-            work += float(np.sum((at[1] - at[0]) * along))
+        along = (new.u - begin.u)[model.pad.nodes]
+        at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (begin, new)]
+        work = float(np.sum((at[1] - at[0]) * along))
         less = self._coefficient(model.equilibrium.interface.on_display(begin))
         less = less - self._coefficient(self.places[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))

@@ -195,8 +195,7 @@ class Stepper:
             self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
 
     def _relaxation(self, body: Body) -> Relaxation:
-        attraction = self.equilibrium.attraction
-        return Relaxation(body, self.solve, attraction is not None and attraction.charging is not None)
+        return Relaxation(body, self.solve, self.equilibrium.attraction.charging is not None)
 
     def _released(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
         """Equilibrium that the body snaps to from `state`, or None; `Folded` or `LiftedOff` if impossible."""
@@ -268,14 +267,14 @@ class Stepper:
     def _climbs(self, target: Target, old: State, new: State) -> bool:
         """Whether a barrier lies between two states; none without attraction, or with a sought voltage."""
         attraction = self.equilibrium.attraction
-        if self.rise is None or attraction is None or not attraction.acts(new.voltage):
+        if self.rise is None or not attraction.acts(new.voltage):
             return False
         return not (target.voltage.free or target.voltage.follows) and self.rise(old, new, target) > CLIMB
 
     def _found(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium with the coupling asked for; where charges move, they follow."""
         attraction = self.equilibrium.attraction
-        if attraction is None or attraction.charging is None:
+        if attraction.charging is None:
             return self._coupled(state, target, start)
         attraction.charging.begin(self.equilibrium.charged(state), target.duration)
         new = self._coupled(state, target, start)
@@ -285,7 +284,7 @@ class Stepper:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""
         equilibrium = self.equilibrium
         at_once = self.coupling == "monolithic" or (self.coupling == "staggered" and self._dragged)
-        if at_once or equilibrium.attraction is None:
+        if at_once or not equilibrium.attraction.parts:
             return equilibrium.step(state, target, start=start)
         if self.coupling == "staggered_once":
             held, frozen = self._frozen(state, state, target)

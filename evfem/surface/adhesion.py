@@ -42,7 +42,7 @@ EDGE = 0.1
 LOOKED, HALVINGS, BEYOND = 4000, 80, 1e3
 #: the shortest gap (mm) that is looked at
 NEAREST = 1e-7
-#: adhesion in the place of a voltage that is always on
+#: the strength that a law takes in the place of a voltage
 ON = 1.0
 ADHESION = "Dugdale, Capillary, or an object with traction(gap) and potential(gap); None for none"
 

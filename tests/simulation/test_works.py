@@ -173,7 +173,7 @@ def test_the_attraction_of_a_plate_that_lands_or_lifts_works_what_its_potential_
     layers = Layers.of(ev.Layer(0.38, 1650.0), insulator)
     far, near = (StrongTroxel().potential(g, voltage, layers) for g in (gap, 0.0))
     expected = 4.0 * (far - near) * (1.0 if way == "down" else -1.0)
-    assert SubstepWork(model, *states).pulled()[0] == pytest.approx(expected, rel=1e-4)
+    assert SubstepWork(model, *states).pulled()["electrostatic"] == pytest.approx(expected, rel=1e-4)
 
 
 def test_what_the_way_of_the_loads_loses_in_a_release_is_no_energy_set_free():

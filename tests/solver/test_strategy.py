@@ -9,6 +9,7 @@ from tools.builders import finger
 from tools.meshes import block
 from tools.refusals import refuses
 
+from evfem.contact.attraction import NoAttraction
 from evfem.newton.state import Record, StepFailed
 from evfem.newton.strategy import Strategy
 from evfem.scene.motion import Press, Slide
@@ -38,7 +39,7 @@ class Steps:
     strategy: Strategy
     longest: float
     takes: int = 5
-    attraction = None
+    attraction = NoAttraction()
     record: Record = field(default_factory=Record)
     ways: list = field(default_factory=list)
 
@@ -73,6 +74,13 @@ class Timed:
     duration: float
 
 
+class Lasts:
+    """Dynamics that take time."""
+
+    def still(self, duration):
+        return duration == 0.0
+
+
 class Lasting(Steps):
     """The same for targets that say how long they take; nothing counts but where they are."""
 
@@ -86,7 +94,7 @@ def test_a_step_that_takes_time_has_parts_down_to_the_square_of_the_smallest(dur
 
     def followed(longest):
         steps = Lasting(Strategy(smallest_part=0.25, growth=1.0, relaxation=False), longest)
-        stepper = Stepper(steps, body=SimpleNamespace(dynamics="viscous", drag_rate=0.0))
+        stepper = Stepper(steps, body=SimpleNamespace(dynamics=Lasts(), drag_rate=0.0))
         return stepper.follow(0.0, lambda _, share: Timed(share, duration), Unbooked())[1]
 
     assert followed(smallest) == round(1 / smallest)
@@ -215,7 +223,7 @@ def test_a_step_begins_ahead_on_the_last_ones_way():
 class Unsettling(Steps):
     """Equilibria that are found all at once alone: rounds fail, or go to and fro."""
 
-    attraction = SimpleNamespace(charging=None)
+    attraction = SimpleNamespace(charging=None, parts=(None,))
     tolerance = 1e-8
 
     def __init__(self, fails):
