@@ -18,7 +18,7 @@ cut-off frequency of the friction by 13.8 Hz. In the plane all three are per mm 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -65,6 +65,11 @@ class Hand:
         above("depth", depth, 0.0, "a depth in mm above 0")
         stiffness = STIFFER * speed / depth
         return cls(stiffness, stiffness / (2.0 * np.pi * FASTER * speed), HEAVIER * speed / depth)
+
+    @property
+    def control(self) -> HandControl:
+        """What it is in a step."""
+        return HandControl(self)
 
     @property
     def timed(self) -> bool:
@@ -168,7 +173,7 @@ RIGID = Drive()
 
 def drive_of(hand: Hand | None) -> Drive:
     """The drive of a scene: a hand, or rigid."""
-    return RIGID if hand is None else HandControl(hand)
+    return RIGID if hand is None else hand.control
 
 
 @dataclass(frozen=True)
@@ -222,7 +227,10 @@ class HandControl(Drive):
         kept = old.memory["hand"]
         before, (along, moved, faster) = (kept[0], old.bone[::2], kept[1]), kept[3:]
         difference = Difference.over(duration, old.seconds)
-        return HandControl(self.hand, drive, duration, before, (along, moved, faster), difference)
+        rates = along, moved, faster
+        return replace(
+            self, drive=drive, duration=duration, before=before, rates=rates, difference=difference
+        )
 
     def _rate(self, number: int, end: Any) -> Any:
         """Rate at the end of the step, (d,), of one of the three that were `before`."""
