@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from evfem.studies.campaign import study
 from tools.commands import called, contents, printed, process_of, run_process
 from tools.fakes import SQUARE_SCENE
 from tools.meshes import square_mesh
@@ -24,6 +23,7 @@ from evfem import cli, studies
 from evfem.mesh import file as meshfile
 from evfem.runfolder import RunFolder
 from evfem.simulation.result import COLUMNS
+from evfem.studies.campaign import study
 from evfem.templates import TEMPLATES
 
 pytestmark = pytest.mark.solver

@@ -142,7 +142,5 @@ DRAG_STEPS = 400
 #: a step that failed where what takes stability away grows so fast, relative to what holds it, has no
 #: equilibrium near; the second, where the body gave way in its iterations [snaps]
 CRITICAL, SOFTENED = 0.9, 0.5
-#: rounds of the staggered coupling
-STAGGERED_LIMIT = 60
 #: so many of the largest out-of-balance forces are named in a failure
 NAMED = 3

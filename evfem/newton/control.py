@@ -139,10 +139,6 @@ class VoltageControl:
         """Relative residual of an equation that is no balance of forces."""
         return 0.0
 
-    def held(self, pad: PadState) -> float:
-        """The voltage (V) if the pad stays where it is."""
-        return self.voltage
-
     def after(self, voltage: float, change: float) -> float:
         """The voltage (V), its sign kept, after a change of its unknown, here its square in kV^2."""
         squared = (voltage / KILOVOLT) ** 2 + change

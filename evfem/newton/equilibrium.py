@@ -5,7 +5,7 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
 
     state <- the body's first guess for the target
     repeat
-        f <- attraction at the iterate (or frozen)
+        f <- attraction at the iterate
         R, residual <- balance of the body, with the shares of the controls (`evfem.newton.control`)
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
@@ -27,11 +27,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
-from evfem.contact.attraction import TOUCHING, Attraction, NoAttraction
+from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.charging import Charged
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.electrostatics.signals import PadState
-from evfem.newton.control import Force, GivenVoltage, Indentation, Target, Unsupported, sticks
+from evfem.newton.control import Force, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
 from evfem.newton.state import NO_AGE, Balance, Folded, Limits, State, StepFailed
@@ -46,10 +46,8 @@ FOLDED = "there is no equilibrium near here without the outline folding over its
 class Equilibrium:
     """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
 
-    def __init__(
-        self, body: FactorisedBody, interface: Interface, attraction: Any, limits: Limits
-    ) -> None:
-        self.interface, self.attraction, self._size = interface, attraction or NoAttraction(), body.size
+    def __init__(self, body: FactorisedBody, interface: Interface, attraction: Any, limits: Limits) -> None:
+        self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record
         self.tolerance, self.strategy = limits.tolerance, limits.strategy
         self._iterate: tuple[State, Balance] | None = None
@@ -92,41 +90,33 @@ class Equilibrium:
         position, pressing = self.interface.resting(state), state.contact_force[:, 0]
         return self.attraction.charged(position, state.voltage, pressing, state.charges if kept else None)
 
-    def held(self, old: State, state: State, target: Target) -> GivenVoltage:
-        """The voltage that the target's control takes while the pad stays in `state`."""
-        pad = PadState.of(self.attraction, self.interface, state, old.touching)
-        return GivenVoltage(target.voltage.held(pad))
-
-    def step(
-        self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
-    ) -> State:
-        """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead
-        of the current one if given; iterations begin at `start` (default `old`). A loose finger that
-        is touched gives way. Raises `StepFailed`.
+    def step(self, old: State, target: Target, start: State | None = None) -> State:
+        """Equilibrium at `target`, friction counted from `old`; iterations begin at `start` (default `old`).
+        A loose finger that is touched gives way. Raises `StepFailed`.
         """
         if not isinstance(target.height, Unsupported):
-            return self._followed(old, target, frozen, start)
+            return self._followed(old, target, start)
         held = replace(target, height=Indentation(float(old.bone[1])))
-        found = self._followed(old, held, frozen, start)
-        return self._given_way(old, held, frozen, found) if found.touching.any() else found
+        found = self._followed(old, held, start)
+        return self._given_way(old, held, found) if found.touching.any() else found
 
-    def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
+    def _given_way(self, old: State, target: Target, touched: State) -> State:
         """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`: of all
         heights above, which are equilibria too, the one where its lowest node just does not touch.
         """
-        lifted = self._followed(old, replace(target, height=Force(0.0)), frozen, touched)
+        lifted = self._followed(old, replace(target, height=Force(0.0)), touched)
         gap = float(self.interface.surface_at(lifted).gap.min())
         if gap <= TOUCHING:
             return lifted
         height = Indentation(float(lifted.bone[1]) - gap + TOUCHING)
-        lowered = self._followed(old, replace(target, height=height), frozen, lifted)
+        lowered = self._followed(old, replace(target, height=height), lifted)
         return lowered if abs(lowered.reaction[1]) < SMALLEST_FORCE else lifted
 
-    def _followed(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
+    def _followed(self, old: State, target: Target, start: State | None) -> State:
         """The equilibrium at `target`, with the voltage as its control wants it."""
         found = None
         try:
-            found = self._try(old, target, frozen, start)
+            found = self._try(old, target, start)
         except StepFailed:
             if target.voltage.fallback(old, None) is None:
                 raise
@@ -134,14 +124,14 @@ class Equilibrium:
         if found is not None and other is None:
             return found
         assert other is not None
-        held = self._try(old, replace(target, voltage=other), frozen, start)
+        held = self._try(old, replace(target, voltage=other), start)
         if not sticks(held):
             raise StepFailed("the prescribed friction force was not found", self.record.residuals)
         return held
 
-    def _try(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
+    def _try(self, old: State, target: Target, start: State | None) -> State:
         try:
-            return self._find(old, target, frozen, start or old)
+            return self._find(old, target, start or old)
         except (ContactNotSolved, StepFailed) as error:
             self.body.discard()
             reason = error.reason if isinstance(error, StepFailed) else f"contact: {error}"
@@ -151,16 +141,16 @@ class Equilibrium:
             failed.findings = "" if self._iterate is None else self.body.findings(*self._iterate)
             raise failed from error
 
-    def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
+    def _find(self, old: State, target: Target, start: State) -> State:
         """The iterations at the head of this file."""
         target = target.begun(old)
         self.interface.begin(old, target.duration)
         target.voltage.begin(old)
-        state = self.body.begin(old, target, frozen is not None, start)
+        state = self.body.begin(old, target, start)
         residuals: list[float] = []
         self.record.residuals, changed = residuals, 0
         for iteration in range(self.strategy.iterations):
-            attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
+            attraction = self.attraction_at(old, state, state.voltage)
             state, balance = self.body.balance(state, attraction, target)
             self._iterate = state, balance
             reached = target.reached(state.bone)

@@ -62,10 +62,10 @@ class FactorisedBody:
     """The finger's finite elements: contact is solved on their condensed tangent."""
 
     def __init__(
-        self, body: Body, interface: Interface, attraction: Any, limits: Limits
+        self, body: Body, interface: Interface, attraction: Attraction | NoAttraction, limits: Limits
     ) -> None:
         self.body, self.interface, self.limits = body, interface, limits
-        self.attraction: Attraction | NoAttraction = attraction or NoAttraction()
+        self.attraction = attraction
         self.size, self.pad = body.space.size, interface.pad
         self.linearisation = Linearisation(body, interface, self.attraction, limits)
         self.pressure, self.record = Pressure(body.tissue, self.linearisation), self.linearisation.record
@@ -76,9 +76,9 @@ class FactorisedBody:
 
     # -- a step begins
 
-    def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
+    def begin(self, old: State, target: Target, start: State) -> State:
         """Prepare everything for a step, and say where its iterations start."""
-        self.linearisation.begin(old, frozen)
+        self.linearisation.begin(old)
         state = replace(self._first_guess(start, target), pressure=self.pressure.begin(start.u))
         travel = abs(target.bone(old.bone)[1] - old.bone[1])
         self.linearisation.choose_candidates(state, constants.REACH * travel)
@@ -291,7 +291,9 @@ class FactorisedBody:
         # attraction changed
         force = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
         given = c, update.contact.given, fraction
-        return replace(after, **self.interface.bed.sunk(self.interface.positions(state.u), state, force, given))
+        return replace(
+            after, **self.interface.bed.sunk(self.interface.positions(state.u), state, force, given)
+        )
 
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:
         """Largest fraction 1, 1/2, 1/4 ... of an update that keeps every sampled volume."""
@@ -308,7 +310,7 @@ class FactorisedBody:
         """
         if state.bone.size == 3:
             return None
-        ahead = self.begin(state, target, frozen=False, start=state)
+        ahead = self.begin(state, target, start=state)
         self.linearisation.factorise(state)
         still = np.zeros(len(self.linearisation.tangent.schur))
         none, found = np.zeros(self.body.reduce(state.u).size), []

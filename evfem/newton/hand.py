@@ -99,7 +99,7 @@ class Hand:
         return float(self.damping * np.sum(stretched**2) / duration)
 
     def potential(self, old: State, new: State, places: Floats) -> Floats:
-        """Energy of the spring beyond the constant force of the end, at the shares `places` (w,) of a part."""
+        """Energy of the spring beyond the constant force of the end, at the fractions `places` (w,)."""
         square = float(np.sum((new.bone - old.bone)[::2] ** 2))
         return 0.5 * self.stiffness * square * ((1.0 - places) ** 2 - (1.0 - places[0]) ** 2)
 

@@ -61,9 +61,7 @@ def limited_gain(gain: Floats) -> Floats:
 class Linearisation:
     """Candidates, factorisation and condensed tangent of a body under an attraction."""
 
-    def __init__(
-        self, body: Body, interface: Interface, attraction: Any, limits: Limits
-    ) -> None:
+    def __init__(self, body: Body, interface: Interface, attraction: Any, limits: Limits) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.pad = interface.pad
         self.record = Record()
@@ -77,7 +75,6 @@ class Linearisation:
         self.tangent: Any = None
         self.stiffest = 0.0
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
-        self.frozen = False
         self._made_at: TangentPoint | None = None
         self._outdated = False
         self._lets_go = True
@@ -85,9 +82,9 @@ class Linearisation:
         self._drag_rate = 0.0
         self.fringes = False
 
-    def begin(self, old: State, frozen: bool) -> None:
-        """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
-        self.touching, self.frozen = old.status != OPEN, frozen
+    def begin(self, old: State) -> None:
+        """Start a step from `old`."""
+        self.touching = old.status != OPEN
         self._lets_go, self._outdated = True, self.fringes
         if self.fringes:
             self.fringes, self._made_at = False, None
@@ -156,8 +153,8 @@ class Linearisation:
         return state.voltage != 0.0 and (acting := self._acting(state)) is not None and acting.has_fringes
 
     def _acting(self, state: State) -> Attraction | None:
-        """The attraction if it follows the gap at `state`, else None."""
-        return self.attraction if not self.frozen and self.attraction.acts(state.voltage) else None
+        """The attraction if it acts at `state`, else None."""
+        return self.attraction if self.attraction.acts(state.voltage) else None
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
@@ -180,7 +177,7 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        self._made_at = TangentPoint(state, self.touching, self.frozen, *self.body.beginning)
+        self._made_at = TangentPoint(state, self.touching, *self.body.beginning)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
@@ -203,7 +200,7 @@ class Linearisation:
 
     def restore(self, at: TangentPoint) -> None:
         """Repeats the factorisation that the run that is resumed made at `at`."""
-        self.touching, self.frozen = at.touched, at.frozen
+        self.touching = at.touched
         self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner, at.past)
         self.factorise(at.state)
 

@@ -116,14 +116,13 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was made: at an iterate, with the pad nodes that `touched` (P,) when the step began, a
-    `frozen` attraction or not, and of the time step the displacements (N, dim) that it began with, its
-    seconds, what branches had kept, and the part before (`Body.beginning`).
+    """Where a tangent was made: at an iterate, with the pad nodes that `touched` (P,) when the step began;
+    of the time step the displacements (N, dim) that it began with, its seconds, what branches had kept, and
+    the part before (`Body.beginning`).
     """
 
     state: State
     touched: Any
-    frozen: bool
     begin: Floats
     duration: float
     inner: Floats

@@ -46,11 +46,11 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """Data of the solver for the next step; of the same shapes with and without a factorisation."""
-    nowhere = TangentPoint(state, state.touching, False, state.u, 0.0, state.inner, state.past)
+    nowhere = TangentPoint(state, state.touching, state.u, 0.0, state.inner, state.past)
     at = carried.tangent_point or nowhere
     parts = {"candidates": carried.candidates, "duration": carried.duration, "factorised": at is not nowhere}
     parts |= {f"factor_{name}": part for name, part in state_arrays(at.state).items()}
-    parts |= {"touched": at.touched, "frozen": at.frozen, "begun_u": at.begin, "begun_inner": at.inner}
+    parts |= {"touched": at.touched, "begun_u": at.begin, "begun_inner": at.inner}
     parts |= {"begun_seconds": at.duration, "past_seconds": at.past.seconds, "past_rates": at.past.rates}
     return {name: np.asarray(part) for name, part in parts.items()}
 
@@ -63,7 +63,7 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
         made = state_of({name: part for name, part in parts.items() if f"factor_{name}" in arrays})
         past = Past(float(arrays["past_seconds"]), arrays["past_rates"])
         begun = arrays["begun_u"], float(arrays["begun_seconds"]), arrays["begun_inner"], past
-        at = TangentPoint(made, arrays["touched"], bool(arrays["frozen"]), *begun)
+        at = TangentPoint(made, arrays["touched"], *begun)
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
 

@@ -113,19 +113,21 @@ class Ledger:
         }
 
     def _pulls(self, state: State, withheld: Floats) -> dict[str, tuple[Floats, float]]:
-        """Of every attraction by name: its force on the whole pad (dim,), and its part of what cores withhold."""
+        """Of every attraction by name: its force on the pad (dim,), its part of what cores withhold."""
         model, none = self.model, np.zeros(state.bone.size)
-        found: dict[str, tuple[Floats, float]] = {name: (none, 0.0) for name in PULLS}
+        found: dict[str, tuple[Floats, float]] = dict.fromkeys(PULLS, (none, 0.0))
         rest, kept = state.attraction, withheld
         acting = [part for part in model.attraction.parts if part.acts(state.voltage)]
         both = model.attraction.restored(state.voltage)
         for part in acting[:0:-1]:
             own, left = model.equilibrium.pull_of(part, state), part.restored(part.load(state.voltage))
-            share = 0.0 if left is None or both is None else left[0] / np.where(both[0] > 0.0, both[0], np.inf)
+            share = (
+                0.0 if left is None or both is None else left[0] / np.where(both[0] > 0.0, both[0], np.inf)
+            )
             pull = model.equilibrium.interface.tilted(state, own)
             found[part.name] = pull.sum(axis=0), float(np.sum(share * withheld))
             rest, kept = rest - pull, kept - share * withheld
-        for part in acting[:1]:  # the rest is its own: staggered rounds end within the tolerance
+        for part in acting[:1]:  # the rest is its own
             found[part.name] = rest.sum(axis=0), float(kept.sum())
         return found
 

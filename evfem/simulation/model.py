@@ -61,7 +61,7 @@ class Model:
 
     @cached_property
     def terms(self) -> tuple[Any, ...]:
-        """What has energies of its own beside tissue, contact and attraction (`evfem.protocols.EnergyTerm`)."""
+        """What has energies beside tissue, contact and attraction (`evfem.protocols.EnergyTerm`)."""
         return (*self.body.dynamics.books, *self.drive.books)
 
     @cached_property

@@ -170,9 +170,7 @@ class Run:
         self.ledger = Ledger(self.model)
         allowed, body = allowed_error(scene), self.model.body
         equilibrium = self.model.equilibrium
-        self.stepper = Stepper(
-            equilibrium, scene.coupling, body=body, allowed=allowed, rise=partial(climb, self.model)
-        )
+        self.stepper = Stepper(equilibrium, body=body, allowed=allowed, rise=partial(climb, self.model))
         if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
@@ -374,7 +372,6 @@ class Run:
             "relaxations": self.stepper.relaxations,
             "barriers": self.stepper.barriers,
             "held": self.stepper.held,
-            "unsettled": self.stepper.unsettled,
             "candidates": int(self.model.equilibrium.body.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",

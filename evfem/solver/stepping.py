@@ -8,10 +8,6 @@ again and again comes to its end.
 
 Where the error of the path is limited, a part is solved as two halves and accepted if one whole part
 ends close enough to them; its length follows that error (`evfem.solver.path`).
-
-Staggered rounds have the same equilibria as the monolithic coupling, but may not converge to them: the
-attraction of one round, held, can pull a node down the slope of a texture. If they do not settle, the
-part is solved monolithically, and so are the rest of the step and every step of a release.
 """
 
 from __future__ import annotations
@@ -20,14 +16,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-import numpy as np
-
-from evfem.common.arrays import Floats
-from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
-from evfem.newton.control import ConstrainedVoltage, Target
+from evfem.common.constants import COARSER, PATH_FIRST, RELEASED
+from evfem.newton.control import Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
-from evfem.newton.strategy import stuck
 from evfem.solver.hold import held
 from evfem.solver.path import length_factor, relative_difference
 from evfem.solver.relaxation import Relaxation, pull
@@ -71,20 +63,16 @@ class Release:
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step, that worked
     last. `body` is what is released where no equilibrium is near; without it such a step fails. `snaps`:
-    parts in which stability was lost without a release; `unsettled`: parts solved monolithically because
-    staggered rounds did not settle; `together`: whether the rest of this step is. Where the error of the path
-    of a part is limited it is at most `allowed`, and `path_error` the largest accepted.
+    parts in which stability was lost without a release. Where the error of the path of a part is limited it
+    is at most `allowed`, and `path_error` the largest accepted.
     """
 
     equilibrium: Equilibrium
-    coupling: str = "monolithic"
     substep: float = 1.0
     cuts: int = 0
     body: Body | None = None
     relaxations: int = 0
     snaps: int = 0
-    unsettled: int = 0
-    together: bool = False
     allowed: float | None = None
     path_error: float = 0.0
     rise: Callable[[State, State, Target], float] | None = None
@@ -104,7 +92,7 @@ class Stepper:
         Raises `StepFailed` when the smallest substep fails; what was accepted before stays accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
-        self.together, self._release = False, Release(max(RELEASED, strategy.smallest_part), self.substep)
+        self._release = Release(max(RELEASED, strategy.smallest_part), self.substep)
         while done < 1.0:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
@@ -272,57 +260,10 @@ class Stepper:
         return not (target.voltage.free or target.voltage.follows) and self.rise(old, new, target) > CLIMB
 
     def _found(self, state: State, target: Target, start: State | None = None) -> State:
-        """One equilibrium with the coupling asked for; where charges move, they follow."""
+        """One equilibrium; where charges move, they follow."""
         attraction = self.equilibrium.attraction
         if attraction.charging is None:
-            return self._coupled(state, target, start)
+            return self.equilibrium.step(state, target, start)
         attraction.charging.begin(self.equilibrium.charged(state), target.duration)
-        new = self._coupled(state, target, start)
+        new = self.equilibrium.step(state, target, start)
         return replace(new, charges=self.equilibrium.charged(new, kept=False).charges)
-
-    def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
-        """One equilibrium: all at once, or mechanics under attraction found beforehand."""
-        equilibrium = self.equilibrium
-        at_once = self.coupling == "monolithic" or (self.coupling == "staggered" and self._dragged)
-        if at_once or not equilibrium.attraction.parts:
-            return equilibrium.step(state, target, start=start)
-        if self.coupling == "staggered_once":
-            held, frozen = self._frozen(state, state, target)
-            return self._charged(state, equilibrium.step(state, held, frozen), target)
-        try:
-            if not self.together:
-                return self._settled(state, target)
-        except StepFailed:
-            self.together = True
-        new = equilibrium.step(state, target, start=start)
-        self.unsettled += 1
-        return new
-
-    def _frozen(self, old: State, state: State, target: Target) -> tuple[Target, Floats]:
-        """The target with the voltage that it takes in `state`, and the attraction (P, dim) there."""
-        if isinstance(target.voltage, ConstrainedVoltage):
-            target = replace(target, voltage=self.equilibrium.held(old, state, target))
-        return target, self.equilibrium.attraction_at(old, state, target.voltage.voltage)
-
-    def _charged(self, old: State, new: State, target: Target) -> State:
-        """The new state with the voltage that its own place takes."""
-        met = isinstance(target.voltage, ConstrainedVoltage)
-        return replace(new, voltage=self.equilibrium.held(old, new, target).voltage) if met else new
-
-    @property
-    def _dragged(self) -> bool:
-        """Whether the body is on its way to another equilibrium, held back by drag."""
-        return self.body is not None and self.body.drag_rate > 0.0
-
-    def _settled(self, state: State, target: Target) -> State:
-        """Rounds of mechanics under the attraction of the round before, until it no longer changes."""
-        equilibrium, new = self.equilibrium, state
-        changes: list[float] = []
-        while len(changes) < STAGGERED_LIMIT and not stuck(changes):
-            held, frozen = self._frozen(state, new, target)
-            changes.append(float(np.abs(frozen - new.attraction).max()))
-            done, allowed = len(changes) > 1, max(np.abs(new.reaction).max(), SMALLEST_FORCE)
-            if done and changes[-1] <= equilibrium.tolerance * allowed:
-                return self._charged(state, new, target)
-            new = equilibrium.step(state, held, frozen, start=new if done else None)
-        raise StepFailed("the staggered coupling does not settle", equilibrium.record.residuals)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from evfem.studies.pressing import contact_spans
 
 from evfem.finger.fingerpad import FingerPad
+from evfem.studies.pressing import contact_spans
 from evfem.surface.pad import outline_nodes
 
 

@@ -84,7 +84,7 @@ def test_what_a_summit_gains_on_closing_and_loses_on_opening_is_the_fields():
     lowest = linear.interface.surface_at(rest(np.zeros(2), 380.0)).gap
     summit = int(np.argmin(lowest))
     state = rest(np.array([0.0, 2e-3 - lowest[summit]]), 380.0)
-    linear.begin(state, False)
+    linear.begin(state)
     status, force = state.status.copy(), state.contact_force.copy()
     status[summit], force[summit, 0] = STICK, 2e-3
     closed = replace(state, status=status)

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from evfem.studies import printed
 
 from evfem import studies
+from evfem.studies import printed
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))

@@ -3,7 +3,6 @@
 import meshio
 import numpy as np
 import pytest
-from evfem.studies.benchmark import benchmark_mesh
 from tools.mesh_parts import REGIONS, of_kind, raw
 from tools.refusals import refuses
 
@@ -11,6 +10,7 @@ from evfem.errors import InputError, StorageError
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import scaled_jacobian
+from evfem.studies.benchmark import benchmark_mesh
 
 
 def stored(folder, **changes):

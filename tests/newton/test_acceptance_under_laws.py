@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node, pushed, shifted
 
+from evfem.contact.attraction import NoAttraction
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.newton.control import GivenVoltage, Indentation, Target
@@ -63,7 +64,7 @@ def lawful(kind, law, surface=None):
 def first_accepted(interface, old, states):
     """Number of the iterate that the solver accepts; it keeps its displacements."""
     script = Script(states, (0.0, 0.0))
-    solver = Equilibrium(script, interface, None, Limits(TOLERANCE, Strategy(iterations=2)))
+    solver = Equilibrium(script, interface, NoAttraction(), Limits(TOLERANCE, Strategy(iterations=2)))
     target = Target(0.0, Indentation(0.0), GivenVoltage(0.0), interface.duration)
     found = solver.step(old, target)
     return next(k for k, state in enumerate(states) if state.u is found.u)
@@ -145,7 +146,7 @@ def test_an_equilibrium_that_the_body_leaves_is_refused():
     interface, old, new = legal(FLAT)
     script = Script([new], (0.0, 0.0))
     script.left = StabilityRatio(1.5, SLOPES)
-    solver = Equilibrium(script, interface, None, Limits(TOLERANCE))
+    solver = Equilibrium(script, interface, NoAttraction(), Limits(TOLERANCE))
     with pytest.raises(StepFailed, match=f"not stable: {SLOPES}, 1.5 times as hard") as failed:
         solver.step(old, Target.held(old.bone, 0.0))
     assert failed.value.unstable

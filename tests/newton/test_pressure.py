@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from evfem.studies.stability.scenes import benchmark, layered
 
 import evfem as ev
 from evfem import meshes
 from evfem.mesh.file import read
 from evfem.simulation.run import simulate
+from evfem.studies.stability.scenes import benchmark, layered
 from evfem.tissue import splitlaw
 
 #: element -> Poisson's ratios at which it is no stiffer by locking than its own iterations can bear

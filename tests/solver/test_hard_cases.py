@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evfem.studies.campaign.invariants import broken
-from evfem.studies.stability.case import judge
-from evfem.studies.stability.study import CASES
 from tools.builders import coarse_pad
 
 import evfem as ev
 from evfem.simulation.run import Run
+from evfem.studies.campaign.invariants import broken
+from evfem.studies.stability.case import judge
+from evfem.studies.stability.study import CASES
 
 HARD = (
     "friction.jump_steep",

@@ -43,7 +43,7 @@ class Steps:
     record: Record = field(default_factory=Record)
     ways: list = field(default_factory=list)
 
-    def step(self, old, target, frozen=None, start=None):
+    def step(self, old, target, start=None):
         self.record.iterations += self.takes
         if target - old > self.longest:
             raise StepFailed("too far", [1.0])
@@ -84,7 +84,7 @@ class Lasts:
 class Lasting(Steps):
     """The same for targets that say how long they take; nothing counts but where they are."""
 
-    def step(self, old, target, frozen=None, start=None):
+    def step(self, old, target, start=None):
         return super().step(old, target.x)
 
 
@@ -107,7 +107,7 @@ class Snapping(Steps):
 
     lost = 0.3
 
-    def step(self, old, target, frozen=None, start=None):
+    def step(self, old, target, start=None):
         self.record.iterations += self.takes
         raise StepFailed("no equilibrium near", [1.0])
 
@@ -187,7 +187,7 @@ def test_a_part_that_failed_for_stability_is_not_forgotten_until_one_works(found
     """Whole and half fail, the half because the body gives way; 1/4 works or fails, and all after it."""
 
     class Unsteady(Steps):
-        def step(self, old, target, frozen=None, start=None):
+        def step(self, old, target, start=None):
             if found and old == 0.0 and target == 0.25:
                 return target
             failed = StepFailed("fails", [1.0])
@@ -220,56 +220,12 @@ def test_a_step_begins_ahead_on_the_last_ones_way():
     assert force == pytest.approx(same, rel=1e-7)
 
 
-class Unsettling(Steps):
-    """Equilibria that are found all at once alone: rounds fail, or go to and fro."""
-
-    attraction = SimpleNamespace(charging=None, parts=(None,))
-    tolerance = 1e-8
-
-    def __init__(self, fails):
-        super().__init__(Strategy(), 1.0)
-        self.fails, self.rounds = fails, 0
-
-    def attraction_at(self, old, new, voltage):
-        self.rounds += 1
-        return np.array([float(self.rounds % 2)])
-
-    def step(self, old, target, frozen=None, start=None):
-        if frozen is not None and self.fails:
-            raise StepFailed("rounds fail", [1.0])
-        return SimpleNamespace(attraction=frozen, reaction=np.ones(1), together=frozen is None)
-
-
-@pytest.mark.parametrize("fails", [True, False])
-def test_a_part_whose_staggered_rounds_do_not_settle_is_solved_all_at_once(fails):
-    rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
-    target = SimpleNamespace(voltage=SimpleNamespace(voltage=100.0))
-    solver = Unsettling(fails)
-    stepper = Stepper(solver, "staggered")
-    assert stepper.solve(rest, target).together
-    assert stepper.unsettled == 1
-    assert solver.rounds == (1 if fails else 17)
-    # the rest of the step is not asked again
-    assert stepper.solve(rest, target).together
-    assert (stepper.unsettled, solver.rounds) == (2, 1 if fails else 17)
-
-
-def test_a_released_body_goes_its_way_without_rounds():
-    rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
-    target = SimpleNamespace(voltage=SimpleNamespace(voltage=100.0))
-    solver = Unsettling(False)
-    stepper = Stepper(solver, "staggered", body=SimpleNamespace(drag_rate=0.5))
-    assert stepper.solve(rest, target).together
-    assert not solver.rounds
-    assert not stepper.unsettled
-
-
 class Decaying(Steps):
     """y' = -y by backward Euler: what a step of length h leaves of a state is 1 / (1 + h)."""
 
     interface = SimpleNamespace(begin=lambda old, duration: None)
 
-    def step(self, old, target, frozen=None, start=None):
+    def step(self, old, target, start=None):
         self.ways.append((target.duration, start is not None))
         assert len(self.ways) < 10_000, "the same part is tried again and again"
         return SimpleNamespace(reaction=old.reaction / (1.0 + target.duration), bone=np.zeros(2))

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evfem.studies.campaign import bodies, drawing, ending, invariants, run, study, tables
 
 from evfem import studies
 from evfem.common.pools import open_pool, processes
@@ -18,6 +17,7 @@ from evfem.scene.format import SIGNALS, SURFACES
 from evfem.scene.motion import MOTIONS
 from evfem.scene.schema import sections
 from evfem.simulation.run import simulate
+from evfem.studies.campaign import bodies, drawing, ending, invariants, run, study, tables
 from evfem.tissue.laws import LAWS
 from evfem.tissue.space import elements_on
 

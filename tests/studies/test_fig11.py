@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evfem.studies import pressing
 
 from evfem.scene.motion import Press, VoltageRamp
 from evfem.simulation.run import simulate
+from evfem.studies import pressing
 
 PAD = pressing.Pad(resolution="coarse")
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from evfem.studies import common, fingertip, fringe, laws, measured, plots
 
 import evfem as ev
 from evfem import data, studies
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.errors import InputError, StorageError
 from evfem.reference import cylinder_force
+from evfem.studies import common, fingertip, fringe, laws, measured, plots
 from evfem.surface.skin import make_skin
 
 CASES = ("HVHD", "HVLD", "LVLD")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from evfem.studies.measured import participant_forces
 
 pytestmark = pytest.mark.solver

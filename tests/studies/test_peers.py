@@ -4,11 +4,11 @@ import sys
 
 import numpy as np
 import pytest
+
+from evfem import studies
 from evfem.studies.peers import apart, hosts, problem, shown
 from evfem.studies.peers import evaluation as numbers
 from evfem.studies.peers import study as peers
-
-from evfem import studies
 
 PRESENT = [name for name in numbers.PEERS if hosts.host(name)]
 FORCES = ("Fn_at_0.5", "Fn_at_1.0", "Fn_at_1.5")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from evfem.studies.precision import evaluation, growth, scenes, shares
 from evfem.studies.precision import runs as runs_of
 

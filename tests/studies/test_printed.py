@@ -4,11 +4,11 @@ import doctest
 import json
 
 import pytest
+
+from evfem import cli, studies
 from evfem.studies import paper, printed
 from evfem.studies.common import Study
 from evfem.studies.printed import Printed, difference_of, rows_of, told
-
-from evfem import cli, studies
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ import os
 
 import numpy as np
 import pytest
-from evfem.studies import common, fig13, rendered
 
 from evfem import studies
 from evfem.errors import InputError
 from evfem.estimate.rendering import ApparentFriction
+from evfem.studies import common, fig13, rendered
 
 pytestmark = pytest.mark.solver
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from evfem.studies.stability import case, figure, scenes
-from evfem.studies.stability import study as stability
 
 from evfem.scene.motion import Press, Slide
+from evfem.studies.stability import case, figure, scenes
+from evfem.studies.stability import study as stability
 from evfem.surface.surfaces import Flat, Sinusoid
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from evfem.studies import common, measured, uncertainty
-from evfem.studies import participants as people
 
 from evfem.scene import file as scenefile
 from evfem.simulation.run import simulate
+from evfem.studies import common, measured, uncertainty
+from evfem.studies import participants as people
 
 pytestmark = pytest.mark.slow
 

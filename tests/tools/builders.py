@@ -1,13 +1,13 @@
 """Small bodies and scenes that several tests share, and what their results say."""
 
 import numpy as np
+
+import evfem as ev
+from evfem.simulation.result import Saved
 from evfem.studies.stability.case import out_of_balance as balance
 from evfem.studies.stability.scenes import INSULATOR, SKIN, finger
 from evfem.studies.stability.scenes import benchmark as benchmark_finger
 from evfem.studies.stability.scenes import pad as coarse_pad
-
-import evfem as ev
-from evfem.simulation.result import Saved
 
 __all__ = ("INSULATOR", "SKIN", "balance", "benchmark_finger", "coarse_pad", "finger")
 

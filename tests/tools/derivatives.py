@@ -22,8 +22,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from evfem.studies.campaign.drawing import draw
-from evfem.studies.campaign.tables import text_of, with_files
 
 from evfem.errors import InputError, NotConverged
 from evfem.response.lines import STEP
@@ -32,6 +30,8 @@ from evfem.response.sensitivities import sensitivities
 from evfem.scene.file import loads
 from evfem.scene.options import Output
 from evfem.simulation.run import simulate
+from evfem.studies.campaign.drawing import draw
+from evfem.studies.campaign.tables import text_of, with_files
 
 FORCES = ("normal_force", "tangential_force", "electrostatic_force")
 TABLES = ("finger", "surface", "electrostatics", "adhesion", "hand", "motion")

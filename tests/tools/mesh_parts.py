@@ -1,10 +1,10 @@
 """The benchmark's coarsest mesh in other cells, and as the parts of a file."""
 
 import numpy as np
-from evfem.meshes.make import triangles
-from evfem.studies.benchmark import benchmark_mesh
 
 from evfem.mesh.mesh import raised
+from evfem.meshes.make import triangles
+from evfem.studies.benchmark import benchmark_mesh
 
 #: numbers of its regions
 REGIONS = {"tissue": 0, "skin": 1}

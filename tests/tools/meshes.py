@@ -3,9 +3,9 @@ a body.
 """
 
 import numpy as np
-from evfem.studies.stability.scenes import block as block
 
 from evfem.mesh.mesh import Mesh
+from evfem.studies.stability.scenes import block as block
 from evfem.surface.pad import Pad
 
 KINDS = ("quad", "quad9", "triangle", "triangle6")

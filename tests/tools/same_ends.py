@@ -29,12 +29,11 @@ Row = dict[str, str]
 
 def run(key: tuple[int, int]) -> Row:
     """The row of one scene, whose process dies beyond `LIMIT_S` CPU seconds."""
-    from evfem.studies.campaign.drawing import draw
-    from evfem.studies.campaign.tables import text_of, with_files
-
     from evfem.errors import InputError, NotConverged
     from evfem.scene.file import loads
     from evfem.simulation.run import simulate
+    from evfem.studies.campaign.drawing import draw
+    from evfem.studies.campaign.tables import text_of, with_files
 
     warnings.simplefilter("ignore")
     resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + LIMIT_S), resource.RLIM_INFINITY))

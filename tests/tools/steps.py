@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from evfem.contact.attraction import NoAttraction
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.mesh.mesh import raised
 from evfem.newton.control import Target
@@ -35,7 +36,7 @@ class Script:
     def known(self, old, target):
         return None
 
-    def begin(self, old, target, frozen, start):
+    def begin(self, old, target, start):
         return self.states[0]
 
     def balance(self, state, attraction, target):
@@ -67,7 +68,7 @@ def legal(surface, kind=Interface):
     """
     interface = kind(PAD, MESH.points, surface, TOLERANCE)
     script = Script([], [])
-    equilibrium = Equilibrium(script, interface, None, Limits(TOLERANCE))
+    equilibrium = Equilibrium(script, interface, NoAttraction(), Limits(TOLERANCE))
     old = equilibrium.rest(np.zeros(2), 0.0)
     status = np.resize([OPEN, STICK, FORWARD, BACKWARD], PAD.nodes.size)
     force = np.array([NODES[s] for s in status.tolist()])
@@ -91,7 +92,7 @@ def accepted(interface, old, states, residuals=(0.0, 0.0), target=None, tries=2)
     script = Script(states, residuals)
     limits = Limits(TOLERANCE, Strategy(iterations=tries))
     target = target or Target.held(old.bone, 0.0)
-    found = Equilibrium(script, interface, None, limits).step(old, target)
+    found = Equilibrium(script, interface, NoAttraction(), limits).step(old, target)
     return next(k for k, state in enumerate(states) if state is found)
 
 
