@@ -48,11 +48,8 @@ class Attractions(Attraction):
         each = zip(self.parts, loads, strict=True)
         return np.asarray(sum(part.forces_along(positions, at, touching, pressing) for part, at in each))
 
-    def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
-        found = [one for part in self.parts if (one := part.restored(part.load(voltage))) is not None]
-        if not found:
-            return None
-        withheld, left = np.sum(found, axis=0)
+    def restored(self, voltage: float) -> tuple[Floats, Floats]:
+        withheld, left = np.sum([part.restored(part.load(voltage)) for part in self.parts], axis=0)
         return withheld, left
 
     def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:

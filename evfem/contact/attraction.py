@@ -28,6 +28,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.contact.charging import Charged, Charging
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
+from evfem.rooms import Room
 from evfem.surface.pad import Pad, surface_state
 from evfem.surface.skin import Skin
 from evfem.tensor import derivative, mul, positive_part
@@ -71,13 +72,12 @@ class Entries(NamedTuple):
 ON = 1.0
 
 
-class NoAttraction:
+class NoAttraction(Room):
     """Nothing attracts: the empty sum of attractions."""
 
     law = layers = roughness = charging = None
     direction, parts, rounding = "vertical", (), 0.0
     has_energy = has_fringes = False
-    no_charges = np.zeros((2, 0))
 
     def acts(self, voltage: float) -> bool:
         """Never."""
@@ -91,12 +91,13 @@ class NoAttraction:
         """By what its forces (P,), which are 0, are tractions."""
         return np.ones(len(position))
 
-    def restored(self, voltage: float) -> None:
+    def restored(self, voltage: float) -> tuple[Floats | float, Floats | float]:
         """Nothing is withheld."""
+        return 0.0, 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class Attraction:
+class Attraction(Room):
     """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface`
     the electrode's outline, `roughness` how far rough faces stay apart in contact (None: not at all).
 
@@ -129,11 +130,6 @@ class Attraction:
         """Whether anything attracts at this voltage: charges may without it."""
         return voltage != 0.0 or self.always or self.charging is not None
 
-    @property
-    def no_charges(self) -> Floats:
-        """Charges (M, P) of an uncharged pad, (2, 0) where charges do not move."""
-        return np.zeros((2, 0)) if self.charging is None else self.charging.none
-
     def _voltages(self, gap: Any, voltage: float, position: Floats) -> Any:
         """Effective voltage at gaps (P,) of nodes at (P, dim), with that of the charges."""
         if self.charging is None:
@@ -150,6 +146,10 @@ class Attraction:
         length = self.pad.tributary(position)
         found = self.charging.after(gap, voltage, length) if charges is None else charges
         return Charged(found, voltage, gap, length)
+
+    def memory(self, state: Any) -> dict[str, Floats]:
+        """Charges over eps_0 (M, P) in V/mm of an uncharged pad, where they move."""
+        return {} if self.charging is None else {"charges": self.charging.none}
 
     def forces(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
         """Nodal forces on the finger (P, dim); without an air layer only `touching` nodes (P,) have any."""
@@ -202,15 +202,15 @@ class Attraction:
         at = zip(gaps, voltages.tolist(), positions, strict=True)
         return np.array([values(gap, self._voltages(gap, u, place), self.layers) for gap, u, place in at])
 
-    def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
-        """Parts of closed nodes' attraction (P,) in MPa that a core takes away, and leaves; or None."""
+    def restored(self, voltage: float) -> tuple[Floats, Floats]:
+        """Of closed nodes' attraction (P,) in MPa what a regularised law takes away and leaves, else 0."""
+        none = np.zeros(self.pad.nodes.size)
         if not hasattr(self.law, "withheld") or voltage == 0.0:
-            return None
+            return none, none
         withheld, left = self.law.withheld(voltage, self.layers)
         if not np.any(left):  # closed faces are out of its reach
-            return None
-        size = self.pad.nodes.shape
-        return np.broadcast_to(withheld, size), np.broadcast_to(left, size)
+            return none, none
+        return none + withheld, none + left
 
     def tangent_factor(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
         """Factor (P,), or 1, of the derivatives of the `column_law` in the tangent of the forces."""

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints, block
+from evfem.rooms import Room
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
@@ -65,18 +66,23 @@ class Yielding:
         return found
 
 
-class Rigid:
-    """A surface that does not give way: what every surface below the pad answers (P nodes, C candidates).
+#: names in a state's memory: what the surface adds to the places of the pad's nodes relative to it, (P, dim)
+#: in mm, and its derivatives along x[, z] (P, d, dim)
+DISPLACEMENT, GRADIENT = "surface_displacement", "surface_gradient"
 
-    `given` (P, dim) in mm is what the surface adds to the places of the pad's nodes relative to it, `strain`
-    (P, d, dim) its derivatives along x[, z]; both are kept in a `State`.
-    """
+
+class Rigid(Room):
+    """A surface that does not give way: what every surface below the pad answers (P nodes, C candidates)."""
 
     reach, yields = 0.0, False
 
-    def memory(self, nodes: int, dim: int) -> dict[str, Floats]:
-        """What a `State` keeps of it at the beginning of a run."""
-        return {}
+    def displacement(self, state: Any) -> Any:
+        """What the surface adds to the places of the pad's nodes relative to it, (P, dim) in mm."""
+        return 0.0
+
+    def sink(self, state: Any) -> Any:
+        """Displacements into the surface below the pad's nodes (P,) in mm."""
+        return np.zeros(len(state.contact_force))
 
     def places(self, position: Floats, state: Any) -> Floats:
         """Places (P, dim) relative to the surface of nodes at `position`, as if it were rigid."""
@@ -105,7 +111,7 @@ class Rigid:
     def sunk(
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
     ) -> dict[str, Floats]:
-        """Fields of the next iterate: the surface gives way to `force` (P, dim), below the candidates of an
+        """Memory of the next iterate: the surface gives way to `force` (P, dim), below the candidates of an
         `update` (C,) by the fraction of what the linear step found.
         """
         return {}
@@ -181,24 +187,31 @@ class Bed(Rigid):
         self.spacing, self.reach = spacing, NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
 
-    def memory(self, nodes: int, dim: int) -> dict[str, Floats]:
-        return {"given": np.zeros((nodes, dim)), "strain": np.zeros((nodes, dim - 1, dim))}
+    def memory(self, state: Any) -> dict[str, Floats]:
+        nodes, dim = state.contact_force.shape
+        return {DISPLACEMENT: np.zeros((nodes, dim)), GRADIENT: np.zeros((nodes, dim - 1, dim))}
+
+    def displacement(self, state: Any) -> Floats:
+        return np.asarray(state.memory[DISPLACEMENT])
+
+    def sink(self, state: Any) -> Floats:
+        return self.displacement(state)[:, 1]
 
     def places(self, position: Floats, state: Any) -> Floats:
-        return np.asarray(position + state.given)
+        return np.asarray(position + self.displacement(state))
 
     def sloped(self, found: SurfaceState, state: Any) -> SurfaceState:
-        slope = np.linalg.solve(_kept(state), (found.slope - state.strain[:, :, 1])[:, :, None])
+        slope = np.linalg.solve(_kept(state), (found.slope - state.memory[GRADIENT][:, :, 1])[:, :, None])
         return replace(found, slope=np.asarray(slope[:, :, 0]))
 
     def tilted(self, state: Any, force: Floats) -> Floats:
-        found, pushed = force.copy(), force[:, ::2] + state.strain[:, :, 1] * force[:, 1:2]
+        found, pushed = force.copy(), force[:, ::2] + state.memory[GRADIENT][:, :, 1] * force[:, 1:2]
         found[:, ::2] = np.linalg.solve(_kept(state), pushed[:, :, None])[:, :, 0]
         return found
 
     def untilted(self, state: Any, force: Floats) -> Floats:
         found, along = force.copy(), np.einsum("pkj,pj->pk", _kept(state), force[:, ::2])
-        found[:, ::2] = along - state.strain[:, :, 1] * force[:, 1:2]
+        found[:, ::2] = along - state.memory[GRADIENT][:, :, 1] * force[:, 1:2]
         return found
 
     def under(self, position: Floats, state: Any) -> Yielding:
@@ -207,31 +220,34 @@ class Bed(Rigid):
 
     def missed(self, position: Floats, state: Any, force: Floats) -> float:
         below = self.under(position, state)
-        missing = np.abs(below.given(force) - state.given).max() / self.spacing
-        return float(max(missing, np.abs(below.change(force) - state.strain).max()))
+        missing = np.abs(below.given(force) - self.displacement(state)).max() / self.spacing
+        return float(max(missing, np.abs(below.change(force) - state.memory[GRADIENT]).max()))
 
     def of(self, position: Floats, state: Any, c: Ints) -> RigidBelow:
         below = self.under(position, state)
-        return BelowCandidates(below.among(c), (below.given(state.attraction) - state.given)[c].ravel())
+        pulled = below.given(state.attraction) - self.displacement(state)
+        return BelowCandidates(below.among(c), pulled[c].ravel())
 
     def sunk(
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
     ) -> dict[str, Floats]:
         below, (c, gives, fraction), force = self.under(position, state), update, force()
         given = below.given(force)
-        given[c] = state.given[c] + fraction * np.asarray(gives).reshape(c.size, -1)
-        return {"given": given, "strain": below.change(force)}
+        given[c] = self.displacement(state)[c] + fraction * np.asarray(gives).reshape(c.size, -1)
+        return {DISPLACEMENT: given, GRADIENT: below.change(force)}
 
     def energies(self, part: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
-        found = [[0.5 * float(np.sum(force * state.given)) for state in part] for force in forces]
+        found = [
+            [0.5 * float(np.sum(force * self.displacement(state))) for state in part] for force in forces
+        ]
         return np.array([found[0][0], found[0][1] + found[1][0], found[1][1]])
 
     def way(self, part: tuple[Any, Any], moved: Floats) -> Floats:
-        return np.asarray(moved + part[1].given - part[0].given)
+        return np.asarray(moved + self.displacement(part[1]) - self.displacement(part[0]))
 
     def stretched(self, part: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
         along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
-        stretch = 0.5 * (part[0].strain + part[1].strain)[:, :, ::2]
+        stretch = 0.5 * (part[0].memory[GRADIENT] + part[1].memory[GRADIENT])[:, :, ::2]
         return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
     def below(self, position: Floats, height: Floats) -> Yielding:
@@ -260,7 +276,7 @@ def bed_of(surface: Any, pad: Pad | Skin, spacing: float, least: float) -> Rigid
 
 def _kept(state: Any) -> Floats:
     """How long lengths on an elastic surface along x[, z] are for what they were, (P, d, d)."""
-    return np.asarray(np.eye(state.strain.shape[1]) - state.strain[:, :, ::2])
+    return np.asarray(np.eye(state.memory[GRADIENT].shape[1]) - state.memory[GRADIENT][:, :, ::2])
 
 
 def _by_nodes(found: Floats, dim: int) -> Floats:

@@ -24,8 +24,8 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
 from evfem.newton.state import State
 
-#: what of a state is combined, beside the squared voltage
-MIXED = ("u", "contact_force", "bone", "pressure", "given", "strain")
+#: what of a state is combined, beside the squared voltage and what iterations change of its memory
+MIXED = ("u", "contact_force", "bone")
 
 
 class Anderson:
@@ -44,28 +44,34 @@ class Anderson:
         if not np.array_equal(before.status, after.status):
             self.reset()
             return after
-        step, image = (after.u - before.u).ravel(), _vector(after)
+        names = mixed(before, after)
+        step, image = (after.u - before.u).ravel(), _vector(after, names)
         last, self._last = self._last, (step, image)
         if last is None:
             return after
         self._changes = [*self._changes, (step - last[0], image - last[1])][-ANDERSON_DEPTH:]
         steps, images = (np.stack(each) for each in zip(*self._changes, strict=True))
         theta = np.linalg.lstsq(steps @ steps.T, steps @ step, rcond=1e-12)[0]
-        return _state(after, image - theta @ images)
+        return _state(after, image - theta @ images, names)
 
 
-def _vector(state: State) -> Floats:
-    squared = np.copysign((state.voltage / KILOVOLT) ** 2, state.voltage)
-    parts = (getattr(state, name) for name in MIXED)
-    return np.concatenate([*(part.ravel() for part in parts), [squared]])
+def mixed(before: State, after: State) -> tuple[str, ...]:
+    """Names among a state's parts that iterations change."""
+    kept = (name for name, one in after.memory.items() if one is not before.memory[name])
+    return (*MIXED, *(f"memory.{name}" for name in kept))
 
 
-def _state(state: State, vector: Floats) -> State:
-    parts = [getattr(state, name) for name in MIXED]
-    *mixed, (signed,) = np.split(vector, np.cumsum([part.size for part in parts]))
+def _vector(state: State, names: tuple[str, ...]) -> Floats:
+    squared, parts = np.copysign((state.voltage / KILOVOLT) ** 2, state.voltage), state.parts
+    return np.concatenate([*(parts[name].ravel() for name in names), [squared]])
+
+
+def _state(state: State, vector: Floats, names: tuple[str, ...]) -> State:
+    parts = [state.parts[name] for name in names]
+    *combined, (signed,) = np.split(vector, np.cumsum([part.size for part in parts]))
     changed: dict[str, Any] = {
-        n: one.reshape(part.shape) for n, one, part in zip(MIXED, mixed, parts, strict=True)
+        n: one.reshape(part.shape) for n, one, part in zip(names, combined, parts, strict=True)
     }
     squared = max(np.copysign(1.0, state.voltage) * signed, 0.0)
     voltage = float(np.copysign(KILOVOLT * np.sqrt(squared), state.voltage))
-    return replace(state, **changed, voltage=voltage)
+    return replace(state.with_parts(changed), voltage=voltage)

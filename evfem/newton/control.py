@@ -383,12 +383,15 @@ class Target:
 
     def going_on(self, old: State, bone: int) -> State:
         """`old` as the next part counts it: anew where the given speed of node `bone` or drive jumps."""
-        if old.seconds == 0.0 or self.duration == 0.0:
+        if not old.memory.get("seconds", 0.0) or self.duration == 0.0:
             return old
-        before, now = old.rates[0][bone].tolist(), ((self.bone(old.bone) - old.bone) / self.duration).tolist()
+        before, now = (
+            old.memory["rates"][0][bone].tolist(),
+            ((self.bone(old.bone) - old.bone) / self.duration).tolist(),
+        )
         pairs = list(zip(before, now, strict=True))
         pairs[::2] = self.drive.given_speeds(old, self.place, self.duration, pairs[::2])
         if self.height.free:
             del pairs[1]
         jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)
-        return replace(old, seconds=0.0) if jumps else old
+        return old.remembering({"seconds": np.zeros(())}) if jumps else old

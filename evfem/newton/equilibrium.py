@@ -34,7 +34,7 @@ from evfem.electrostatics.signals import PadState
 from evfem.newton.control import Force, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
-from evfem.newton.state import NO_AGE, Balance, Folded, Limits, State, StepFailed
+from evfem.newton.state import Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
@@ -49,6 +49,7 @@ class Equilibrium:
     def __init__(self, body: FactorisedBody, interface: Interface, attraction: Any, limits: Limits) -> None:
         self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record
+        self.rooms = (*body.body.rooms, body.pressure, *interface.rooms, attraction)
         self.tolerance, self.strategy = limits.tolerance, limits.strategy
         self._iterate: tuple[State, Balance] | None = None
 
@@ -64,16 +65,31 @@ class Equilibrium:
             voltage=voltage,
             attraction=zero,
             reaction=np.zeros(dim),
-            velocity=still,
             last_increment=still,
-            age=NO_AGE if self.interface.law is None else np.zeros(nodes),
-            charges=self.attraction.no_charges,
-            inner=self.body.body.at_rest,
-            **self.interface.bed.memory(nodes, dim),
-            rates=np.zeros_like(self.body.body.rates(still)),
         )
+        for room in self.rooms:
+            state = state.remembering(room.memory(state))
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
+
+    def begin(self, old: State, target: Target) -> Target:
+        """A trial from `old` begins: every room counts from there. Returns the target as it then is."""
+        self.interface.begin(old, target.duration)
+        for room in self.rooms:
+            room.begin(old, target.duration)
+        if self.attraction.charging is not None:
+            self.attraction.charging.begin(self.charged(old), target.duration)
+        target.voltage.begin(old)
+        return target.begun(old)
+
+    def accept(self, old: State, state: State, target: Target) -> State:
+        """The converged state with what every room keeps of it."""
+        state = replace(state, last_increment=state.u - old.u)
+        for room in self.rooms:
+            state = state.remembering(room.accept(old, state))
+        if self.attraction.charging is not None:
+            state = state.remembering({"charges": self.charged(state, kept=False).charges})
+        return state.remembering(target.drive.settled(state))
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
@@ -88,7 +104,9 @@ class Equilibrium:
     def charged(self, state: State, *, kept: bool = True) -> Charged:
         """The electric state in `state`: with its charges, or with those that flow up to the step's end."""
         position, pressing = self.interface.resting(state), state.contact_force[:, 0]
-        return self.attraction.charged(position, state.voltage, pressing, state.charges if kept else None)
+        return self.attraction.charged(
+            position, state.voltage, pressing, state.memory["charges"] if kept else None
+        )
 
     def step(self, old: State, target: Target, start: State | None = None) -> State:
         """Equilibrium at `target`, friction counted from `old`; iterations begin at `start` (default `old`).
@@ -143,9 +161,7 @@ class Equilibrium:
 
     def _find(self, old: State, target: Target, start: State) -> State:
         """The iterations at the head of this file."""
-        target = target.begun(old)
-        self.interface.begin(old, target.duration)
-        target.voltage.begin(old)
+        target = self.begin(old, target)
         state = self.body.begin(old, target, start)
         residuals: list[float] = []
         self.record.residuals, changed = residuals, 0
@@ -176,7 +192,7 @@ class Equilibrium:
             raise Folded(FOLDED.format(place), self.record.residuals)
         if (margin := self.body.leaves(old, state, target)) is not None:
             raise Unstable(NOT_STABLE.format(margin.cause, margin.ratio))
-        return target.drive.settled(self.interface.aged(old, self.body.accepted(old, state)))
+        return self.accept(old, state, target)
 
     def _accepts(self, old: State, state: State, target: Target) -> bool:
         if not self.obeys_contact(old, state):

@@ -34,7 +34,6 @@ from evfem.newton.interface import Interface
 from evfem.newton.linearisation import Linearisation
 from evfem.newton.pressure import Pressure
 from evfem.newton.state import (
-    NO_PRESSURE,
     Balance,
     Limits,
     MixedBalance,
@@ -79,7 +78,7 @@ class FactorisedBody:
     def begin(self, old: State, target: Target, start: State) -> State:
         """Prepare everything for a step, and say where its iterations start."""
         self.linearisation.begin(old)
-        state = replace(self._first_guess(start, target), pressure=self.pressure.begin(start.u))
+        state = self._first_guess(start, target).remembering(self.pressure.first(start.u))
         travel = abs(target.bone(old.bone)[1] - old.bone[1])
         self.linearisation.choose_candidates(state, constants.REACH * travel)
         self.linearisation.start_clock(old, target.duration)
@@ -221,8 +220,7 @@ class FactorisedBody:
         moved = self._moved(state, target, update)
         if balance.mixed is None:
             return moved
-        pressure = self.pressure.after(state, balance.mixed.misfit, delta, update.fraction)
-        return replace(moved, pressure=pressure)
+        return moved.remembering(self.pressure.after(state, balance.mixed.misfit, delta, update.fraction))
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
@@ -291,8 +289,8 @@ class FactorisedBody:
         # attraction changed
         force = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
         given = c, update.contact.given, fraction
-        return replace(
-            after, **self.interface.bed.sunk(self.interface.positions(state.u), state, force, given)
+        return after.remembering(
+            self.interface.bed.sunk(self.interface.positions(state.u), state, force, given)
         )
 
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:
@@ -349,13 +347,6 @@ class FactorisedBody:
             return None
         return found if found.cause == SLOPES and found.ratio > 1.0 else None
 
-    def accepted(self, old: State, state: State) -> State:
-        """The converged state with its velocity, its increment and what branches keep of it."""
-        velocity, increment, rates = self.body.velocity(state.u), state.u - old.u, self.body.rates(state.u)
-        state = replace(state, velocity=velocity, last_increment=increment, inner=self.body.inner(state.u))
-        seconds = self.body.beginning[1] if rates.size else 0.0
-        return replace(state, rates=rates, seconds=seconds, pressure=NO_PRESSURE)
-
     def add_candidates(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""
         self.linearisation.choose_candidates(state, max(0.0, gap))
@@ -377,6 +368,6 @@ class FactorisedBody:
         """Make the factorisation again that the interrupted run had at hand."""
         self.linearisation.candidates = carried.candidates
         if (at := carried.tangent_point) is not None:
-            self.pressure.check(at.state.pressure)
+            self.pressure.check(at.state.memory.get("pressure", np.zeros((0, 0))))
             self.linearisation.restore(at)
         self.body.dynamics.step = carried.duration

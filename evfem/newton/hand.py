@@ -155,9 +155,9 @@ class Drive:
         """Speeds (mm/s) that are prescribed along x[, z] before and now; `bone`: those of the bone."""
         return list(bone)
 
-    def settled(self, state: State) -> State:
-        """The accepted state with what the drive keeps."""
-        return state
+    def settled(self, state: State) -> dict[str, Floats]:
+        """What the drive keeps of an accepted state."""
+        return {}
 
     def begin_at(self, start: dict[str, float], travelled: tuple[float, float]) -> dict[str, float]:
         """Where a motion starts, from where the bone is and how far the drive has `travelled` (mm)."""
@@ -226,7 +226,7 @@ class HandControl(Drive):
     def begun(self, old: State, drive: Floats, duration: float) -> HandControl:
         kept = old.memory["hand"]
         before, (along, moved, faster) = (kept[0], old.bone[::2], kept[1]), kept[3:]
-        difference = Difference.over(duration, old.seconds)
+        difference = Difference.over(duration, float(old.memory.get("seconds", 0.0)))
         rates = along, moved, faster
         return replace(
             self, drive=drive, duration=duration, before=before, rates=rates, difference=difference
@@ -282,13 +282,12 @@ class HandControl(Drive):
             found.append(ExtraUnknown(push, axis, force))
         return tuple(found)
 
-    def settled(self, state: State) -> State:
-        """The accepted state with what the hand keeps along x[, z], (6, d): the drive's place (mm), the
-        bone's velocity (mm/s), the drive's force (N/mm), mean rates of both places and that velocity.
+    def settled(self, state: State) -> dict[str, Floats]:
+        """Along x[, z], (6, d): the drive's place (mm), the bone's velocity (mm/s), the drive's force (N/mm),
+        mean rates of both places and that velocity.
         """
         x = state.bone[::2]
         ends = np.stack([self.drive, x, self.velocity(x)])
         changes = ends - self.before
         rates = changes / self.duration if self.duration > 0.0 else 0.0 * changes
-        kept = np.stack([self.drive, ends[2], self.driving(x), *rates])
-        return state.remembering(hand=kept)
+        return {"hand": np.stack([self.drive, ends[2], self.driving(x), *rates])}

@@ -11,7 +11,6 @@ and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,10 +20,10 @@ from evfem.common.arrays import Floats, Ints
 from evfem.contact.bed import bed_of
 from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
-from evfem.contact.slipping import OscillatingNodes
+from evfem.newton.friction import ProportionalFriction
 from evfem.newton.state import State
-from evfem.protocols import FrictionLaw
-from evfem.surface.friction import Slipping, with_core
+from evfem.rooms import Room
+from evfem.surface.friction import with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 from evfem.surface.ways import Steps
@@ -109,10 +108,11 @@ class Interface:
     dense compliance is large, the candidates follow the contact: those that are far by now are dropped.
     """
 
-    restored: Callable[[float], tuple[Floats, Floats] | None] = staticmethod(lambda voltage: None)
-    _surfaces: tuple[tuple[Floats, Floats, SurfaceState], ...] = ()
+    _surfaces: tuple[tuple[Floats, Any, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
+        none = np.zeros(pad.nodes.size)
+        self.restored: Callable[[float], tuple[Floats, Floats]] = lambda voltage: (none, none)
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
         self.points = points[pad.nodes]
         self.dim = points.shape[1]
@@ -124,16 +124,19 @@ class Interface:
         )
         self._least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
         self.bed = bed_of(surface, pad, self.length, self._least)
-        self.law: FrictionLaw | None = None
-        self._oscillating = OscillatingNodes(pad.nodes.size)
+        self.bounds = ProportionalFriction()
         self.duration = 0.0
         self.neighbourhood = constants.NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
         self.jumps.begin(self.on_display(old))
-        self._oscillating = OscillatingNodes(self.pad.nodes.size)
         self.duration = duration
+
+    @property
+    def rooms(self) -> tuple[Room, ...]:
+        """Bounds of friction and what is below the pad."""
+        return self.bounds, self.bed
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, dim) for displacements u (N, dim)."""
@@ -149,11 +152,12 @@ class Interface:
 
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, kept for the last two states."""
-        for u, given, found in self._surfaces:
-            if u is state.u and given is state.given:
+        sunk = self.bed.displacement(state)
+        for u, before, found in self._surfaces:
+            if u is state.u and before is sunk:
                 return found
         found = self.bed.sloped(surface_state(self.surface, self.places(state)), state)
-        self._surfaces = ((state.u, state.given, found), *self._surfaces[:1])
+        self._surfaces = ((state.u, sunk, found), *self._surfaces[:1])
         return found
 
     def tilted(self, state: State, force: Floats) -> Floats:
@@ -196,53 +200,18 @@ class Interface:
             negative_stiffness=negative_stiffness[c],
             gain_on_closing=gain_on_closing[c],
         )
-        return known if self.law is None else self._obeying(self.law, known, old, state, c)
-
-    def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
-        """The candidates c under a law of friction other than Coulomb's. Where the interface yields by C, a
-        node that slips under F(s), dF/ds = K, and moves by dx slips by ds = dx - C dF: friction grows by K dx
-        / (1 + K C). With the part of F that does not grow, slip and yielding are (1 + K C) times as large.
-        """
-        give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
-        size = sizes(known.slip + give[:, None] * known.force[:, 1:])
-        slip = np.where(known.status >= FORWARD, size, 0.0)
-        moving = self.slipping(old, state, c, known.friction, slip)
-        found = self._oscillating.linearised(law, moving, c, known.status, shear)
-        if self.dim == 3:  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
-            found = replace(found, by_speed=np.maximum(found.by_speed, 0.0))
-        by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
-        by_slip = by_speed / self.duration if self.duration > 0.0 else np.zeros_like(slip)
-        yielding = np.maximum(by_slip, 0.0) * give
-        series = 1.0 / (1.0 + yielding)
-        normal = np.maximum(known.force[:, 0], 0.0)
-        by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
-        along_normal, along_tangents = np.split(known.interface_compliance, [1], axis=1)
-        return replace(
-            known,
-            slip=known.slip / series[:, None],
-            interface_compliance=np.hstack([along_normal, along_tangents / series[:, None]]),
-            friction=series * found.slope,
-            cohesion=series * (found.offset + yielding * shear),
-            slip_stiffness=series * by_slip if self.duration > 0.0 else None,
-            friction_slope=(series * by_place)[:, None] * known.friction_slope,
-        )
-
-    def slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
-        """Data of a law of friction at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
-        speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
-        length = self.tributary(state)[nodes]
-        nodal = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
-        found = self.restored(state.voltage)
-        return nodal if found is None else replace(nodal, withheld=found[0][nodes], left=found[1][nodes])
+        return self.bounds.linearised(self, known, old, state, c)
 
     def withheld(self, state: State) -> Floats:
         """Part of attraction and pressing force of closed nodes (P,) that a core takes away, N/mm."""
-        found = self.restored(state.voltage)
-        if found is None:
-            return np.zeros(len(self.points))
         length = self.tributary(state)
         pressure = np.maximum(state.contact_force[:, 0], 0.0) / length
-        return np.where(state.touching, with_core(pressure, *found) * length, 0.0)
+        return np.where(state.touching, with_core(pressure, *self.core(state)) * length, 0.0)
+
+    def core(self, state: State) -> tuple[Floats, Floats]:
+        """Of closed nodes' attraction (P,) in MPa what a regularised law takes away, and leaves (above 0)."""
+        withheld, left = self.restored(state.voltage)
+        return withheld, np.where(withheld > 0.0, left, 1.0)
 
     def tributary_of(self, position: Floats) -> Floats:
         """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
@@ -258,22 +227,9 @@ class Interface:
             return self.tributary_of(place)
         return np.asarray(0.5 * sum(map(self.tributary, part)))
 
-    def age(self, old: State) -> Floats:
-        """Contact time of every pad node at the end of the step from `old`, (P,) in s."""
-        return np.where(old.touching, old.age + self.duration, 0.0)
-
-    def aged(self, old: State, state: State) -> State:
-        """The accepted state, with contact times if a law of friction is given."""
-        return state if self.law is None else replace(state, age=self.age(old))
-
     def resistance(self, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats) -> Floats:
         """Largest shear forces of the pad nodes (P,) at places (P, d), pressed and slipping by (P,)."""
-        old, new = part
-        mu = self.friction(old, nodes := np.arange(len(place)), place)
-        if self.law is None:
-            return np.asarray(mu * normal)
-        nodal = self.slipping(old, new, nodes, mu, slip)
-        return replace(nodal, normal=normal, length=self.tributary_at(part, place)).bound(self.law)
+        return self.bounds.resistance(self, part, place, normal, slip)
 
     def limit(self, old: State, state: State, place: Floats, slip: Floats) -> Floats:
         """Bounds of friction (P,) in N/mm of the pad nodes at places (P, d), slipping by (P,)."""
@@ -282,9 +238,7 @@ class Interface:
 
     def _bound(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
         """The same of some nodes (k,) with the coefficients mu (k,), slipping by (k,)."""
-        if self.law is None:
-            return np.asarray(mu * state.contact_force[nodes, 0])
-        return self.slipping(old, state, nodes, mu, slip).bound(self.law)
+        return self.bounds.bound(self, old, state, nodes, mu, slip)
 
     def compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""

@@ -27,7 +27,7 @@ from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
 from evfem.newton.condensation import Singular, make_condensation
 from evfem.newton.interface import Interface
-from evfem.newton.state import Limits, Record, State, StepFailed, TangentPoint
+from evfem.newton.state import NOTHING, Beginning, Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import surface_state
 from evfem.tissue.body import Body
 
@@ -76,6 +76,7 @@ class Linearisation:
         self.stiffest = 0.0
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self._made_at: TangentPoint | None = None
+        self._begin = Beginning(np.zeros((0, 0)), NOTHING)
         self._outdated = False
         self._lets_go = True
         self._status: Ints = np.zeros(0, dtype=np.int64)
@@ -90,12 +91,12 @@ class Linearisation:
             self.fringes, self._made_at = False, None
 
     def start_clock(self, old: State, duration: float) -> None:
-        """Start the clock of a step; a factorisation for a much different duration is outdated."""
+        """A factorisation for a much different duration than that of the step from `old` is outdated."""
         dynamics = self.body.dynamics
         self._outdated |= self.body.drag_rate != self._drag_rate
         if self._made_at is not None:
             self._outdated |= dynamics.outdates(self._made_at.duration, duration)
-        dynamics.begin(old.u, old.velocity, duration, old.inner, old.past)
+        self._begin = Beginning(old.u, old.memory)
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
@@ -166,7 +167,7 @@ class Linearisation:
             single = kept.size >= constants.LARGE_SCHUR
             self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, single)
             self.record.backend = type(self.factor).__name__
-        pressure = state.pressure if state.pressure.size else None
+        pressure = state.memory.get("pressure")
         upper = self.body.tangent(state.u, pressure)
         if self.interface.follows:
             self._weaken(upper, state)
@@ -177,7 +178,7 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        self._made_at = TangentPoint(state, self.touching, *self.body.beginning)
+        self._made_at = TangentPoint(state, self.touching, self._begin, self.body.dynamics.step)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
@@ -201,7 +202,8 @@ class Linearisation:
     def restore(self, at: TangentPoint) -> None:
         """Repeats the factorisation that the run that is resumed made at `at`."""
         self.touching = at.touched
-        self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration, at.inner, at.past)
+        self._begin = at.begin
+        self.body.begin(at.begin, at.duration)
         self.factorise(at.state)
 
     def _too_old(self, history: list[float]) -> bool:

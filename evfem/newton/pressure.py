@@ -17,17 +17,24 @@ Methods Appl. Mech. Eng. 313 (2017) 986-1005 (stresses of displacement elements 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.errors import InputError
 from evfem.newton.linearisation import Linearisation
-from evfem.newton.state import NO_PRESSURE, State
+from evfem.newton.state import State
+from evfem.rooms import Room
 from evfem.tissue.weakform import Tissue
+
+#: the pressure between two substeps
+NO_PRESSURE: Floats = np.zeros((0, 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Pressure:
-    """The pressure as an unknown beside u, if nearly incompressible and not without (0, 0) values."""
+class Pressure(Room):
+    """The pressure as an unknown beside u, if nearly incompressible: `pressure` of an iterate's memory."""
 
     tissue: Tissue
     linearisation: Linearisation
@@ -41,15 +48,28 @@ class Pressure:
         """Refuse a pressure from a checkpoint that has not one value for each point."""
         expected = self.tissue.space.weight.shape if self.active else NO_PRESSURE.shape
         if q.shape != expected:
-            raise InputError("checkpoint", "no usable factor_pressure", f"numbers of the shape {expected}")
+            raise InputError(
+                "checkpoint", "no usable factor_memory.pressure", f"numbers of the shape {expected}"
+            )
 
-    def begin(self, u: Floats) -> Floats:
+    def memory(self, state: Any) -> dict[str, Floats]:
+        return {"pressure": NO_PRESSURE} if self.active else {}
+
+    def accept(self, old: Any, new: Any) -> dict[str, Floats]:
+        return self.memory(new)
+
+    def of(self, state: State) -> Floats | None:
+        """The iterate's, None where it is no unknown."""
+        found = state.memory.get("pressure", NO_PRESSURE)
+        return found if found.size else None
+
+    def first(self, u: Floats) -> dict[str, Floats]:
         """The first iterate of a step from an equilibrium at u (N, 2)."""
-        return self.tissue.pressure(u) if self.active else NO_PRESSURE
+        return {"pressure": self.tissue.pressure(u)} if self.active else {}
 
     def misfit(self, state: State) -> Floats:
         """Residual of the pressure, q(u) - q."""
-        return self.tissue.pressure(state.u) - state.pressure if self.active else NO_PRESSURE
+        return self.tissue.pressure(state.u) - state.memory["pressure"]
 
     def further_forces(self, state: State, misfit: Floats) -> Floats | None:
         """Forces (N, 2) of the misfit along the older tangent's volume less the present one's, or None."""
@@ -58,10 +78,10 @@ class Pressure:
             return None
         return self.tissue.pressure_forces(at.state.u, misfit) - self.tissue.pressure_forces(state.u, misfit)
 
-    def after(self, state: State, misfit: Floats, du: Floats, fraction: float) -> Floats:
-        """The next pressure, after the fraction of an increment du (N, 2) of the displacements."""
+    def after(self, state: State, misfit: Floats, du: Floats, fraction: float) -> dict[str, Floats]:
+        """The next iterate, after the fraction of an increment du (N, 2) of the displacements."""
         at = self.linearisation.reusable
         if not self.active or at is None:
-            return state.pressure
+            return {}
         change: Floats = misfit + self.tissue.pressure_change(at.state.u, du)
-        return state.pressure + fraction * change
+        return {"pressure": state.memory["pressure"] + fraction * change}

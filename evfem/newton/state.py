@@ -14,16 +14,9 @@ from evfem.common.constants import NAMED
 from evfem.contact.signorini import OPEN, STICK
 from evfem.newton.strategy import Strategy
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES, Past
 
-#: the pressure where it is no unknown of the iterations
-NO_PRESSURE: Floats = np.zeros((0, 0))
-#: the time since a node touched where nothing depends on it
-NO_AGE: Floats = np.zeros(0)
-#: what a rigid surface gives way by, and its change along x
-NO_BED: Floats = np.zeros((0, 2))
-#: the charges where the voltage is not resolved in time
-NO_CHARGES: Floats = np.zeros((2, 0))
+#: what rooms keep where none keeps anything
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class StepFailed(ArithmeticError):
@@ -52,15 +45,9 @@ class State:
     """A configuration of a body with N nodes, P of them on the pad.
 
     Displacements u (N, 2) in mm, contact forces along normal and tangent (P, 2) in N/mm and statuses (P,),
-    the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,),
-    velocities (N, 2) in mm/s, and the increment of the step that led here (N, 2). While iterations have a
-    pressure as an unknown, that (E, Q) in MPa (`evfem.newton.pressure`). With a law of friction other than
-    Coulomb's `age` (P,) in s; under a voltage resolved in time charges over eps_0 (M, P) in V/mm. What a term
-    keeps from part to part is in its `memory`, by the term's name. Maxwell branches keep `inner`
-    (`evfem.tissue.branches`). Tissue with mass keeps the mean `rates` of the part that led here and its
-    `seconds`, 0 where the next one does not go on from it (`evfem.tissue.dynamics`). What an elastic surface
-    adds to the places of the pad's nodes relative to it is `given` (P, dim) in mm, its derivatives along x[,
-    z] `strain` (P, d, dim).
+    the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,), and the
+    increment of the substep that led here (N, 2). What rooms keep from substep to substep is in `memory`, by
+    the names that the rooms gave (`evfem.rooms`).
     """
 
     u: Floats
@@ -70,25 +57,16 @@ class State:
     voltage: float
     attraction: Floats
     reaction: Floats
-    velocity: Floats
     last_increment: Floats
-    pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
-    age: Floats = field(default_factory=lambda: NO_AGE)
-    charges: Floats = field(default_factory=lambda: NO_CHARGES)
-    inner: Floats = field(default_factory=lambda: NO_BRANCHES)
-    rates: Floats = field(default_factory=lambda: NO_RATES)
-    seconds: float = 0.0
-    given: Floats = field(default_factory=lambda: NO_BED)
-    strain: Floats = field(default_factory=lambda: NO_BED)
-    memory: Mapping[str, Floats] = field(default_factory=lambda: MappingProxyType({}))
+    memory: Mapping[str, Any] = field(default_factory=lambda: NOTHING)
 
-    def remembering(self, **kept: Floats) -> State:
-        """The state with what terms keep of it."""
-        return replace(self, memory=MappingProxyType({**self.memory, **kept}))
+    def remembering(self, kept: Mapping[str, Any]) -> State:
+        """The state with what rooms keep of it."""
+        return replace(self, memory=MappingProxyType({**self.memory, **kept})) if kept else self
 
     @property
     def parts(self) -> dict[str, Any]:
-        """All of it by name, what terms keep as `memory.term`."""
+        """All of it by name, what rooms keep as `memory.name`."""
         own = {spec.name: getattr(self, spec.name) for spec in fields(self) if spec.name != "memory"}
         return own | {f"memory.{name}": kept for name, kept in self.memory.items()}
 
@@ -96,12 +74,7 @@ class State:
         """The state with some of its `parts` replaced."""
         kept = {name.partition(".")[2]: value for name, value in parts.items() if "." in name}
         own = {name: value for name, value in parts.items() if "." not in name}
-        return replace(self, **own).remembering(**kept) if kept else replace(self, **own)
-
-    @property
-    def past(self) -> Past:
-        """The part that led here, as the next one counts it."""
-        return Past(self.seconds, self.rates)
+        return replace(self, **own).remembering(kept)
 
     @property
     def unit(self) -> str:
@@ -115,18 +88,23 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
+class Beginning:
+    """Of the state that a step began with what the body's terms count from: u (N, dim) and memory."""
+
+    u: Floats
+    memory: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was made: at an iterate, with the pad nodes that `touched` (P,) when the step began;
-    of the time step the displacements (N, dim) that it began with, its seconds, what branches had kept, and
-    the part before (`Body.beginning`).
+    """Where a tangent was made: at an iterate, with the pad nodes that `touched` (P,) when the step began,
+    where it began, and its seconds.
     """
 
     state: State
     touched: Any
-    begin: Floats
+    begin: Beginning
     duration: float
-    inner: Floats
-    past: Past
 
 
 @dataclass(frozen=True, eq=False)

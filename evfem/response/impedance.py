@@ -45,7 +45,6 @@ from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.simulation.result import Result
 from evfem.simulation.run import Run
-from evfem.tensor import derivative
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
 
 AXES = ("normal", "tangential")
@@ -267,24 +266,19 @@ class Contact:
     def _before(self) -> State:
         """The state that the last part began with, as far as friction asks for it."""
         state = self.state
-        age = state.age - self.interface.duration if state.age.size else state.age
-        return replace(state, u=state.u - state.last_increment, age=age)
+        kept = state.memory.get("contact_time")
+        aged = {} if kept is None else {"contact_time": kept - self.interface.duration}
+        return replace(state, u=state.u - state.last_increment).remembering(aged)
 
     def _friction(self, old: State) -> None:
         """The largest shear force of slipping nodes and its derivatives, (k,), 0 of others."""
         c, state, interface = self.nodes, self.state, self.interface
         place = interface.on_display(state)[c]
-        mu, normal = interface.friction(old, c, place), np.maximum(state.contact_force[c, 0], 0.0)
+        mu = interface.friction(old, c, place)
         way = np.where(self.slips, sizes(interface.slip(old, state)[c]), 0.0)
-        bound, by_normal, by_mu, by_speed, by_length = mu * normal, mu, normal, 0.0 * mu, 0.0 * mu
         speed = way / interface.duration if interface.duration > 0.0 else 0.0 * way
-        if (law := interface.law) is not None:
-            seen = interface.slipping(old, state, c, mu, way)
-            found, bound = seen.linearised(law), seen.bound(law)
-            by_mu, by_speed = found.by_mu, found.by_speed
-            by_normal = derivative(lambda N: replace(seen, normal=N).bound(law), normal, FORCE_STEP)
-            by_length = derivative(lambda A: replace(seen, length=A).bound(law), seen.length, LENGTH_STEP)
-        each = (bound, by_normal, by_mu, by_speed, by_length, speed)
+        found = interface.bounds.slopes(interface, old, state, c, mu, way)
+        each = (found.bound, found.by_normal, found.by_mu, found.by_speed, found.by_length, speed)
         of_slips = (np.where(self.slips, value, 0.0) for value in each)
         self.bound, self.by_normal, by_mu, self.by_speed, self.by_length, self.speed = of_slips
         self.by_place = by_mu[:, None] * interface.surface.friction_gradient(place)

@@ -48,9 +48,9 @@ FAR = 4.0
 #: fall with the matrix of another part
 ROUNDS, DONE, ROUNDING, NOISE, WRONG, SLOW = 30, 1e-13, 1e-7, 0.5, 1e-6, 0.01
 #: the unknowns of a part, and what follows from them where the surface is elastic
-UNKNOWN, SUNK = ("u", "bone", "contact_force"), ("given", "strain")
+UNKNOWN, SUNK = ("u", "bone", "contact_force"), ("memory.surface_displacement", "memory.surface_gradient")
 #: what of a state knows the kinks of the attraction
-NEARBY = ("attraction", "charges")
+NEARBY = ("attraction", "memory.charges")
 TIED = "several nodes touch the surface first, and which one is next depends on the sign of the change"
 LOST = "the linear equations of step {} were not solved"
 #: how columns with units end that are counted all the same
@@ -220,7 +220,8 @@ class Line:
         """Take the derivatives to the end of a part; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(part, jumps, part.old) for one in self.beside]
         voltage = difference([one.target.voltage.voltage for one in equations], self.step)
-        change: Change = {name: np.zeros_like(getattr(part.new, name)) for name in (*UNKNOWN, *SUNK)}
+        kept = part.new.parts
+        change: Change = {name: np.zeros_like(kept[name]) for name in (*UNKNOWN, *SUNK) if name in kept}
         change["voltage"] = float(voltage)
         sunk = self._sunk(part, equations)
         by_parameter, reaction = self._partial(part, equations, jumps)
@@ -264,10 +265,11 @@ class Line:
     def _sink(self, part: Accepted, jumps: Jumps, change: Change, by_parameter: list[Any]) -> float:
         """Take what an elastic surface gives way by along with the rest; returns its relative change."""
         along = self._slopes(part, jumps, change, self._way(part, change), Equations.sunk)
-        before, usual = change["given"], STEP / self.longest * np.abs(part.new.given).max()
+        before = change[SUNK[0]]
+        usual = STEP / self.longest * np.abs(part.new.parts[SUNK[0]]).max()
         change |= {name: by_parameter[i] + along[i] for i, name in enumerate(SUNK)}
-        largest = max(np.abs(change["given"]).max(), usual, 1e-300)
-        return float(np.abs(change["given"] - before).max() / largest)
+        largest = max(np.abs(change[SUNK[0]]).max(), usual, 1e-300)
+        return float(np.abs(change[SUNK[0]] - before).max() / largest)
 
     def _add(self, change: Change, more: Floats) -> None:
         """Add a solution (m,) of a part's equations to a derivative."""
@@ -304,11 +306,10 @@ class Line:
         model = self.centre.run.model
         slope = model.equilibrium.interface.surface_at(part.new).slope
         moves = change["u"][model.pad.nodes]
-        if change["given"].size:
-            moves = moves + change["given"]
+        moves = moves + change.get(SUNK[0], 0.0)
         rate = np.maximum(np.abs(moves[:, 1] - np.sum(slope * moves[:, ::2], axis=1)), 1e-300)
         nearest = min(float((self.lengths(part.new) / rate).min()), NEAR * reach)
-        if model.equilibrium.interface.law is not None:
+        if model.equilibrium.interface.bounds.kinked:
             force, changed = part.new.contact_force[:, 0], np.abs(change["contact_force"][:, 0])
             pressed = force / np.maximum(changed, 1e-300)
             nearest = min(nearest, PRESSED * float(pressed[force > 0.0].min(initial=np.inf)))

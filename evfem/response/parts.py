@@ -43,15 +43,8 @@ class Equations:
         """Start the part from `old`: velocities, branches, charges and slips count from there; `pins`
         (P, d) are places of nodes that a jump of friction holds, else nan.
         """
-        target = target.begun(old)
-        interface, attraction = model.equilibrium.interface, model.attraction
-        interface.begin(old, target.duration)
-        interface.jumps.place = pins
-        model.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
-        if attraction.charging is not None:
-            pressing = old.contact_force[:, 0]
-            charged = attraction.charged(interface.resting(old), old.voltage, pressing, old.charges)
-            attraction.charging.begin(charged, target.duration)
+        target = model.equilibrium.begin(old, target)
+        model.equilibrium.interface.jumps.place = pins
         return cls(model, old, target)
 
     @property
@@ -65,20 +58,14 @@ class Equations:
         return replace(state, attraction=attraction)
 
     def sunk(self, state: State) -> tuple[Floats, Floats]:
-        """What an elastic surface adds to the nodes' places, as `State.given` and `strain`."""
+        """What an elastic surface adds to the nodes' places, and its gradient (`evfem.contact.bed`)."""
         force = self.interface.contact_forces(state) + self._attracted(state).attraction
         below = self.interface.bed.under(self.interface.positions(state.u), state)
         return below.given(force), below.change(force)
 
     def ended(self, state: State) -> State:
         """The state as the run would accept it, its reaction left, with the history that it leaves behind."""
-        state, attraction = self._attracted(state), self.model.attraction
-        state = self.interface.aged(self.old, self.model.equilibrium.body.accepted(self.old, state))
-        state = self.target.drive.settled(state)
-        if attraction.charging is None:
-            return state
-        resting, pressing = self.interface.resting(state), state.contact_force[:, 0]
-        return replace(state, charges=attraction.charged(resting, state.voltage, pressing).charges)
+        return self.model.equilibrium.accept(self.old, self._attracted(state), self.target)
 
     def smooth(self, state: State) -> tuple[Floats, Floats]:
         """The part of R (m,) that is smooth over long ways, and its reaction (dim,)."""

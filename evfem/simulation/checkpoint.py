@@ -21,22 +21,21 @@ import evfem
 from evfem.common.checks import plain
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
-from evfem.newton.state import Reusable, State, TangentPoint
+from evfem.newton.state import Beginning, Reusable, State, TangentPoint
 from evfem.simulation.history import COLUMNS, NEEDED, SUMS, columns_of
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
-from evfem.tissue.dynamics import Past
 
-CHECKPOINT_FORMAT = "evfem-checkpoint-8"
+CHECKPOINT_FORMAT = "evfem-checkpoint-9"
 ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
 #: name of what was found at the points of all probes after each step (S, P, K)
 PROBES = "probes"
 #: arrays whose size a run that has just been set up does not know
-OF_ANY_SIZE = ("candidates", "factor_pressure", "came_off", PROBES)
+OF_ANY_SIZE = ("candidates", "factor_memory.pressure", "came_off", PROBES)
 
 
 def state_arrays(state: State) -> dict[str, Any]:
@@ -46,12 +45,12 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """Data of the solver for the next step; of the same shapes with and without a factorisation."""
-    nowhere = TangentPoint(state, state.touching, state.u, 0.0, state.inner, state.past)
+    nowhere = TangentPoint(state, state.touching, Beginning(state.u, state.memory), 0.0)
     at = carried.tangent_point or nowhere
     parts = {"candidates": carried.candidates, "duration": carried.duration, "factorised": at is not nowhere}
     parts |= {f"factor_{name}": part for name, part in state_arrays(at.state).items()}
-    parts |= {"touched": at.touched, "begun_u": at.begin, "begun_inner": at.inner}
-    parts |= {"begun_seconds": at.duration, "past_seconds": at.past.seconds, "past_rates": at.past.rates}
+    parts |= {"touched": at.touched, "factor_seconds": at.duration, "begun_u": at.begin.u}
+    parts |= {f"begun_memory.{name}": kept for name, kept in at.begin.memory.items()}
     return {name: np.asarray(part) for name, part in parts.items()}
 
 
@@ -61,9 +60,10 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
     if arrays["factorised"]:
         parts = {name.removeprefix("factor_"): part for name, part in arrays.items()}
         made = state_of({name: part for name, part in parts.items() if f"factor_{name}" in arrays})
-        past = Past(float(arrays["past_seconds"]), arrays["past_rates"])
-        begun = arrays["begun_u"], float(arrays["begun_seconds"]), arrays["begun_inner"], past
-        at = TangentPoint(made, arrays["touched"], *begun)
+        own = "begun_memory."
+        kept = {name.removeprefix(own): part for name, part in arrays.items() if name.startswith(own)}
+        begin = Beginning(arrays["begun_u"], kept)
+        at = TangentPoint(made, arrays["touched"], begin, float(arrays["factor_seconds"]))
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
 
@@ -126,7 +126,7 @@ def _unusable(name: str) -> InputError:
 def state_of(arrays: Mapping[str, np.ndarray]) -> State:
     """The state in the arrays of a checkpoint."""
     own: dict[str, Any] = {spec.name: arrays[spec.name] for spec in fields(State) if spec.name in arrays}
-    state = State(**own | {name: float(arrays[name]) for name in ("voltage", "seconds")})
+    state = State(**own | {"voltage": float(arrays["voltage"])})
     return state.with_parts({name: part for name, part in arrays.items() if name.startswith("memory.")})
 
 

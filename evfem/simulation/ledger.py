@@ -103,7 +103,7 @@ class Ledger:
             **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
-            "surface_sink": max(0.0, float(state.given[:, 1].max(initial=0.0))),
+            "surface_sink": max(0.0, float(model.equilibrium.interface.bed.sink(state).max(initial=0.0))),
             "peak_contact_pressure": float((pressing / shares(model, position)).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
@@ -118,12 +118,10 @@ class Ledger:
         found: dict[str, tuple[Floats, float]] = dict.fromkeys(PULLS, (none, 0.0))
         rest, kept = state.attraction, withheld
         acting = [part for part in model.attraction.parts if part.acts(state.voltage)]
-        both = model.attraction.restored(state.voltage)
+        both = model.attraction.restored(state.voltage)[0]
         for part in acting[:0:-1]:
-            own, left = model.equilibrium.pull_of(part, state), part.restored(part.load(state.voltage))
-            share = (
-                0.0 if left is None or both is None else left[0] / np.where(both[0] > 0.0, both[0], np.inf)
-            )
+            own, left = model.equilibrium.pull_of(part, state), part.restored(part.load(state.voltage))[0]
+            share = left / np.where(both > 0.0, both, np.inf)
             pull = model.equilibrium.interface.tilted(state, own)
             found[part.name] = pull.sum(axis=0), float(np.sum(share * withheld))
             rest, kept = rest - pull, kept - share * withheld
@@ -199,7 +197,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
         shear_traction=on_pad(_shear(state) / share, 0.0),
         electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
-        surface_sink=on_pad(state.given[:, 1] if state.given.size else 0.0, 0.0),
+        surface_sink=on_pad(interface.bed.sink(state), 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),
         von_mises=_von_mises(stress),
         cauchy_stress=stress,

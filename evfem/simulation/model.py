@@ -20,6 +20,7 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.factorised import FactorisedBody
+from evfem.newton.friction import LawFriction
 from evfem.newton.hand import Drive, drive_of
 from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits, State
@@ -62,7 +63,7 @@ class Model:
     @cached_property
     def terms(self) -> tuple[Any, ...]:
         """What has energies beside tissue, contact and attraction (`evfem.protocols.EnergyTerm`)."""
-        return (*self.body.dynamics.books, *self.drive.books)
+        return (*self.body.rooms, *self.drive.books)
 
     @cached_property
     def shear_modulus(self) -> Floats:
@@ -153,7 +154,7 @@ def make_interface(
     if cored:
         interface.restored = attraction.restored
     if cored or not isinstance(scene.friction_law, Coulomb):
-        interface.law = scene.friction_law
+        interface.bounds = LawFriction(scene.friction_law, pad.nodes.size)
     return interface
 
 

@@ -184,7 +184,7 @@ class Run:
         self.frames: list[Frame] = []
         self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
-        self.state = self.state.remembering(**self.model.drive.memory(self.state.bone.size))
+        self.state = self.state.remembering(self.model.drive.memory(self.state.bone.size))
         if resume is not None:
             self._restore(resume)
 
@@ -348,7 +348,9 @@ class Run:
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if self.probes is not None:
-            self.probed.append(self.probes.at(self.model.body.whole(self.state.u), self.state.inner))
+            self.probed.append(
+                self.probes.at(self.model.body.whole(self.state.u), self.state.memory.get("branches"))
+            )
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))

@@ -110,7 +110,8 @@ class Stepper:
             self._release = replace(self._release, trusted=self.substep, unstable=False)
             for target, new in parts:
                 if len(parts) > 1:
-                    self._restart(state, target)
+                    # others were tried since: works are those of the trial that began last
+                    self.equilibrium.begin(state, target)
                 self.snaps += bool(accounts.accept(state, new))
                 state, substeps = new, substeps + 1
             if self.allowed is not None:
@@ -175,12 +176,6 @@ class Stepper:
         half = self.solve(state, first)
         end = self.solve(half, second)
         return [(first, half), (second, end)], relative_difference(self.solve(state, whole, start=end), end)
-
-    def _restart(self, old: State, target: Target) -> None:
-        """Start the clocks from `old` to `target` again: others were tried, works are booked by the last."""
-        self.equilibrium.interface.begin(old, target.duration)
-        if self.body is not None:
-            self.body.dynamics.begin(old.u, old.velocity, target.duration, old.inner, old.past)
 
     def _relaxation(self, body: Body) -> Relaxation:
         return Relaxation(body, self.solve, self.equilibrium.attraction.charging is not None)
@@ -260,10 +255,4 @@ class Stepper:
         return not (target.voltage.free or target.voltage.follows) and self.rise(old, new, target) > CLIMB
 
     def _found(self, state: State, target: Target, start: State | None = None) -> State:
-        """One equilibrium; where charges move, they follow."""
-        attraction = self.equilibrium.attraction
-        if attraction.charging is None:
-            return self.equilibrium.step(state, target, start)
-        attraction.charging.begin(self.equilibrium.charged(state), target.duration)
-        new = self.equilibrium.step(state, target, start)
-        return replace(new, charges=self.equilibrium.charged(new, kept=False).charges)
+        return self.equilibrium.step(state, target, start)

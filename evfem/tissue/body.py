@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.tissue.dynamics import Dynamics, Past, Static
+from evfem.tissue.dynamics import Dynamics, Static
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
@@ -32,7 +32,7 @@ class Body:
     ) -> None:
         self.space = space
         self.tissue = Tissue(space, laws)
-        self.dynamics = dynamics or Static(space)
+        self.dynamics = dynamics or Static()
         self.given = tuple(terms)
         self.terms = (*terms, *self.dynamics.forms)
         self.drag_rate = 0.0
@@ -69,13 +69,13 @@ class Body:
         """From now on drag of this rate holds the body back at u (N, dim); none if it is 0."""
         self.drag_rate = rate
         if rate > 0.0:
-            self.drag.begin(u, np.zeros_like(u), 1.0 / rate)
+            self.drag.begin_from(u, np.zeros_like(u), 1.0 / rate)
 
     def drag_dissipation(self, u: Floats) -> float:
         """Dissipation by drag in the step that ends at u: N mm, in the plane per mm of depth."""
         if self.drag_rate == 0.0:
             return 0.0
-        return self.drag.dissipation(u) + 2.0 * self.drag.kinetic_energy(self.drag.velocity(u))
+        return self.drag.damping(u) + 2.0 * self.drag.kinetic_energy(self.drag.velocity(u))
 
     def reduce(self, nodal: Floats) -> Floats:
         """Nodal forces (N, dim) to reduced forces (n,): sums over the bone."""
@@ -119,34 +119,20 @@ class Body:
         """Displacements (N, dim) of all nodes in a state that has u: here the same."""
         return u
 
-    def velocity(self, u: Floats) -> Floats:
-        """Nodal velocities (N, dim) at the end of a step that ends at u."""
-        return self.dynamics.velocity(u)
-
     @property
-    def beginning(self) -> tuple[Floats, float, Floats, Past]:
-        """Displacements (N, dim) that the step began with, its seconds, what branches had kept, and the part
-        before.
-        """
-        return self.dynamics.beginning
+    def rooms(self) -> tuple[Any, ...]:
+        """Its terms that keep something from substep to substep, or have energies of their own."""
+        return (self.dynamics,)
 
-    def rates(self, u: Floats) -> Floats:
-        """Mean velocities and accelerations (2, N, dim) over the step that ends at u (N, dim), with mass."""
-        return self.dynamics.rates(u)
+    def begin(self, old: Any, seconds: float) -> None:
+        """A trial of so many seconds begins from an accepted state, or what is kept of it."""
+        for room in self.rooms:
+            room.begin(old, seconds)
 
     @property
     def branches(self) -> Any:
         """The Maxwell branches of the tissue, or None."""
         return self.dynamics.branches
-
-    @property
-    def at_rest(self) -> Floats:
-        """What branches keep of the undeformed body."""
-        return self.dynamics.at_rest
-
-    def inner(self, u: Floats) -> Floats:
-        """What branches keep of a step that ends at u (N, dim)."""
-        return self.dynamics.inner(u)
 
     def energy(self, u: Floats) -> float:
         """Stored energy of the tissue: N mm, in the plane per mm of depth."""

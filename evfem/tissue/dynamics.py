@@ -39,6 +39,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import LONGER, SHORTER
+from evfem.rooms import Room
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
 from evfem.tissue.branches import Branches, branches_of, make_branches
@@ -89,24 +90,12 @@ class Difference:
         return cls((1.0 + 2.0 * ratio) / (1.0 + ratio), ratio / (1.0 + ratio))
 
 
-class Static:
+class Static(Room):
     """Tissue without viscosity and mass: no time passes in it. Answers what `Dynamics` does."""
 
-    acts, mass, branches, at_rest, step = False, None, None, NO_BRANCHES, 0.0
-    #: further terms of the internal forces, and of the books
+    acts, mass, branches, viscosity, step = False, None, None, None, 0.0
+    #: further terms of the internal forces
     forms: tuple[Any, ...] = ()
-    books: tuple[Any, ...] = ()
-
-    def __init__(self, space: Space) -> None:
-        self._still = np.zeros((space.size, space.dim))
-
-    def begin(self, *begun: Any) -> None:
-        """A step begins: nothing counts from there."""
-
-    @property
-    def beginning(self) -> tuple[Floats, float, Floats, Past]:
-        """As of `Dynamics`."""
-        return self._still, 0.0, NO_BRANCHES, Past()
 
     def still(self, duration: float) -> bool:
         """Whether tissue takes no time in a step of `duration` seconds."""
@@ -116,22 +105,10 @@ class Static:
         """Whether a tangent made for a step of `made_for` seconds is too old for one of `duration`."""
         return False
 
-    def velocity(self, u: Floats) -> Floats:
-        """Nodal velocities (N, dim) in mm/s."""
-        return np.zeros_like(u)
 
-    def rates(self, u: Floats) -> Floats:
-        """None count."""
-        return NO_RATES
-
-    def inner(self, u: Floats) -> Floats:
-        """No branches keep anything."""
-        return NO_BRANCHES
-
-
-class Dynamics:
+class Dynamics(Room):
     """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other
-    term of the internal forces.
+    term of the internal forces. Branches keep `branches` (`evfem.tissue.branches`) in a state's memory.
 
     A class with a `name` is one of `DYNAMICS`. `inertia`: whether tissue has mass; `difference` of the step.
     """
@@ -158,7 +135,7 @@ class Dynamics:
         self.loops = loops(space.dim) if viscosity is not None else None
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, space.dim))
-        self._inner0, self._start, self.past = self.at_rest, self._v0, Past()
+        self._start, self.past = self._v0, Past()
         self._strain0: Any = None  # what the stress counts from
         self._strain_begun: Any = None
 
@@ -167,19 +144,9 @@ class Dynamics:
         return mass_matrices(self.space)
 
     @property
-    def at_rest(self) -> Floats:
-        """What the branches keep of the undeformed body."""
-        return NO_BRANCHES if self.branches is None else self.branches.at_rest
-
-    @property
     def forms(self) -> tuple[Any, ...]:
         """Further terms of the internal forces."""
         return (self,)
-
-    @property
-    def books(self) -> tuple[Any, ...]:
-        """Further terms of the books."""
-        return (TimeTerm(self),)
 
     def still(self, duration: float) -> bool:
         """Whether tissue takes no time in a step of `duration` seconds."""
@@ -189,7 +156,17 @@ class Dynamics:
         """Whether a tangent made for a step of `made_for` seconds is too old for one of `duration`."""
         return not SHORTER * made_for <= duration <= LONGER * made_for
 
-    def begin(
+    def memory(self, state: Any) -> dict[str, Floats]:
+        return {} if self.branches is None else {"branches": self.branches.at_rest}
+
+    def begin(self, old: Any, seconds: float) -> None:
+        inner = old.memory.get("branches", NO_BRANCHES)
+        self.begin_from(old.u, np.zeros_like(old.u), seconds, inner)
+
+    def accept(self, old: Any, new: Any) -> dict[str, Floats]:
+        return {} if self.branches is None else {"branches": self.branches.inner(new.u)}
+
+    def begin_from(
         self,
         u: Floats,
         velocity: Floats,
@@ -200,7 +177,7 @@ class Dynamics:
         """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N,
         dim), what the branches kept, and the part before.
         """
-        self.step, self._u0, self._v0, self._inner0 = step, u, velocity, inner
+        self.step, self._u0, self._v0 = step, u, velocity
         self.past = past or Past()
         if self.branches is not None:
             self.branches.begin(u, inner, step)
@@ -235,13 +212,6 @@ class Dynamics:
         return Integral(
             kelvin_voigt, points_of(self.space, cells), Parts(self.space.dim, grad=True), w, at_once=True
         )
-
-    @property
-    def beginning(self) -> tuple[Floats, float, Floats, Past]:
-        """Displacements (N, dim) that the step began with, its seconds, what the branches had kept, and the
-        part before.
-        """
-        return self._u0, self.step, self._inner0, self.past
 
     def forces(self, u: Floats) -> Floats:
         """Nodal forces (N, dim)."""
@@ -280,25 +250,15 @@ class Dynamics:
         lag = self.difference.lag
         return self.difference.share * mean - lag * self.past.rates[0] if lag else mean
 
-    def rates(self, u: Floats) -> Floats:
-        """Mean velocities and accelerations (2, N, dim) over a step that ends at u, of tissue with mass."""
-        return NO_RATES
+    def stored(self, state: Any) -> float:
+        return 0.0 if self.branches is None else self.branches.energy(state.u)
 
-    def inner(self, u: Floats) -> Floats:
-        """What the branches keep of a step that ends at u (N, dim)."""
-        return NO_BRANCHES if self.branches is None else self.branches.inner(u)
-
-    def branch_energy(self, u: Floats) -> float:
-        """What the branches store at the end of the step: N mm, in the plane per mm of depth."""
-        return 0.0 if self.branches is None else self.branches.energy(u)
-
-    def dissipation(self, u: Floats) -> float:
-        """What tissue loses in the step: N mm, in the plane per mm of depth."""
-        damped = self.damping(u)
-        return damped if self.branches is None else damped + self.branches.dissipation(u)
+    def dissipation(self, old: Any, new: Any, seconds: float) -> float:
+        damped = self.damping(new.u)
+        return damped if self.branches is None else damped + self.branches.dissipation(new.u)
 
     def damping(self, u: Floats) -> float:
-        """The share of the Kelvin-Voigt stress in `dissipation`."""
+        """Dissipation by the Kelvin-Voigt stress in the step that ends at u (N mm)."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
         return self._damping_from(self._strain_begun, self.step, u)
@@ -313,7 +273,14 @@ class Dynamics:
         power = 2.0 * damping.w.eta / seconds * ddot(change, change)[0]
         return float(np.sum(power * damping.points.weight))
 
-    def potential(self, u: Floats, way: Floats, places: Floats) -> Floats:
+    def potential(self, old: Any, new: Any, fractions: Floats) -> Floats:
+        held = self.potential_along(old.u, new.u - old.u, fractions)
+        return held - held[0]
+
+    def takes_time(self, seconds: float) -> bool:
+        return self.step > 0.0
+
+    def potential_along(self, u: Floats, way: Floats, places: Floats) -> Floats:
         """What the forces of the step are the derivative of, at u plus the shares `places` (w,) of a way (N,
         dim): (w,) in N mm, in the plane per mm of depth.
         """
@@ -327,7 +294,7 @@ class Dynamics:
         return held + [self.kinetic_energy(rate * (s * way - begun)) for s in places]
 
     def _damped_potential(self, u: Floats, way: Floats, places: Floats) -> Floats:
-        """The share of the Kelvin-Voigt stress in `potential`, of strain that grows evenly."""
+        """Of the Kelvin-Voigt stress in `potential_along`, of strain that grows evenly."""
         return 0.5 * self.damping(u + way) * places**2
 
     def kinetic_energy(self, velocity: Floats) -> float:
@@ -360,41 +327,37 @@ class Dynamics:
 DYNAMICS["viscous"] = Dynamics
 
 
-@dataclass(frozen=True, eq=False)
-class TimeTerm:
-    """The books of `dynamics` (`evfem.protocols.EnergyTerm`)."""
-
-    dynamics: Dynamics
-
-    def stored(self, state: Any) -> float:
-        return self.dynamics.branch_energy(state.u)
-
-    def kinetic(self, state: Any) -> float:
-        return self.dynamics.kinetic_energy(state.velocity)
-
-    def work(self, old: Any, new: Any) -> float:
-        return 0.0
-
-    def dissipation(self, old: Any, new: Any, seconds: float) -> float:
-        return self.dynamics.dissipation(new.u)
-
-    def potential(self, old: Any, new: Any, places: Floats) -> Floats:
-        held = self.dynamics.potential(old.u, new.u - old.u, places)
-        return held - held[0]
-
-    def takes_time(self, seconds: float) -> bool:
-        return self.dynamics.step > 0.0
-
-
 class Inertial(Dynamics, name="inertial"):
-    """Dynamics with mass: backward differences of second order, and a pad whose nodes have no mass."""
+    """Dynamics with mass: backward differences of second order, and a pad whose nodes have no mass.
+
+    Keeps the `velocity` (N, dim) at the end of a substep, its mean `rates` (2, N, dim) and its `seconds`, 0
+    where the next one does not go on from it.
+    """
 
     inertia, scheme = True, "backward differences of second order"
+
+    def memory(self, state: Any) -> dict[str, Floats]:
+        still = np.zeros_like(state.u)
+        own = {"velocity": still, "rates": np.stack([still, still]), "seconds": np.zeros(())}
+        return super().memory(state) | own
+
+    def begin(self, old: Any, seconds: float) -> None:
+        kept = old.memory
+        past = Past(float(kept["seconds"]), kept["rates"])
+        self.begin_from(old.u, kept["velocity"], seconds, kept.get("branches", NO_BRANCHES), past)
+
+    def accept(self, old: Any, new: Any) -> dict[str, Floats]:
+        own = {"velocity": self.velocity(new.u), "rates": self.rates(new.u), "seconds": np.array(self.step)}
+        return super().accept(old, new) | own
+
+    def kinetic(self, state: Any) -> float:
+        return self.kinetic_energy(state.memory["velocity"])
 
     def _masses(self) -> Floats:
         return without_pad(self.space, super()._masses())
 
     def rates(self, u: Floats) -> Floats:
+        """Mean velocities and accelerations (2, N, dim) over a step that ends at u (N, dim)."""
         if self.step == 0.0:
             return np.zeros((2, *u.shape))
         return np.stack([u - self._u0, self.velocity(u) - self._v0]) / self.step
@@ -438,7 +401,7 @@ def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str)
     """
     kind: type[Dynamics] | None = DYNAMICS[name]
     if kind is None:
-        return Static(space)
+        return Static()
     eta, density = np.zeros(len(space.nodes)), np.zeros(len(space.nodes))
     for region, law in laws.items():
         cells = space.mesh.cells_of(region)
@@ -449,6 +412,6 @@ def make_dynamics(space: Space, laws: Mapping[str, Any], finger: Any, name: str)
         density[cells] = getattr(law, "density", 1e-9)
     rows = branches_of(space, laws, finger)
     if not (eta.any() or rows or kind.inertia):
-        return Static(space)
+        return Static()
     branches = make_branches(space, rows) if rows else None
     return kind(space, eta if eta.any() else None, density if kind.inertia else None, branches)

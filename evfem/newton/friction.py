@@ -1,0 +1,150 @@
+r"""The bound of friction in the equations: Coulomb's, and that of any law of friction.
+
+Under Coulomb's law the bound of a node is :math:`\mu(x)\,\lambda_n`, which the contact problem solves as it
+is. Another law (`evfem.surface.friction`) is linearised at each iterate, and keeps the time since each node
+touched, `contact_time` (P,) in s. Where the interface yields by C, a node that slips under a bound F(s) with
+dF/ds = K and moves by dx slips by ds = dx - C dF: friction grows by K dx / (1 + K C). With the part of F that
+does not grow, slip and yielding are (1 + K C) times as large.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.condensed import Candidates
+from evfem.contact.signorini import FORWARD, OPEN, sizes
+from evfem.contact.slipping import OscillatingNodes
+from evfem.newton.state import State
+from evfem.protocols import FrictionLaw
+from evfem.rooms import Room
+from evfem.surface.friction import Slipping
+from evfem.tensor import derivative
+
+#: steps of differences of a bound by contact forces (N/mm) and tributary lengths (mm)
+FORCE_STEP, LENGTH_STEP = 1e-7, 1e-6
+
+
+@dataclass(frozen=True)
+class BoundSlopes:
+    """Bounds of friction of k nodes, their derivatives (k,) by contact force, coefficient, speed, length."""
+
+    bound: Floats
+    by_normal: Floats
+    by_mu: Floats
+    by_speed: Floats
+    by_length: Floats | float
+
+
+class ProportionalFriction(Room):
+    """Coulomb's bound: mu times the contact force."""
+
+    #: whether the bound may have a kink over the pressure
+    kinked = False
+
+    def linearised(self, interface: Any, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
+        """The candidates c (C,) under the bound at an iterate."""
+        return known
+
+    def bound(self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
+        """Bounds (k,) in N/mm of some nodes (k,) with the coefficients mu (k,), slipping by (k,) mm."""
+        return np.asarray(mu * state.contact_force[nodes, 0])
+
+    def resistance(
+        self, interface: Any, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats
+    ) -> Floats:
+        """Bounds (P,) of all nodes at (P, d) between two states, pressed by (P,) and slipping by (P,)."""
+        mu = interface.friction(part[0], np.arange(len(place)), place)
+        return np.asarray(mu * normal)
+
+    def slopes(
+        self, interface: Any, old: State, state: State, c: Ints, mu: Floats, slip: Floats
+    ) -> BoundSlopes:
+        """The bounds of nodes c (k,) with their derivatives."""
+        normal = np.maximum(state.contact_force[c, 0], 0.0)
+        return BoundSlopes(mu * normal, mu, normal, 0.0 * mu, 0.0 * mu)
+
+
+class LawFriction(ProportionalFriction):
+    """The bound of a `law`, between faces on which a regularised attraction may leave out a pressure."""
+
+    kinked = True
+
+    def __init__(self, law: FrictionLaw, nodes: int) -> None:
+        self.law, self.nodes = law, nodes
+        self._oscillating, self._seconds = OscillatingNodes(nodes), 0.0
+
+    def memory(self, state: Any) -> dict[str, Floats]:
+        return {"contact_time": np.zeros(self.nodes)}
+
+    def begin(self, old: Any, seconds: float) -> None:
+        self._oscillating, self._seconds = OscillatingNodes(self.nodes), seconds
+
+    def accept(self, old: Any, new: Any) -> dict[str, Floats]:
+        return {"contact_time": self.contact_time(old)}
+
+    def contact_time(self, old: State) -> Floats:
+        """Contact time (P,) in s of every pad node at the end of the step from `old`."""
+        return np.where(old.touching, old.memory["contact_time"] + self._seconds, 0.0)
+
+    def slipping(
+        self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats
+    ) -> Slipping:
+        """Data of the law at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
+        speed = np.abs(slip) / self._seconds if self._seconds > 0.0 else np.zeros_like(slip)
+        withheld, left = (each[nodes] for each in interface.core(state))
+        length, age = interface.tributary(state)[nodes], self.contact_time(old)[nodes]
+        return Slipping(state.contact_force[nodes, 0], length, mu, speed, age, withheld, left)
+
+    def linearised(self, interface: Any, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
+        give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
+        size = sizes(known.slip + give[:, None] * known.force[:, 1:])
+        slip = np.where(known.status >= FORWARD, size, 0.0)
+        moving = self.slipping(interface, old, state, c, known.friction, slip)
+        found = self._oscillating.linearised(self.law, moving, c, known.status, shear)
+        if (
+            interface.follows
+        ):  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
+            found = replace(found, by_speed=np.maximum(found.by_speed, 0.0))
+        by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
+        timed = self._seconds > 0.0
+        by_slip = by_speed / self._seconds if timed else np.zeros_like(slip)
+        yielding = np.maximum(by_slip, 0.0) * give
+        series = 1.0 / (1.0 + yielding)
+        normal = np.maximum(known.force[:, 0], 0.0)
+        by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
+        along_normal, along_tangents = np.split(known.interface_compliance, [1], axis=1)
+        return replace(
+            known,
+            slip=known.slip / series[:, None],
+            interface_compliance=np.hstack([along_normal, along_tangents / series[:, None]]),
+            friction=series * found.slope,
+            cohesion=series * (found.offset + yielding * shear),
+            slip_stiffness=series * by_slip if timed else None,
+            friction_slope=(series * by_place)[:, None] * known.friction_slope,
+        )
+
+    def bound(self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
+        return self.slipping(interface, old, state, nodes, mu, slip).bound(self.law)
+
+    def resistance(
+        self, interface: Any, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats
+    ) -> Floats:
+        old, new = part
+        mu = interface.friction(old, nodes := np.arange(len(place)), place)
+        nodal = self.slipping(interface, old, new, nodes, mu, slip)
+        length = interface.tributary_at(part, place)
+        return replace(nodal, normal=normal, length=length).bound(self.law)
+
+    def slopes(
+        self, interface: Any, old: State, state: State, c: Ints, mu: Floats, slip: Floats
+    ) -> BoundSlopes:
+        normal = np.maximum(state.contact_force[c, 0], 0.0)
+        seen = self.slipping(interface, old, state, c, mu, slip)
+        found, law = seen.linearised(self.law), self.law
+        by_normal = derivative(lambda N: replace(seen, normal=N).bound(law), normal, FORCE_STEP)
+        by_length = derivative(lambda A: replace(seen, length=A).bound(law), seen.length, LENGTH_STEP)
+        return BoundSlopes(seen.bound(law), by_normal, found.by_mu, found.by_speed, by_length)

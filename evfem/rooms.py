@@ -1,0 +1,82 @@
+r"""What every capability answers, so that solver, checkpoint, balance of energy and history sum over lists.
+
+A *room* holds one capability: its keys, equation, tangent, memory, energies and columns. The solver asks the
+rooms of a scene in the order of a step and knows none by name (docs, Inside)::
+
+    memory(state)           once, at rest            what the room keeps from substep to substep, by name
+    begin(old, seconds)     a trial begins           any number of times from the same accepted state
+    accept(old, new)        a substep is accepted    the room's memory at its end
+    stored, kinetic         of an accepted state     energies
+    work, dissipation       of an accepted substep   the balance of energy closes with them
+    values(model, state)    of an accepted state     the room's `columns` in the history
+
+Units: mm, N, MPa, s, V; in the plane per mm of depth. N nodes, P nodes of the pad, dim = 2 or 3.
+A room that keeps nothing, stores nothing and shows nothing inherits all of it from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that a room adds to the history: its name, unit (per mm of depth in the plane) and meaning."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+class Room:
+    """A capability without memory, energy and columns; subclasses answer what theirs has."""
+
+    #: columns of the history in the order of `values`
+    columns: tuple[Column, ...] = ()
+
+    def memory(self, state: Any) -> dict[str, Floats]:
+        """What is kept of the undeformed `state`, by name; shapes stay the same from then on."""
+        return {}
+
+    def begin(self, old: Any, seconds: float) -> None:
+        """A trial begins from the accepted state `old` and takes so many seconds, 0 without time."""
+
+    def accept(self, old: Any, new: Any) -> dict[str, Floats]:
+        """The memory at the end of the trial that began last, accepted as `new`."""
+        return {}
+
+    def stored(self, state: Any) -> float:
+        """Stored energy of an accepted state (N mm)."""
+        return 0.0
+
+    def kinetic(self, state: Any) -> float:
+        """Kinetic energy of an accepted state (N mm)."""
+        return 0.0
+
+    def work(self, old: Any, new: Any) -> float:
+        """Work that an actuator of the room does in a substep, beyond that on the bone (N mm)."""
+        return 0.0
+
+    def dissipation(self, old: Any, new: Any, seconds: float) -> float:
+        """Energy that the room loses in a substep of so many seconds (N mm)."""
+        return 0.0
+
+    def potential(self, old: Any, new: Any, fractions: Floats) -> Floats:
+        """Potential (w,) in N mm with the loads of the end, at fractions (w,) of the straight path from `old`
+        to `new`, relative to that at the first one.
+        """
+        return np.zeros_like(fractions)
+
+    def takes_time(self, seconds: float) -> bool:
+        """Whether rates count in a substep of so many seconds: no stability is then asked for."""
+        return False
+
+    def values(self, model: Any, state: Any) -> Mapping[str, float]:
+        """Values of the `columns` in an accepted state."""
+        return {}
