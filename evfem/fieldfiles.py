@@ -47,7 +47,7 @@ def full_field_of_step(scene: Scene, result: Result, path: str | Path, step: int
         raise InputError("scene", f"field {scene.field!r}", "one with the full field and smooth faces")
     pad = model.pad.nodes
     position = model.mesh.points[pad] + frames[step].displacement[pad]
-    x, levels = attraction.outline(position, attraction.visible(position))
+    x, levels = attraction.outline(attraction.bare(position), attraction.visible(position))
     found = attraction.solve(position)
     voltage = next(float(row["voltage"]) for row in result.rows if row["step"] == step)
     lines, rows = found.phi.shape

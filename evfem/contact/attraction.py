@@ -18,24 +18,21 @@ pressed by d lam_n more is pulled by :math:`p'(s)\,s'(p)\,d\lambda_n` more (`gai
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
-from evfem.contact.charging import Charged, Charging
+from evfem.common.arrays import Floats
+from evfem.common.constants import KILOVOLT
+from evfem.contact.charging import NO_CHARGES, Charged, Charging, NoCharges
+from evfem.contact.traction import TOUCHING, Entries, PadPath, PadState, PadTraction, Reading
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
-from evfem.rooms import Room
-from evfem.surface.pad import Pad, surface_state
+from evfem.surface.pad import Pad
 from evfem.surface.skin import Skin
 from evfem.tensor import derivative, mul, positive_part
 from evfem.tissue.forms import deformation_gradient, form
-
-#: gaps up to this (mm) count as closed
-TOUCHING = 1e-9
 
 
 @form
@@ -48,60 +45,14 @@ def attraction(u: Any, v: Any, w: Any) -> Any:
     return w.law.traction(gap, w.voltage, w.layers) * width * v[1]
 
 
-class Entries(NamedTuple):
-    """Entries (K,) of a matrix (size, size) at these rows and columns; those of one place add up."""
-
-    size: int
-    row: Ints
-    column: Ints
-    value: Floats
-
-    @classmethod
-    def of(cls, size: int, blocks: Iterable[tuple[Any, Any, Any]]) -> Entries:
-        """From several rows, columns and values at once, broadcast."""
-        whole = [np.broadcast_arrays(*block) for block in blocks]
-        return cls(size, *(np.concatenate([each[i].ravel() for each in whole]) for i in range(3)))
-
-    def toarray(self) -> Floats:
-        """The dense matrix."""
-        flat: Any = np.bincount(self.size * self.row + self.column, self.value, self.size**2)
-        return flat.reshape(self.size, self.size)
-
-
 #: adhesion, in the place of a voltage: it is always on
 ON = 1.0
 
 
-class NoAttraction(Room):
-    """Nothing attracts: the empty sum of attractions."""
-
-    law = layers = roughness = charging = None
-    direction, parts, rounding = "vertical", (), 0.0
-    has_energy = has_fringes = False
-
-    def acts(self, voltage: float) -> bool:
-        """Never."""
-        return False
-
-    def forces(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
-        """Nodal forces on the finger (P, dim)."""
-        return np.zeros_like(position)
-
-    def weights(self, position: Floats) -> Floats:
-        """By what its forces (P,), which are 0, are tractions."""
-        return np.ones(len(position))
-
-    def restored(self, voltage: float) -> tuple[Floats | float, Floats | float]:
-        """Nothing is withheld."""
-        return 0.0, 0.0
-
-
 @dataclass(frozen=True, eq=False)
-class Attraction(Room):
+class Attraction(PadTraction):
     """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface`
     the electrode's outline, `roughness` how far rough faces stay apart in contact (None: not at all).
-
-    `pressing` (P,) are the present contact forces along the normal in N/mm, None for none.
     """
 
     law: Any
@@ -111,110 +62,120 @@ class Attraction(Room):
     direction: str = "vertical"
     air_layer: bool = True
     roughness: Any = None
-    charging: Charging | None = None
+    charging: Charging | NoCharges = NO_CHARGES
     #: of its columns in the history
     name: str = field(default="electrostatic", kw_only=True)
     #: whether it acts without a voltage; its law then takes the strength `ON` in the place of one
     always: bool = field(default=False, kw_only=True)
 
     @property
-    def parts(self) -> tuple[Attraction, ...]:
-        """The attractions of which this is the sum."""
-        return (self,)
+    def rough(self) -> bool:  # type: ignore[override]
+        return self.roughness is not None
 
-    def load(self, voltage: float) -> float:
-        """What its law takes as a voltage (V) when that of the display is `voltage`."""
-        return ON if self.always else voltage
+    @property
+    def flows(self) -> bool:  # type: ignore[override]
+        return self.charging.flows
+
+    def load(self, pad: PadState) -> Any:
+        """What its law takes as a voltage (V)."""
+        return ON * pad.load if self.always else pad.voltage
 
     def acts(self, voltage: float) -> bool:
         """Whether anything attracts at this voltage: charges may without it."""
-        return voltage != 0.0 or self.always or self.charging is not None
+        return voltage != 0.0 or self.always or self.flows
 
-    def _voltages(self, gap: Any, voltage: float, position: Floats) -> Any:
-        """Effective voltage at gaps (P,) of nodes at (P, dim), with that of the charges."""
-        if self.charging is None:
-            return voltage
-        return self.charging.effective(gap, voltage, self.pad.tributary(position))
-
-    def charged(
-        self, position: Floats, voltage: float, pressing: Floats | None, charges: Floats | None = None
-    ) -> Charged:
-        """The electric state at positions (P, dim): with the charges (M, P), or those at the step's end."""
-        assert self.charging is not None
-        apart = self._separation(position, pressing)
-        gap = np.maximum(surface_state(self.surface, position).gap, 0.0) + apart
-        length = self.pad.tributary(position)
-        found = self.charging.after(gap, voltage, length) if charges is None else charges
-        return Charged(found, voltage, gap, length)
+    # -- charges
 
     def memory(self, state: Any) -> dict[str, Floats]:
-        """Charges over eps_0 (M, P) in V/mm of an uncharged pad, where they move."""
-        return {} if self.charging is None else {"charges": self.charging.none}
+        return self.charging.memory
 
-    def forces(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
-        """Nodal forces on the finger (P, dim); without an air layer only `touching` nodes (P,) have any."""
-        pressed = None if pressing is None else pressing[None]
-        return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
+    def begin(self, old: PadState, seconds: float) -> None:
+        if self.flows:
+            self.charging.begin(self.charged(old), seconds)
 
-    def weights(self, position: Floats) -> Floats:
-        """Lengths or areas (P,) by which the forces are tractions, at positions (P, dim)."""
-        return self.pad.tributary(position)
+    def accept(self, old: PadState, new: PadState) -> dict[str, Floats]:
+        return {"charges": self.charged(new, at_end=True).charges} if self.flows else {}
 
-    #: whether `work` is known from an energy
-    has_energy = False
-    #: whether the forces are more than those of columns
-    has_fringes = False
-    #: what rounding does to the forces, as a fraction of the largest nodal one
-    rounding = 0.0
+    def charged(self, pad: PadState, *, at_end: bool = False) -> Charged:
+        """The electric state of a pad: with its charges, or those `at_end` of the step."""
+        gap, length = self.gaps(pad), self.pad.tributary(pad.position)
+        charges = self.charging.after(gap, pad.voltage, length) if at_end else pad.memory["charges"]
+        return Charged(charges, pad.voltage, gap, length)
 
-    @property
-    def column_law(self) -> Attraction:
-        """The attraction whose derivative `stiffness` is, and that resolves how it grows as gaps close."""
-        return self
+    def electrode_charge(self, pad: PadState) -> Reading:
+        """Charge over eps_0 (V, in space V mm): its derivative by a touching node's gap is left out."""
+        at, below = self.charged(pad, at_end=True), pad.below
+        assert below is not None
+        by_gap, by_length = self.charging.charge_slopes(at)
+        by_gap = np.where(below.gap > TOUCHING, by_gap, 0.0)
+        by_position = np.zeros_like(pad.position)
+        by_position[:, ::2], by_position[:, 1] = -by_gap[:, None] * below.slope, by_gap
+        of, moved, value = self.pad.tributary_gradient(pad.position)
+        more = np.bincount(moved, by_length[of] * value, by_position.size)
+        by_voltage = KILOVOLT * self.charging.capacity(at)
+        return Reading(
+            self.charging.electrode_charge(at), by_voltage, by_position + more.reshape(by_position.shape)
+        )
 
-    def forces_along(
-        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """`forces` at W places (W, P, dim) of a way, by voltages (W,) and contact forces (W, P)."""
-        if not voltages.any() and self.charging is None:
+    def unit(self, pad: PadState) -> Floats:
+        """Attraction (P, dim) of a kV."""
+        return self.forces(replace(pad, voltage=KILOVOLT))
+
+    # -- forces
+
+    def gaps(self, pad: PadState) -> Any:
+        """Gaps (..., P) in mm that the law sees, with the separation of rough faces."""
+        return pad.gap + self._separation(pad)
+
+    def _voltages(self, gap: Any, pad: PadState) -> Any:
+        """Effective voltage at gaps (P,), with that of the charges."""
+        return self.charging.effective(gap, self.load(pad), self.pad.tributary(pad.position))
+
+    def _on(self, pad: PadState) -> Any:
+        """1 of nodes that carry force, 0 of others."""
+        return 1.0 if self.air_layer else pad.touching.astype(float)
+
+    def forces(self, pad: PadState) -> Floats:
+        return self.forces_along(pad.path)[0]
+
+    def weights(self, pad: PadState) -> Floats:
+        return self.pad.tributary(pad.position)
+
+    def forces_along(self, path: PadState) -> Floats:
+        positions = path.position
+        if not (self.flows or np.any(self.load(path))):
             return np.zeros_like(positions)
-        frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
-        gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1])
-        gaps = gaps + self._separation(positions, pressing)
-        on = 1.0 if self.air_layer else touching.astype(float)
-        pressure = self._of_law(self.law.traction, gaps, voltages, positions)
+        gaps, on = self.gaps(path), self._on(path)
+        pressure = self._of_law(self.law.traction, gaps, path)
         weight = on * pressure * self.pad.tributary(positions)
         if self.direction == "vertical":
             forces = np.zeros_like(positions)
             forces[..., 1] = -weight
             return forces
-        potential = on * self._of_law(self.law.potential, gaps, voltages, positions)
+        potential = on * self._of_law(self.law.potential, gaps, path)
         forces = np.stack([self._sideways(*each) for each in zip(positions, potential, strict=True)])
-        forces[..., ::2] += weight[..., None] * frame.slope.reshape(*weight.shape, -1)
+        forces[..., ::2] += weight[..., None] * path.frame.slope.reshape(*weight.shape, -1)
         forces[..., 1] = -weight
         return forces
 
-    def _of_law(self, values: Any, gaps: Floats, voltages: Floats, positions: Floats) -> Floats:
-        """Values (W, P) of the law at W places of a way: at once where these have all in common."""
+    def _of_law(self, values: Any, gaps: Floats, path: PadState) -> Floats:
+        """Values (W, P) of the law in the states of a path: at once where these have all in common."""
         harmonics = np.ndim(getattr(self.layers, "reduced", 0.0)) > 1  # their axis comes before the nodes
-        if self.charging is None and not harmonics and (voltages == voltages[0]).all():
-            return np.asarray(values(gaps, float(voltages[0]), self.layers))
-        at = zip(gaps, voltages.tolist(), positions, strict=True)
-        return np.array([values(gap, self._voltages(gap, u, place), self.layers) for gap, u, place in at])
+        loads = self.load(path)
+        if not (self.flows or harmonics) and (loads == loads[0]).all():
+            return np.asarray(values(gaps, float(loads[0]), self.layers))
+        at = zip(gaps, path.states(), strict=True)
+        return np.array([values(gap, self._voltages(gap, pad), self.layers) for gap, pad in at])
 
     def restored(self, voltage: float) -> tuple[Floats, Floats]:
-        """Of closed nodes' attraction (P,) in MPa what a regularised law takes away and leaves, else 0."""
         none = np.zeros(self.pad.nodes.size)
-        if not hasattr(self.law, "withheld") or voltage == 0.0:
+        load = ON if self.always else voltage
+        if not hasattr(self.law, "withheld") or load == 0.0:
             return none, none
-        withheld, left = self.law.withheld(voltage, self.layers)
+        withheld, left = self.law.withheld(load, self.layers)
         if not np.any(left):  # closed faces are out of its reach
             return none, none
         return none + withheld, none + left
-
-    def tangent_factor(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Any:
-        """Factor (P,), or 1, of the derivatives of the `column_law` in the tangent of the forces."""
-        return 1.0
 
     def _sideways(self, position: Floats, potential: Floats) -> Floats:
         """Forces (P, dim) along the display that enlarge what nodes stand for, by the potential (P,)."""
@@ -222,60 +183,46 @@ class Attraction(Room):
         found = np.bincount(moved, -potential[of] * value, position.size)
         return found.astype(float, copy=False).reshape(position.shape)
 
-    def _separation(self, position: Floats, pressing: Floats | None) -> Any:
-        """Separation of rough faces at nodes at (..., P, dim), in mm."""
-        if self.roughness is None:
-            return 0.0
-        return self.roughness.separation(self._contact_pressure(position, pressing))
+    def _separation(self, pad: PadState) -> Any:
+        """Separation (..., P) of rough faces in mm."""
+        return 0.0 if self.roughness is None else self.roughness.separation(self._contact_pressure(pad))
 
-    def _contact_pressure(self, position: Floats, pressing: Floats | None) -> Floats:
-        """Contact pressure in MPa of the nodes at (..., P, dim)."""
-        if pressing is None:
-            return np.zeros(position.shape[:-1])
-        length = self.pad.tributary(position)
+    def _contact_pressure(self, pad: PadState) -> Floats:
+        """Contact pressure (..., P) in MPa."""
+        length = self.pad.tributary(pad.position)
         facing = length > 0.0
-        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, length, 1.0), 0.0)
+        return np.where(facing, np.maximum(pad.pressed, 0.0) / np.where(facing, length, 1.0), 0.0)
 
-    def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
+    def gain_on_pressing(self, pad: PadState) -> Floats:
         """Growth of a node's attraction per contact force (P,): the rough faces come closer."""
         if self.roughness is None:
-            return np.zeros(len(position))
-        on = 1.0 if self.air_layer else touching.astype(float)
-        p = self._contact_pressure(position, pressing)
+            return np.zeros(len(pad.position))
+        p = self._contact_pressure(pad)
         closer = separation_derivative(self.roughness, p)
-        rate = self._rate(self.roughness.separation(p), voltage, position)
-        return np.asarray(on * rate * closer)
+        return np.asarray(self._on(pad) * self._rate(self.roughness.separation(p), pad) * closer)
 
-    def negative_stiffness(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """Decrease of a node's attraction with its vertical gap, -dp/dg A (P,) in N/mm per mm; 0 where
-        contact holds the gap, and where losses make it grow with the gap, which stabilises.
+    def weakening(self, pad: PadState) -> Floats:
+        """-dp/dg A (P,) in N/mm per mm; 0 where contact holds the gap, and where losses make the attraction
+        grow with the gap, which stabilises.
         """
-        gap = surface_state(self.surface, position).gap
-        on = 1.0 if self.air_layer else touching.astype(float)
-        apart = np.maximum(gap, 0.0) + self._separation(position, pressing)
-        rate = self._rate(apart, voltage, position)
-        weakening = -on * rate * self.pad.tributary(position)
-        return np.where((gap > TOUCHING) & (weakening > 0.0), weakening, 0.0)
+        rate = self._rate(self.gaps(pad), pad)
+        weakening = -self._on(pad) * rate * self.pad.tributary(pad.position)
+        return np.where((pad.frame.gap > TOUCHING) & (weakening > 0.0), weakening, 0.0)
 
-    def _rate(self, apart: Floats, voltage: float, position: Floats) -> Any:
-        """dp/dg (P,) in MPa/mm of nodes at (P, dim), the charges of the present step following."""
-        if self.charging is None:
-            return traction_derivative(self.law, apart, voltage, self.layers)
+    def _rate(self, apart: Floats, pad: PadState) -> Any:
+        """dp/dg (P,) in MPa/mm at gaps (P,), the charges of the present step following."""
+        if not self.flows:
+            return traction_derivative(self.law, apart, self.load(pad), self.layers)
         law = self.law
-        seen = lambda g: law.traction(g, self._voltages(g, voltage, position), self.layers)  # noqa: E731
-        return derivative(seen, apart, GAP_STEP)
+        return derivative(lambda g: law.traction(g, self._voltages(g, pad), self.layers), apart, GAP_STEP)
 
-    def stiffness(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Entries:
-        """Derivative of `forces` by node positions (dim P, dim P), ordered (node, component)."""
+    def stiffness(self, pad: PadState) -> Entries:
+        position, frame, on = pad.position, pad.frame, self._on(pad)
         size, dim = position.shape
-        frame, horizontal = surface_state(self.surface, position), np.arange(0, dim, 2)
-        on = 1.0 if self.air_layer else touching.astype(float)
-        apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
-        voltages = self._voltages(apart, voltage, position)
+        horizontal, apart = np.arange(0, dim, 2), self.gaps(pad)
+        voltages = self._voltages(apart, pad)
         p = on * self.law.traction(apart, voltages, self.layers)
-        dp = -self.negative_stiffness(position, voltage, touching, pressing)
+        dp = -self.weakening(pad)
         of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)
         up, aside = dim * nodes + 1, dim * nodes[:, None] + horizontal
@@ -301,3 +248,43 @@ class Attraction(Room):
             row, column, turned = self.pad.tributary_curvature(position, potential)
             blocks.append((row, column, -turned))
         return Entries.of(dim * size, blocks)
+
+    # -- work
+
+    def work_along(self, path: PadPath) -> float:
+        if self.flows:
+            return self._work_of_charged(path)
+        if not (self.load(path.old) or self.load(path.new)):
+            return path.trapezoidal
+        # on the way with the bone the mean force does the work, and along a vertical pull's level nothing
+        if self.direction == "vertical" and not path.turned[:, 1].any():
+            return path.trapezoidal
+        return super().work_along(path)
+
+    def _work_of_charged(self, path: PadPath) -> float:
+        """Work while the pad moves with its old charges and voltage."""
+        volts = self.charging.old.voltage
+        ends = replace(path.old, voltage=volts), replace(path.new, voltage=volts)
+        with self.charging.standing():
+            return self.power(replace(path, old=ends[0], new=ends[1]), path.moved)
+
+    def powers(self, path: PadPath, along: Floats, fractions: Floats, begin: Floats | None = None) -> Floats:
+        if not self.flows:
+            return super().powers(path, along, fractions, begin)
+        volts = np.full(fractions.shape, path.old.voltage)  # its sign counts where there are charges
+        return np.asarray(np.sum(self.forces_along(path.at(fractions, volts, begin)) * along, axis=(1, 2)))
+
+    def released_work(self, path: PadPath, along: Floats, begin: Floats, fractions: Floats) -> Floats:
+        if self.always and path.new.surface.is_flat:
+            return self._by_potential(path, begin, fractions)
+        with self.charging.ending(lambda: self.charged(path.new)):
+            return super().released_work(path, along, begin, fractions)
+
+    def _by_potential(self, path: PadPath, begin: Floats, fractions: Floats) -> Floats:
+        """Work of a pull whose reach may be short, above a flat surface, by its potential."""
+        ends = [replace(pad, position=at) for pad, at in ((path.old, begin), (path.new, path.new.position))]
+        gap = [pad.frame.gap for pad in ends]
+        gaps = np.maximum(np.outer(1.0 - fractions, gap[0]) + np.outer(fractions, gap[1]), 0.0)
+        length = 0.5 * (self.weights(ends[0]) + self.weights(ends[1]))
+        energy = np.asarray(self.law.potential(gaps)) @ length
+        return np.asarray(energy[0] - energy)

@@ -11,6 +11,8 @@ charges at the end are a function of gap and voltage. Each term of the balance h
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,8 +48,33 @@ class Flow:
     leakage: float
 
 
-class Charging:
+class NoCharges:
+    """Charges follow at once: the voltage of the display is that of every node."""
+
+    flows = False
+
+    @property
+    def memory(self) -> dict[str, Floats]:
+        """Nothing is kept."""
+        return {}
+
+    def effective(self, gap: Any, voltage: Any, length: Floats) -> Any:
+        """Effective voltage of the force law."""
+        return voltage
+
+    @contextmanager
+    def ending(self, at_end: Callable[[], Charged]) -> Iterator[None]:
+        """Within, the charges are those of the end of the step."""
+        yield
+
+
+NO_CHARGES = NoCharges()
+
+
+class Charging(NoCharges):
     """The charges of a step that begins at `begin` and takes `seconds`."""
+
+    flows = True
 
     def __init__(self, stack: Sandwich, nodes: int) -> None:
         self.stack = stack
@@ -59,6 +86,30 @@ class Charging:
     def none(self) -> Floats:
         """No charge anywhere (M, P)."""
         return np.zeros((self.stack.states, self.nodes))
+
+    @property
+    def memory(self) -> dict[str, Floats]:
+        return {"charges": self.none}
+
+    @contextmanager
+    def standing(self) -> Iterator[None]:
+        """Within, no time passes from the beginning of the step."""
+        with self._instead(self.old):
+            yield
+
+    @contextmanager
+    def ending(self, at_end: Callable[[], Charged]) -> Iterator[None]:
+        with self._instead(at_end()):
+            yield
+
+    @contextmanager
+    def _instead(self, charged: Charged) -> Iterator[None]:
+        old, seconds = self.old, self.seconds
+        self.begin(charged, 0.0)
+        try:
+            yield
+        finally:
+            self.begin(old, seconds)
 
     def begin(self, old: Charged, seconds: float) -> None:
         """A step begins at the state `old`."""

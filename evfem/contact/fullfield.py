@@ -27,7 +27,9 @@ import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
-from evfem.contact.attraction import TOUCHING, Attraction, Entries
+from evfem.common.quadrature import ENDS
+from evfem.contact.attraction import Attraction
+from evfem.contact.traction import TOUCHING, Entries, PadPath, PadState
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
@@ -173,24 +175,21 @@ class FieldAttraction(Attraction):
     def _size(self) -> int:
         return int(self.pad.nodes.size)
 
-    def forces_along(
-        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
-        """Forces (W, P, 2) at W places of a way, each from its own solution."""
-        fraction = self.voltage_fraction(positions[..., 0])[..., None]
-        forces = fraction**2 * self.flanks.forces_along(positions, voltages, touching, pressing)
-        for k, (position, voltage) in enumerate(zip(positions, voltages.tolist(), strict=True)):
-            if voltage != 0.0:
-                own = None if pressing is None else pressing[k]
-                forces[k] += voltage**2 * self._remembered(position, own)[1]
+    def forces_along(self, path: PadState) -> Floats:
+        """Forces (W, P, 2) in the states of a path, each from its own solution."""
+        fraction = self.voltage_fraction(path.position[..., 0])[..., None]
+        forces = fraction**2 * self.flanks.forces_along(path)
+        for k, pad in enumerate(path.states()):
+            if pad.voltage != 0.0:
+                forces[k] += pad.voltage**2 * self._remembered(pad)[1]
         return forces
 
-    def weights(self, position: Floats) -> Floats:
+    def weights(self, pad: PadState) -> Floats:
         """Lengths (P,): half the distance to the next columns, on the flanks the columns' own."""
-        lines = self.visible(position)
-        half = 0.5 * np.diff(lines @ position[:, 0])
+        lines = self.visible(pad.position)
+        half = 0.5 * np.diff(lines @ pad.position[:, 0])
         own = lines.T @ (np.append(half, 0.0) + np.append(0.0, half))
-        return np.asarray(own + self.flanks.pad.tributary(position))
+        return np.asarray(own + self.flanks.pad.tributary(pad.position))
 
     has_fringes = True
     rounding = FIELD_ROUNDING
@@ -200,72 +199,87 @@ class FieldAttraction(Attraction):
         """Without rough faces, whose gap depends on the contact forces."""
         return self.roughness is None
 
-    def tangent_factor(self, position: Floats, voltage: float, touching: Any, pressing: Any = None) -> Floats:
+    def tangent_factor(self, pad: PadState) -> Floats:
         """Factor (P,) of the column law's derivatives: the squared fraction of the voltage below a node,
         between rough faces the ratio of the field's force to the columns', at most 1: on a summit it gains
         less.
         """
         if self.roughness is None:
-            return self.voltage_fraction(position[:, 0]) ** 2
-        columns = self.column_law.forces(position, voltage, touching, pressing)[:, 1]
-        forces = self.forces(position, voltage, touching, pressing)[:, 1]
+            return self.voltage_fraction(pad.position[:, 0]) ** 2
+        columns, forces = (law.forces(pad)[:, 1] for law in (self.column_law, self))
         pulled = columns < 0.0
         return np.where(pulled, np.clip(forces / np.where(pulled, columns, 1.0), 0.0, 1.0), 1.0)
 
-    def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
+    def gain_on_pressing(self, pad: PadState) -> Floats:
         """The column law's, times the `tangent_factor`."""
-        gain = super().gain_on_pressing(position, voltage, touching, pressing)
-        return np.asarray(gain * self.tangent_factor(position, voltage, touching, pressing))
+        return np.asarray(super().gain_on_pressing(pad) * self.tangent_factor(pad))
 
-    def negative_stiffness(
-        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
-    ) -> Floats:
+    def weakening(self, pad: PadState) -> Floats:
         """The column law's, times the `tangent_factor`."""
-        weakening = super().negative_stiffness(position, voltage, touching, pressing)
-        return np.asarray(weakening * self.tangent_factor(position, voltage, touching, pressing))
+        return np.asarray(super().weakening(pad) * self.tangent_factor(pad))
 
-    def beyond_trapezoidal(self, begin: Floats, end: Floats, voltages: tuple[float, float]) -> float:
-        """Energy on the way between positions (P, 2) beyond the trapezoidal work (N mm per mm of depth)."""
+    def work_along(self, path: PadPath) -> float:
+        if not self.has_energy or not (path.old.voltage or path.new.voltage):
+            return super().work_along(path)
+        return path.trapezoidal + self._beyond_trapezoidal(path)
+
+    def power_of_ends(self, path: PadPath, along: Floats) -> float:
+        """Of the columns, as `powers` are."""
+        return float(np.mean(self.powers(path, along, ENDS)))
+
+    def released_work(self, path: PadPath, along: Floats, begin: Floats, fractions: Floats) -> Floats:
+        """The columns', and the fringes' evenly."""
+        work = super().released_work(path, along, begin, fractions)
+        held = replace(path, old=replace(path.old, voltage=path.new.voltage))
+        last = float(self.powers(held, along, fractions[-1:], begin)[0])
+        return work + (float(np.sum(path.ends[1] * along)) - last) * fractions
+
+    def _beyond_trapezoidal(self, path: PadPath) -> float:
+        """Energy on the path beyond the trapezoidal work (N mm per mm of depth)."""
+        begin, end = path.old.position, path.new.position
         self.check(end)
-        squared = [voltage**2 for voltage in voltages]
+        squared = [pad.voltage**2 for pad in (path.old, path.new)]
         before, after = self.solve(begin), self.solve(end)
         energy = 0.25 * sum(squared) * (after.value - before.value)
-        ends = zip(squared, (begin, end), strict=True)
-        forces = sum(square * self._remembered(at, None)[1] for square, at in ends)
+        ends = zip(squared, (path.old, path.new), strict=True)
+        forces = sum(square * self._remembered(pad)[1] for square, pad in ends)
         return energy - 0.5 * float(np.sum(forces * (end - begin)))
 
-    def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
-        """The field under the pad at `position` (P, 2)."""
-        found = self._remembered(position, pressing)[0]
+    def bare(self, position: Floats) -> PadState:
+        """The pad at `position` (P, 2) under 1 V, not pressed."""
+        return PadState(self.pad, self.surface, position, 1.0, None, np.zeros(self._size, dtype=bool))
+
+    def solve(self, position: Floats) -> Capacitance:
+        """The field under the pad at `position` (P, 2), of smooth faces."""
+        found = self._remembered(self.bare(position))[0]
         assert found is not None
         return found
 
-    def _remembered(self, position: Floats, pressing: Floats | None) -> tuple[Capacitance | None, Floats]:
+    def _remembered(self, pad: PadState) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V, anew where they are not among the last `KEPT`."""
-        key = position.tobytes()
-        if self.roughness is not None and pressing is not None:
-            key += pressing.tobytes()
+        key = pad.position.tobytes()
+        if self.roughness is not None and pad.pressing is not None:
+            key += pad.pressing.tobytes()
         found = self.solved.get(key)
         if found is None:
-            self.solved[key] = found = self._above(position, self.visible(position), pressing)
+            self.solved[key] = found = self._above(pad, self.visible(pad.position))
             while len(self.solved) > KEPT:
                 self.solved.popitem(last=False)
         return found
 
-    def _above(
-        self, position: Floats, lines: Any, pressing: Floats | None
-    ) -> tuple[Capacitance | None, Floats]:
+    def _above(self, pad: PadState, lines: Any) -> tuple[Capacitance | None, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
-        x, levels = self.outline(position, lines, pressing)
-        field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope[:, 0])
+        x, levels = self.outline(pad, lines)
+        slope = surface_state(self.surface, lines @ pad.position).slope[:, 0]
+        field, forces = self._solved(x, levels, slope)
         return field, np.asarray(lines.T @ forces)
 
-    def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Entries:
+    def full_stiffness(self, pad: PadState) -> Entries:
         """Derivative of `forces` by positions (2 P, 2 P); touching nodes move along the surface."""
-        lines, frame = self.visible(position), surface_state(self.surface, position)
-        nodes = in_line(self._plane, self.edges)
+        position, voltage, frame = pad.position, pad.voltage, pad.frame
+        lines, nodes = self.visible(position), in_line(self._plane, self.edges)
         closed = frame.gap <= TOUCHING
-        start = self._above(position, lines, pressing)[1]
+        start = self._above(pad, lines)[1]
         directions = np.zeros((2, self._size, 2))
         directions[0, :, 0] = 1.0
         directions[0, closed, 1], directions[1, ~closed, 1] = frame.slope[closed, 0], 1.0
@@ -274,11 +288,11 @@ class FieldAttraction(Attraction):
             moved = nodes[first::APART]
             place = position.copy()
             place[moved] += MOVED * directions[axis, moved]
-            rate = voltage**2 / MOVED * (self._above(place, lines, pressing)[1] - start)[nodes]
+            rate = voltage**2 / MOVED * (self._above(replace(pad, position=place), lines)[1] - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
             blocks += [(2 * nodes + k, column, rate[:, k]) for k in range(2)]
-        outer = self.flanks.stiffness(position, voltage, np.ones(self._size, dtype=bool), pressing)
+        outer = self.flanks.stiffness(replace(pad, touching=np.ones(self._size, dtype=bool)))
         share = self.voltage_fraction(position[:, 0])[outer.row // 2] ** 2
         return Entries.of(outer.size, [*blocks, (outer.row, outer.column, share * outer.value)])
 
@@ -321,12 +335,12 @@ class FieldAttraction(Attraction):
         kept = in_sight(self._lines @ position)
         return self._lines if kept.size == self._lines.shape[0] else self._lines[kept]
 
-    def outline(self, position: Floats, lines: Any, pressing: Floats | None = None) -> tuple[Floats, Floats]:
+    def outline(self, pad: PadState, lines: Any) -> tuple[Floats, Floats]:
         """x (L,) of columns at `lines` (L, P), heights (n + 1, L) of electrode, insulator, skin, tissue."""
-        place = lines @ position
+        place = lines @ pad.position
         frame = surface_state(self.surface, place)
         insulator = self.surface.insulator
-        rough = self._separation(position, pressing) * np.ones(self._size)
+        rough = self._separation(pad) * np.ones(self._size)
         lowest = SERIES_GAP * insulator.thickness / self.insulator_eps_r
         gap = np.maximum(np.maximum(frame.gap, 0.0) + np.maximum(lines @ rough, 0.0), lowest)
         ground = place[:, 1] - frame.gap
@@ -344,7 +358,7 @@ class FieldAttraction(Attraction):
         """Raise Unresolved if the capacitance at `position` (P, 2) is not between its bounds."""
         if self._electrodes is not None or self.floating:
             return  # the bounds are those of a grounded pad over one electrode
-        bounds = self.bounds(*self.outline(position, self.visible(position)))
+        bounds = self.bounds(*self.outline(self.bare(position), self.visible(position)))
         value = self.solve(position).value
         if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):
             raise Unresolved(

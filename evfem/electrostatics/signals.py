@@ -1,22 +1,17 @@
 r"""Voltage as a function of position, its effective value, and what a carrier and an amplifier make of it.
 
 The laws need the effective voltage across skin and insulator. Units: V, mm (of bone position), s.
-
-The electrode's charge and the smallest gap of a pad, with their derivatives, can be prescribed in place
-of the voltage (`evfem.newton.control.ConstrainedVoltage`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats
 from evfem.common.checks import Values, above, plain
-from evfem.common.constants import KILOVOLT
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
 from evfem.common.views import plus
@@ -202,72 +197,3 @@ def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
             now = last if abs(slope) <= steepest else now + np.sign(slope) * steepest * (end - x)
         rows.append((end, now))
     return VoltageProfile(*np.array(rows).T)
-
-
-#: gaps up to this (mm) count as closed
-CLOSED = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class PadState:
-    """Pad nodes under the attraction: positions (P, dim), surface, voltage (V), contact forces (P,), and
-    which `touching` (P,) when the step began.
-    """
-
-    attraction: Any
-    position: Floats
-    surface: Any
-    voltage: float
-    pressing: Floats
-    touching: Any
-
-    @classmethod
-    def of(cls, attraction: Any, interface: Any, state: Any, touching: Any) -> PadState:
-        """From a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
-        at = interface.resting(state), interface.surface_at(state)
-        return cls(attraction, *at, state.voltage, state.contact_force[:, 0], touching)
-
-    def forces(self, voltage: float) -> Floats:
-        """Attraction (P, dim) of the pad nodes under a voltage (V)."""
-        return np.asarray(self.attraction.forces(self.position, voltage, self.touching, self.pressing))
-
-    @property
-    def unit(self) -> Floats:
-        """Attraction (P, dim) of a kV."""
-        return replace(self, attraction=self.attraction.parts[0]).forces(KILOVOLT)
-
-    @property
-    def slope(self) -> Floats:
-        """By how much the attraction (P, dim) grows with a kV: it is quadratic in the voltage."""
-        more, less = (self.forces(self.voltage + change) for change in (KILOVOLT, -KILOVOLT))
-        return 0.5 * (more - less)
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """A number that a state has, with its derivatives by a kV and by the positions (P, dim)."""
-
-    value: float
-    by_voltage: float
-    by_position: Floats
-
-
-def electrode_charge(pad: PadState) -> Reading:
-    """Charge over eps_0 (V, in space V mm): its derivative by a touching node's gap is left out."""
-    charging, surface = pad.attraction.charging, pad.surface
-    at = pad.attraction.charged(pad.position, pad.voltage, pad.pressing)
-    by_gap, by_length = charging.charge_slopes(at)
-    by_gap = np.where(surface.gap > CLOSED, by_gap, 0.0)
-    by_position = np.zeros_like(pad.position)
-    by_position[:, ::2], by_position[:, 1] = -by_gap[:, None] * surface.slope, by_gap
-    of, moved, value = pad.attraction.pad.tributary_gradient(pad.position)
-    by_position += np.bincount(moved, by_length[of] * value, by_position.size).reshape(by_position.shape)
-    return Reading(charging.electrode_charge(at), KILOVOLT * charging.capacity(at), by_position)
-
-
-def smallest_gap(pad: PadState) -> Reading:
-    """The smallest vertical gap of the pad (mm)."""
-    least = int(np.argmin(pad.surface.gap))
-    by_position = np.zeros_like(pad.position)
-    by_position[least, ::2], by_position[least, 1] = -pad.surface.slope[least], 1.0
-    return Reading(float(pad.surface.gap[least]), 0.0, by_position)

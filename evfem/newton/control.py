@@ -31,7 +31,7 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
-from evfem.electrostatics.signals import PadState, Reading, electrode_charge, smallest_gap
+from evfem.contact.traction import PadState, Reading, smallest_gap
 from evfem.newton.hand import RIGID, Drive
 from evfem.newton.state import State, StepFailed
 
@@ -97,7 +97,8 @@ class Unsupported(Indentation):
 class VoltageProblem:
     """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state for the
     backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim), `pushed`;
-    of a number with a gradient (P, dim), `measured`, the condensed row and its gains; the state of the `pad`.
+    of a number with a gradient (P, dim), `measured`, the condensed row and its gains; the state of the `pad`
+    and the `attraction`.
     """
 
     squared: float
@@ -106,6 +107,7 @@ class VoltageProblem:
     pushed: Any = None
     measured: Any = None
     pad: Any = None
+    attraction: Any = None
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ class VoltageControl:
         """Force on the bone (N/mm) that the control's equation lacks at these reactions (dim,)."""
         return 0.0
 
-    def lacking(self, pad: PadState) -> float:
+    def lacking(self, attraction: Any, pad: PadState) -> float:
         """Relative residual of an equation that is no balance of forces."""
         return 0.0
 
@@ -178,18 +180,18 @@ class ConstrainedVoltage(VoltageControl):
 
     free = True
 
-    def read(self, pad: PadState) -> tuple[Reading, float]:
+    def read(self, attraction: Any, pad: PadState) -> tuple[Reading, float]:
         """The quantity and its prescribed value."""
         raise NotImplementedError
 
-    def unit(self, pad: PadState) -> Floats:
+    def unit(self, attraction: Any, pad: PadState) -> Floats:
         """Forces (P, dim) on the pad nodes per unit of the voltage's unknown."""
         raise NotImplementedError
 
     def unknown(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, Floats]:
         """The unknown, and the part of the backward solve that a unit of it adds."""
-        reading, prescribed = self.read(problem.pad)
-        saved, push = problem.pushed(self.unit(problem.pad))
+        reading, prescribed = self.read(problem.attraction, problem.pad)
+        saved, push = problem.pushed(self.unit(problem.attraction, problem.pad))
         row, still, own = problem.measured(reading.by_position, saved)
         travels = [row[unknown.axis - step.body.dim] for unknown in step.unknowns]
         gains = np.array([*travels, reading.by_voltage + own])
@@ -210,21 +212,22 @@ class KeptCharge(ConstrainedVoltage):
 
     charge: float | None = None
 
-    def read(self, pad: PadState) -> tuple[Reading, float]:
-        charging = pad.attraction.charging
+    def read(self, attraction: Any, pad: PadState) -> tuple[Reading, float]:
+        electrode = attraction.parts[0]
+        charging = electrode.charging
         kept = charging.electrode_charge(charging.old) if self.charge is None else self.charge
-        return electrode_charge(pad), kept
+        return electrode.electrode_charge(pad), kept
 
-    def unit(self, pad: PadState) -> Floats:
-        return pad.slope
+    def unit(self, attraction: Any, pad: PadState) -> Floats:
+        """It is quadratic in the voltage."""
+        volts = (pad.voltage + KILOVOLT, pad.voltage - KILOVOLT)
+        more, less = (attraction.forces(replace(pad, voltage=each)) for each in volts)
+        return np.asarray(0.5 * (more - less))
 
-    def lacking(self, pad: PadState) -> float:
-        wanted = self.held(pad)
+    def lacking(self, attraction: Any, pad: PadState) -> float:
+        reading, kept = self.read(attraction, pad)
+        wanted = self.after(pad.voltage, (kept - reading.value) / reading.by_voltage)
         return abs(wanted - pad.voltage) / max(abs(wanted), abs(pad.voltage), TINY)
-
-    def held(self, pad: PadState) -> float:
-        reading, kept = self.read(pad)
-        return self.after(pad.voltage, (kept - reading.value) / reading.by_voltage)
 
     def after(self, voltage: float, change: float) -> float:
         return voltage + KILOVOLT * change
@@ -236,13 +239,13 @@ class GivenGap(ConstrainedVoltage):
 
     gap: float
 
-    def read(self, pad: PadState) -> tuple[Reading, float]:
+    def read(self, attraction: Any, pad: PadState) -> tuple[Reading, float]:
         return smallest_gap(pad), self.gap
 
-    def unit(self, pad: PadState) -> Floats:
-        return pad.unit
+    def unit(self, attraction: Any, pad: PadState) -> Floats:
+        return np.asarray(attraction.parts[0].unit(pad))
 
-    def lacking(self, pad: PadState) -> float:
+    def lacking(self, attraction: Any, pad: PadState) -> float:
         return abs(smallest_gap(pad).value / self.gap - 1.0)
 
     def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:

@@ -21,16 +21,13 @@ state; nothing is committed before acceptance.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
-from evfem.contact.attraction import TOUCHING, Attraction
-from evfem.contact.charging import Charged
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.electrostatics.signals import PadState
+from evfem.contact.traction import TOUCHING, PadState, PadTraction
 from evfem.newton.control import Force, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
@@ -46,10 +43,12 @@ FOLDED = "there is no equilibrium near here without the outline folding over its
 class Equilibrium:
     """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
 
-    def __init__(self, body: FactorisedBody, interface: Interface, attraction: Any, limits: Limits) -> None:
+    def __init__(
+        self, body: FactorisedBody, interface: Interface, attraction: PadTraction, limits: Limits
+    ) -> None:
         self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record
-        self.rooms = (*body.body.rooms, body.pressure, *interface.rooms, attraction)
+        self.rooms = (*body.body.rooms, body.pressure, *interface.rooms)
         self.tolerance, self.strategy = limits.tolerance, limits.strategy
         self._iterate: tuple[State, Balance] | None = None
 
@@ -67,7 +66,7 @@ class Equilibrium:
             reaction=np.zeros(dim),
             last_increment=still,
         )
-        for room in self.rooms:
+        for room in (*self.rooms, self.attraction):
             state = state.remembering(room.memory(state))
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
@@ -77,8 +76,7 @@ class Equilibrium:
         self.interface.begin(old, target.duration)
         for room in self.rooms:
             room.begin(old, target.duration)
-        if self.attraction.charging is not None:
-            self.attraction.charging.begin(self.charged(old), target.duration)
+        self.attraction.begin(self.pad_state(old), target.duration)
         target.voltage.begin(old)
         return target.begun(old)
 
@@ -87,26 +85,27 @@ class Equilibrium:
         state = replace(state, last_increment=state.u - old.u)
         for room in self.rooms:
             state = state.remembering(room.accept(old, state))
-        if self.attraction.charging is not None:
-            state = state.remembering({"charges": self.charged(state, kept=False).charges})
+        ends = self.pad_state(old), self.interface.pad_state(state, old.touching)
+        state = state.remembering(self.attraction.accept(*ends))
         return state.remembering(target.drive.settled(state))
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
-        found = PadState.of(self.attraction, self.interface, state, old.touching).forces(voltage)
-        return self.interface.tilted(state, found)
+        pad = replace(self.interface.pad_state(state, old.touching), voltage=voltage)
+        return self.interface.tilted(state, self.attraction.forces(pad))
 
-    def pull_of(self, part: Attraction, state: State) -> Floats:
-        """One part of the attraction alone on the pad nodes (P, dim) in `state`, above a rigid surface."""
-        pad = PadState.of(part, self.interface, state, state.touching)
-        return pad.forces(part.load(state.voltage))
+    def pad_state(self, state: State) -> PadState:
+        """The pad of an accepted state."""
+        return self.interface.pad_state(state, state.touching)
 
-    def charged(self, state: State, *, kept: bool = True) -> Charged:
-        """The electric state in `state`: with its charges, or with those that flow up to the step's end."""
-        position, pressing = self.interface.resting(state), state.contact_force[:, 0]
-        return self.attraction.charged(
-            position, state.voltage, pressing, state.memory["charges"] if kept else None
-        )
+    def pulls(self, state: State) -> dict[str, Floats]:
+        """Forces (P, dim) of every traction by name in an accepted state, as above a rigid surface."""
+        rest, found = self.interface.bed.untilted(state, state.attraction), {}
+        for part in self.attraction.parts[:0:-1]:
+            found[part.name] = state.memory[f"forces.{part.name}"]
+            rest = rest - found[part.name]
+        first = self.attraction.parts[:1]
+        return found | {one.name: rest if one.acts(state.voltage) else 0.0 * rest for one in first}
 
     def step(self, old: State, target: Target, start: State | None = None) -> State:
         """Equilibrium at `target`, friction counted from `old`; iterations begin at `start` (default `old`).

@@ -23,11 +23,10 @@ import numpy as np
 
 from evfem.common import constants
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import Attraction, NoAttraction
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
-from evfem.electrostatics.signals import PadState
+from evfem.contact.traction import PadTraction
 from evfem.newton.anderson import Anderson
 from evfem.newton.control import Target, VoltageProblem
 from evfem.newton.interface import Interface
@@ -60,9 +59,7 @@ class Update:
 class FactorisedBody:
     """The finger's finite elements: contact is solved on their condensed tangent."""
 
-    def __init__(
-        self, body: Body, interface: Interface, attraction: Attraction | NoAttraction, limits: Limits
-    ) -> None:
+    def __init__(self, body: Body, interface: Interface, attraction: PadTraction, limits: Limits) -> None:
         self.body, self.interface, self.limits = body, interface, limits
         self.attraction = attraction
         self.size, self.pad = body.space.size, interface.pad
@@ -141,7 +138,10 @@ class FactorisedBody:
         missing = [target.height.missing(float(state.bone[1]), reaction), target.voltage.missing(reaction)]
         missing.append(target.drive.unbalanced(state.bone[::2], reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
-        return max(float(free / largest), target.voltage.lacking(self._pad_state(state)))
+        return max(
+            float(free / largest),
+            target.voltage.lacking(self.attraction, self.linearisation.pad_state(state)),
+        )
 
     def _rounding(self, state: State) -> float:
         """Forces (N/mm) below which the balance is rounding: of displacements, stresses and attraction."""
@@ -225,7 +225,7 @@ class FactorisedBody:
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
         linearisation, tangent = self.linearisation, self.linearisation.tangent
-        weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
+        weakening, gain = linearisation.weakening(state), linearisation.gain_on_closing(state)
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
         known = known if rough is None else replace(known, roughness=rough[c])
@@ -247,12 +247,9 @@ class FactorisedBody:
         self._scaled_down = found.reduced
         return found
 
-    def _pad_state(self, state: State) -> PadState:
-        return PadState.of(self.attraction, self.interface, state, self.linearisation.touching)
-
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
         """Data for a voltage control; `saved` is the residual's state for the backward solve."""
-        factor, pad, nodes = self.linearisation.factor, self._pad_state(state), self.pad.nodes
+        factor, pad, nodes = self.linearisation.factor, self.linearisation.pad_state(state), self.pad.nodes
 
         def pushed(forces: Floats) -> tuple[Floats, Floats]:
             nodal = np.zeros_like(state.u)
@@ -265,8 +262,9 @@ class FactorisedBody:
             still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
             return row, still, own
 
-        squared, unit = (state.voltage / constants.KILOVOLT) ** 2, lambda: pushed(pad.unit)
-        return VoltageProblem(squared, self._solve, unit, pushed, measured, pad)
+        squared = (state.voltage / constants.KILOVOLT) ** 2
+        unit = lambda: pushed(self.attraction.parts[0].unit(pad))  # noqa: E731
+        return VoltageProblem(squared, self._solve, unit, pushed, measured, pad, self.attraction)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""
@@ -287,7 +285,7 @@ class FactorisedBody:
         )
         # below the candidates an elastic surface gives way as the linear step found, which knows how the
         # attraction changed
-        force = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
+        pushed = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
         given = c, update.contact.given, fraction
         return after.remembering(
             self.interface.bed.sunk(self.interface.positions(state.u), state, force, given)

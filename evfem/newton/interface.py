@@ -20,6 +20,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.contact.bed import bed_of
 from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
+from evfem.contact.traction import PadState
 from evfem.newton.friction import ProportionalFriction
 from evfem.newton.state import State
 from evfem.rooms import Room
@@ -102,7 +103,7 @@ class FrictionJumps:
 
 class Interface:
     """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh; `restored`, from
-    a voltage (V) to `Attraction.restored`.
+    a voltage (V) to `PadTraction.restored`.
 
     Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where the
     dense compliance is large, the candidates follow the contact: those that are far by now are dropped.
@@ -170,6 +171,12 @@ class Interface:
         touching = state.status != OPEN
         position[touching, 1] -= self.surface_at(state).gap[touching]
         return position
+
+    def pad_state(self, state: State, touching: Any) -> PadState:
+        """The pad in a state as tractions see it, in a step that began with these nodes `touching` (P,)."""
+        place, pressing = self.resting(state), state.contact_force[:, 0]
+        memory, below = state.memory, self.surface_at(state)
+        return PadState(self.pad, self.surface, place, state.voltage, pressing, touching, memory, below)
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, dim)."""

@@ -22,9 +22,9 @@ import numpy as np
 
 from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.attraction import Attraction, Entries
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
+from evfem.contact.traction import Entries, PadState, PadTraction
 from evfem.newton.condensation import Singular, make_condensation
 from evfem.newton.interface import Interface
 from evfem.newton.state import NOTHING, Beginning, Limits, Record, State, StepFailed, TangentPoint
@@ -61,7 +61,7 @@ def limited_gain(gain: Floats) -> Floats:
 class Linearisation:
     """Candidates, factorisation and condensed tangent of a body under an attraction."""
 
-    def __init__(self, body: Body, interface: Interface, attraction: Any, limits: Limits) -> None:
+    def __init__(self, body: Body, interface: Interface, attraction: PadTraction, limits: Limits) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.pad = interface.pad
         self.record = Record()
@@ -102,7 +102,7 @@ class Linearisation:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
         position = self.interface.places(state)
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
-        weakening = self.negative_stiffness(state)
+        weakening = self.weakening(state)
         if self.interface.follows:
             least = constants.STEEP_IN_SPACE * self.softest
             self._follow(state, gap, weakening > least * self.pad.tributary(position))
@@ -151,11 +151,7 @@ class Linearisation:
 
     def _has_fringes(self, state: State) -> bool:
         """Whether the attraction at `state` has a stiffness of its own beside that of columns."""
-        return state.voltage != 0.0 and (acting := self._acting(state)) is not None and acting.has_fringes
-
-    def _acting(self, state: State) -> Attraction | None:
-        """The attraction if it acts at `state`, else None."""
-        return self.attraction if self.attraction.acts(state.voltage) else None
+        return bool(self.attraction.has_fringes and state.voltage != 0.0)
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
@@ -184,7 +180,7 @@ class Linearisation:
     def _weaken(self, upper: Floats, state: State) -> None:
         """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
         most = constants.SUBTRACTED * self.softest * self.pad.tributary(self.interface.places(state))
-        weakening = np.minimum(self.negative_stiffness(state), most)
+        weakening = np.minimum(self.weakening(state), most)
         weakening[self.candidates] = 0.0
         weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
         unknowns = self.body.unknowns[self.pad.nodes[weakened]][:, 1]
@@ -220,43 +216,44 @@ class Linearisation:
 
     # -- the attraction's part
 
-    def negative_stiffness(self, state: State) -> Floats:
+    def pad_state(self, state: State) -> PadState:
+        """The pad at an iterate of the present step."""
+        return self.interface.pad_state(state, self.touching)
+
+    def weakening(self, state: State) -> Floats:
         """Negative stiffness of the attraction of every pad node, (P,) in N/mm per mm."""
-        if (attraction := self._acting(state)) is None:
+        if not self.attraction.acts(state.voltage):
             return np.zeros(self.pad.nodes.size)
-        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
-        return attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
+        return np.asarray(self.attraction.weakening(self.pad_state(state)))
 
     def gain_on_closing(self, state: State) -> Floats:
         """Increase of the attraction of every pad node when its gap closes, (P,) in N/mm."""
-        if (attraction := self._acting(state)) is None:
+        attraction = self.attraction
+        if not attraction.acts(state.voltage):
             return np.zeros(self.pad.nodes.size)
-        everywhere = replace(state, status=np.full_like(state.status, STICK))
-        # gaps now, and with every node in contact
-        places = [self.interface.resting(s) for s in (state, everywhere)]
-        at = (state.voltage, self.touching, state.contact_force[:, 0])
-        now, closed = (attraction.column_law.forces(place, *at)[:, 1] for place in places)
-        return np.asarray(attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
+        now = self.pad_state(state)
+        everywhere = self.pad_state(replace(state, status=np.full_like(state.status, STICK)))
+        pull, closed = (attraction.column_law.forces(pad)[:, 1] for pad in (now, everywhere))
+        return np.asarray(attraction.tangent_factor(now) * np.maximum(pull - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
         """Derivatives of the attraction of every pad node by its contact force, along normal and tangent,
         where rough faces come closer under it; None for smooth faces.
         """
-        if (attraction := self._acting(state)) is None or attraction.roughness is None:
+        attraction = self.attraction
+        if not (attraction.rough and attraction.acts(state.voltage)):
             return None
-        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        pad, pressing = self.pad_state(state), state.contact_force[:, 0]
         unpressed, pressed = (
-            attraction.column_law.forces(place, state.voltage, self.touching, each)[:, 1]
-            for each in (None, pressing)
+            attraction.column_law.forces(one)[:, 1] for one in (replace(pad, pressing=None), pad)
         )
-        factor = attraction.tangent_factor(place, state.voltage, self.touching, pressing)
-        lost = factor * (unpressed - pressed)
+        lost = attraction.tangent_factor(pad) * (unpressed - pressed)
         surface = self.interface.surface_at(state)
         along = surface.axes[:, :, 0]  # of a pull straight down
         if attraction.direction == "normal":
             along = np.zeros_like(state.contact_force)
             along[:, 0] = surface.stretch
-        gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)[:, None] * along
+        gain = attraction.gain_on_pressing(pad)[:, None] * along
         # the full tangential gain could close a node on a slope by more than the limited normal gain holds
         gain[:, 1:] = np.where(gain[:, :1] > constants.STABLE, 0.0, gain[:, 1:])
         gain[:, 0] = limited_gain(gain[:, 0])
@@ -267,17 +264,11 @@ class Linearisation:
         left are changes of tributary lengths. None where they are faint, as a symmetric compliance takes a
         third of the time, and with charges, so that a factorisation does not depend on the step.
         """
-        if (attraction := self._acting(state)) is None or attraction.charging:
+        attraction = self.attraction
+        if attraction.flows or not attraction.acts(state.voltage):
             return None
-        position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
-        pressing = state.contact_force[:, 0]
-        if self.fringes:
-            from evfem.contact.fullfield import FieldAttraction
-
-            assert isinstance(attraction, FieldAttraction)
-            whole = attraction.fringe_stiffness(position, state.voltage, pressing)
-        else:
-            whole = attraction.stiffness(position, state.voltage, self.touching, pressing)
+        pad, c, dim = self.pad_state(state), self.candidates, self.body.bone.size
+        whole = attraction.full_stiffness(pad) if self.fringes else attraction.stiffness(pad)
         unknowns = (dim * c[:, None] + np.arange(dim)).ravel()
         number = np.full(whole.size, -1)
         number[unknowns] = np.arange(unknowns.size)
@@ -286,8 +277,8 @@ class Linearisation:
         along = np.where((column < 0) & (axis != 1), row - row % dim + axis, column)
         seen = (row >= 0) & (along >= 0)
         inner = Entries(unknowns.size, row[seen], along[seen], whole.value[seen]).toarray()
-        normal = surface_state(self.interface.surface, position[c]).axes[:, 0, COMPONENTS[:dim]]
-        own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        normal = surface_state(self.interface.surface, pad.position[c]).axes[:, 0, COMPONENTS[:dim]]
+        own = self.weakening(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
         # that belongs to the contact problem: not twice
         blocks = inner.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own

@@ -219,7 +219,7 @@ def linearised(model: Model, state: State) -> LinearSystem:
     damping = pattern.zeros()
     if terms.viscosity is not None:
         viscous = Dynamics(body.space, terms.viscosity, None)
-        viscous.begin(state.u, np.zeros_like(state.u), 1.0)
+        viscous.begin_from(state.u, np.zeros_like(state.u), 1.0)
         viscous.add_tangent(state.u, pattern, damping)
     branches = {} if terms.branches is None else terms.branches.at_once(state.u, pattern)
     return LinearSystem(
@@ -291,8 +291,8 @@ class Contact:
         attraction, state = self.model.attraction, self.state
         if not attraction.acts(state.voltage):
             return felt
-        at = (self.interface.resting(state), state.voltage, state.touching, state.contact_force[:, 0])
-        gain, surface = attraction.gain_on_pressing(*at)[self.nodes], self.known.surface
+        pad = self.interface.pad_state(state, state.touching)
+        gain, surface = attraction.gain_on_pressing(pad)[self.nodes], self.known.surface
         if attraction.direction == "normal":
             felt[:, 0] -= gain * surface.stretch
         else:
@@ -304,11 +304,7 @@ class Contact:
         state, u = self.state, self.unknowns.ravel()
         if not attraction.acts(state.voltage):
             return self._matrix(np.zeros(0), u[:0], u[:0])
-        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
-        if attraction.has_fringes:
-            found = attraction.fringe_stiffness(place, state.voltage, pressing)
-        else:
-            found = attraction.stiffness(place, state.voltage, state.touching, pressing)
+        found = attraction.full_stiffness(self.interface.pad_state(state, state.touching))
         return self._matrix(found.value, u[found.row], u[found.column])
 
     def _matrix(self, values: Floats, rows: Ints, columns: Ints) -> Any:

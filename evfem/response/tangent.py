@@ -125,11 +125,10 @@ class Tangent:
         attraction = self.equations.model.attraction
         if not attraction.acts(state.voltage):
             return found
-        resting, touched = self.equations.interface.resting(state), self.equations.old.touching
-        seen = (resting, state.voltage, touched, force[:, 0])
-        pulled = attraction.stiffness(*seen)
+        seen = self.equations.interface.pad_state(state, self.equations.old.touching)
+        pulled = attraction.stiffness(seen)
         found.append((moves.ravel()[pulled.row], moves.ravel()[pulled.column], -pulled.value))
-        found.append((moves[:, 1], presses[:, 0], attraction.gain_on_pressing(*seen)))
+        found.append((moves[:, 1], presses[:, 0], attraction.gain_on_pressing(seen)))
         return found
 
     def _contact_rows(self) -> list[Triplet]:

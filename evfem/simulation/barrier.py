@@ -29,7 +29,6 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import Attraction
 from evfem.newton.control import Target
 from evfem.simulation.works import SubstepWork
 from evfem.surface.pad import surface_state
@@ -72,28 +71,13 @@ def _pulled(part: SubstepWork, carried: Floats) -> Floats:
     attraction, old, new = part.model.attraction, part.old, part.new
     if not attraction.acts(new.voltage):
         return np.zeros_like(PLACES)
-    along = part.way - carried
-    begin = part.model.equilibrium.interface.resting(old) + carried
+    along, equilibrium = part.way - carried, part.model.equilibrium
+    begin = equilibrium.interface.resting(old) + carried
     begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
-    with part.charges_held():
-        flat, power = part.model.surface.is_flat, np.zeros_like(FINE)
-        for one in (each for each in attraction.parts if not (each.always and flat)):
-            load = one.load(new.voltage)
-            power = power + part.pulls(along, FINE, (load, load), begin, one)
-    work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(FINE)))
-    work = work + sum(_adhered(part, begin, one) for one in attraction.parts if one.always and flat)
-    fringes = float(np.sum(new.attraction * along)) - float(power[-1]) if attraction.has_fringes else 0.0
-    return np.interp(PLACES, FINE, work) + fringes * PLACES
-
-
-def _adhered(part: SubstepWork, begin: Floats, adhesive: Attraction) -> Floats:
-    """Work of adhesion up to `FINE` above a flat surface, by its potential: its reach may be short."""
-    end = part.model.equilibrium.interface.resting(part.new)
-    ends = [surface_state(part.model.surface, place).gap for place in (begin, end)]
-    gaps = np.maximum(np.outer(1.0 - FINE, ends[0]) + np.outer(FINE, ends[1]), 0.0)
-    length = 0.5 * (adhesive.weights(begin) + adhesive.weights(end))
-    energy = np.asarray(adhesive.law.potential(gaps)) @ length
-    return np.asarray(energy[0] - energy)
+    ends = equilibrium.pulls(new)
+    paths = {one: part.path(ends[one.name], ends[one.name]) for one in attraction.parts}
+    work = sum(one.released_work(path, along, begin, FINE) for one, path in paths.items())
+    return np.asarray(np.interp(PLACES, FINE, work))
 
 
 def _rubbed(part: SubstepWork) -> float:

@@ -15,7 +15,7 @@ from evfem.newton.state import State
 from evfem.simulation.history import PULLS, SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, SubstepWork, source_of
+from evfem.simulation.works import Books, SubstepWork, charged_of, source_of
 from evfem.surface.pad import Pad, reach, surface_state
 
 
@@ -59,8 +59,9 @@ class Ledger:
         if self.model.scene.adhesion is None:
             return
         equilibrium = self.model.equilibrium
-        always = [part for part in self.model.attraction.parts if part.always]
-        holds = -float(sum(equilibrium.pull_of(part, new)[:, 1].sum() for part in always))
+        always = [part.name for part in self.model.attraction.parts if part.always]
+        pulls = equilibrium.pulls(new)
+        holds = -float(sum(pulls[name][:, 1].sum() for name in always))
         if not new.touching.any() and self.pull > 0.0 and holds < LEFT * self.pull:
             self.let_go, self.pull = self.pull, 0.0
         elif self.model.body.drag_rate == 0.0:
@@ -109,24 +110,20 @@ class Ledger:
             **self.sums,
             "stored_energy": end.stored + end.springs,
             "kinetic_energy": end.kinetic,
-            "field_energy": 0.0 if source is None else source.field_energy(model.equilibrium.charged(state)),
+            "field_energy": 0.0 if source is None else source.field_energy(charged_of(model, state)),
         }
 
     def _pulls(self, state: State, withheld: Floats) -> dict[str, tuple[Floats, float]]:
         """Of every attraction by name: its force on the pad (dim,), its part of what cores withhold."""
         model, none = self.model, np.zeros(state.bone.size)
         found: dict[str, tuple[Floats, float]] = dict.fromkeys(PULLS, (none, 0.0))
-        rest, kept = state.attraction, withheld
-        acting = [part for part in model.attraction.parts if part.acts(state.voltage)]
-        both = model.attraction.restored(state.voltage)[0]
-        for part in acting[:0:-1]:
-            own, left = model.equilibrium.pull_of(part, state), part.restored(part.load(state.voltage))[0]
-            share = left / np.where(both > 0.0, both, np.inf)
-            pull = model.equilibrium.interface.tilted(state, own)
-            found[part.name] = pull.sum(axis=0), float(np.sum(share * withheld))
-            rest, kept = rest - pull, kept - share * withheld
-        for part in acting[:1]:  # the rest is its own
-            found[part.name] = rest.sum(axis=0), float(kept.sum())
+        pulls = model.equilibrium.pulls(state)
+        interface, both = model.equilibrium.interface, model.attraction.restored(state.voltage)[0]
+        every = np.where(both > 0.0, both, np.inf)
+        for part in model.attraction.parts:
+            share = part.restored(state.voltage)[0] / every
+            pull = interface.tilted(state, pulls[part.name]).sum(axis=0)
+            found[part.name] = pull, float(np.sum(share * withheld))
         return found
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
@@ -179,7 +176,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
     position, withheld = interface.places(state), interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
-    pulled = _positive(model.attraction.weights(position))
+    pulled = _positive(model.attraction.weights(interface.pad_state(state, state.touching)))
 
     def on_pad(values: Any, off: float) -> Any:
         field = np.full(size, off)

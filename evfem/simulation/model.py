@@ -10,9 +10,10 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.common.arrays import Floats
-from evfem.contact.adhesive import sum_of
-from evfem.contact.attraction import Attraction, NoAttraction
-from evfem.contact.charging import Charging
+from evfem.contact.attraction import Attraction
+from evfem.contact.charging import NO_CHARGES, Charging, NoCharges
+from evfem.contact.traction import PadTraction
+from evfem.contact.tractions import sum_of
 from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
@@ -50,7 +51,7 @@ class Model:
     body: Body
     pad: Pad | Skin
     surface: Any
-    attraction: Attraction | NoAttraction
+    attraction: Any
     equilibrium: Equilibrium
     first_gap: float
     closing: Closing
@@ -138,9 +139,7 @@ def linearised(model: Model, state: State) -> Model:
     return replace(model, body=body, equilibrium=equilibrium)
 
 
-def make_interface(
-    closing: Closing, pad: Pad | Skin, surface: Any, attraction: Attraction | NoAttraction
-) -> Interface:
+def make_interface(closing: Closing, pad: Pad | Skin, surface: Any, attraction: PadTraction) -> Interface:
     """The contact interface: exact or penalty."""
     scene, points, solver = closing.scene, closing.mesh.points, closing.scene.solver
     interface = Interface(pad, points, surface, solver.tolerance)
@@ -177,7 +176,8 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
     if isinstance(scene.voltage, FollowForce):
         _check_quadratic(scene)
     law, layers = electrics.attraction
-    rough, charging = roughness_of(scene.roughness_gap), None
+    rough = roughness_of(scene.roughness_gap)
+    charging: Charging | NoCharges = NO_CHARGES
     if electrics.resolved:
         charging = Charging(electrics.sandwich, pad.nodes.size)
     if closing.core is not None:

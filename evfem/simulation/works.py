@@ -77,20 +77,17 @@ The first part begins without any load: voltage, adhesion and user's forms count
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.quadrature import ENDS, FINE_SHARE, FINE_WAY, LEGENDRE, PART, SEEN, SHARE, SLIDE, WAY
-from evfem.contact.attraction import Attraction
+from evfem.common.quadrature import PART, SHARE, SLIDE, WAY
 from evfem.contact.bed import Rigid
-from evfem.contact.charging import Charging
+from evfem.contact.charging import Charged, Charging
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
+from evfem.contact.traction import PadPath, PadState
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
 from evfem.simulation.history import PULLS, SUMS
@@ -126,7 +123,16 @@ class Books:
 
 def source_of(model: Model) -> Charging | None:
     """The charges whose source's work is known: of a voltage resolved in time and Strong and Troxel's law."""
-    return model.attraction.charging if getattr(model.attraction.law, "of_a_field", False) else None
+    for part in model.attraction.parts[:1]:
+        if part.flows and getattr(part.law, "of_a_field", False):
+            return part.charging
+    return None
+
+
+def charged_of(model: Model, state: State) -> Charged:
+    """The electric state of the voltage's traction in an accepted state."""
+    found: Charged = model.attraction.parts[0].charged(model.equilibrium.pad_state(state))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,122 +187,46 @@ class SubstepWork:
         return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
 
     def pulled(self) -> dict[str, float]:
-        """Works of the attractions by name, N mm per mm of depth."""
-        attraction, states = self.model.attraction, (self.old, self.new)
-        equilibrium = self.model.equilibrium
-        untilted = equilibrium.interface.bed.untilted
-        rest, found = [untilted(state, state.attraction) for state in states], {}
-        for part in attraction.parts[::-1]:
-            loads = [part.load(state.voltage) for state in states]
-            own = rest
-            if part is not attraction.parts[0]:
-                own = [equilibrium.pull_of(part, state) for state in states]
-            if self.first and part.always:  # raised within the first part
-                own, loads = [np.zeros_like(own[0]), own[1]], [0.0, loads[1]]
-            found[part.name] = self._work_of(part, *own, (loads[0], loads[1]))
-            rest = [all_of - one for all_of, one in zip(rest, own, strict=True)]
-        return found
+        """Works of the tractions by name, N mm per mm of depth."""
+        before, after = (self.model.equilibrium.pulls(state) for state in (self.old, self.new))
+        parts = self.model.attraction.parts
+        return {one.name: one.work_along(self.path(before[one.name], after[one.name])) for one in parts}
 
-    def _work_of(
-        self, attraction: Attraction, before: Floats, after: Floats, voltages: tuple[float, float]
-    ) -> float:
-        """Work of an attraction by its forces (P, dim) and voltages at both ends."""
-        model, old, new, moved = self.model, self.old, self.new, self.way
-        trapezoidal = _mean_work(before, after, moved)
-        if attraction.charging is not None:
-            return self._work_of_charged(attraction.charging, moved)
-        if not any(voltages):
-            return trapezoidal
-        if attraction.has_energy:
-            begin, end = (model.equilibrium.interface.resting(state) for state in (old, new))
-            own: Any = attraction
-            return trapezoidal + own.beyond_trapezoidal(begin, end, voltages)
-        open_ = ~(old.touching | new.touching)
+    @cached_property
+    def pads(self) -> tuple[PadState, PadState]:
+        """The pad before and after; in the first substep what acts without a voltage is raised."""
+        interface, touching = self.model.equilibrium.interface, self.old.touching
+        before, after = (interface.pad_state(state, touching) for state in (self.old, self.new))
+        return replace(before, load=0.0) if self.first else before, after
+
+    def path(self, before: Floats, after: Floats) -> PadPath:
+        """The substep as a traction with these forces (P, dim) at both ends sees it."""
+        if self.first:
+            before = np.zeros_like(after)
+        open_ = ~(self.old.touching | self.new.touching)
         # trapezoidal only on the way with the bone, and only where that is not stopped by the surface
-        along = moved - np.where(open_[:, None], new.bone - old.bone, 0.0)
-        if not (along[:, 1].any() or attraction.direction == "normal"):
-            return trapezoidal
-        ends = _mean_work(before, after, along)
-        if attraction.has_fringes:
-            ends = float(np.mean(self.pulls(along, ENDS, voltages)))
-        return trapezoidal + self._on_the_way(along, voltages, attraction) - ends
-
-    def _on_the_way(
-        self, along: Floats, voltages: tuple[float, float], attraction: Attraction | None = None
-    ) -> float:
-        """Work of an attraction along `along` (P, dim) of the straight way between two voltages."""
-        values = self.pulls(along, WAY, voltages, attraction=attraction)
-        size = np.abs(LEGENDRE @ values)
-        if size[-2:].max() > SEEN * size.max():
-            return float(FINE_SHARE @ self.pulls(along, FINE_WAY, voltages, attraction=attraction))
-        return float(SHARE @ values)
-
-    def _work_of_charged(self, charging: Charging, moved: Floats) -> float:
-        """Work of the attraction while the pad moves (P, dim) with its old charges and voltage."""
-        begin, seconds = charging.old, charging.seconds
-        charging.begin(begin, 0.0)
-        work = self._on_the_way(moved, (begin.voltage, begin.voltage))
-        charging.begin(begin, seconds)
-        return work
-
-    @contextmanager
-    def charges_held(self) -> Iterator[None]:
-        """Within, the charges are those of the end."""
-        if (charging := self.model.attraction.charging) is None:
-            yield
-            return
-        begin, seconds = charging.old, charging.seconds
-        charging.begin(self.model.equilibrium.charged(self.new), 0.0)
-        try:
-            yield
-        finally:
-            charging.begin(begin, seconds)
+        turned = self.way - np.where(open_[:, None], self.new.bone - self.old.bone, 0.0)
+        return PadPath(*self.pads, self.way, turned, (before, after))
 
     def _flow(self, charging: Charging) -> tuple[float, float]:
         """Work of the source and leakage; the first voltage is raised before anything moves."""
-        flow = charging.flow(self.model.equilibrium.charged(self.new))
+        flow = charging.flow(self.model.attraction.parts[0].charged(self.pads[1]))
         raised = self.old.voltage != charging.old.voltage
         return flow.source_work + (charging.field_energy(charging.old) if raised else 0.0), flow.leakage
 
     def _stretching(self, charging: Charging) -> float:
-        """Work of the field on the tributary lengths on the way of `_work_of_charged`."""
-        attraction: Any = self.model.attraction
-        interface = self.model.equilibrium.interface
-        begin, end = (interface.resting(state) for state in (self.old, self.new))
+        """Work of the field on the tributary lengths on the path of the charged pad."""
+        attraction, (before, after) = self.model.attraction.parts[0], self.pads
         lengths = attraction.pad.tributary
-        grown = lengths(end) - lengths(begin)
-        pressed = self.old.contact_force[:, 0], self.new.contact_force[:, 0]
-        work = 0.0
-        for way, share in zip(WAY, SHARE, strict=True):
-            position, pressing = begin + way * (end - begin), pressed[0] + way * (pressed[1] - pressed[0])
-            carried = charging.carried(lengths(position))
-            at = attraction.charged(position, charging.old.voltage, pressing, carried)
+        grown = lengths(after.position) - lengths(before.position)
+        volts, work = charging.old.voltage, 0.0
+        none = np.zeros_like(before.position)
+        path = PadPath(before, after, none, none, (none, none)).at(WAY, np.full(WAY.shape, volts))
+        for pad, share in zip(path.states(), SHARE, strict=True):
+            carried = {"charges": charging.carried(lengths(pad.position))}
+            at = attraction.charged(replace(pad, memory=carried))
             work += share * float(charging.energy_density(at) @ grown)
         return work
-
-    def pulls(
-        self,
-        along: Floats,
-        ways: Floats,
-        voltages: tuple[float, float],
-        begin: Floats | None = None,
-        attraction: Attraction | None = None,
-    ) -> Floats:
-        """Power of all attraction, or of one, in N mm per mm of depth (w,), on the way `along` (P, dim) at
-        the parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
-        growing evenly; of what has fringes that of the columns.
-        """
-        old, new = self.old, self.new
-        attraction = attraction or self.model.attraction
-        begin = self.model.equilibrium.interface.resting(old) if begin is None else begin
-        end = self.model.equilibrium.interface.resting(new)
-        volts = np.sqrt((1.0 - ways) * voltages[0] ** 2 + ways * voltages[1] ** 2)
-        if attraction.charging is not None:
-            volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
-        places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
-        pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
-        forces = attraction.column_law.forces_along(places, volts, old.touching, pressing)
-        return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""

@@ -178,7 +178,7 @@ class Stepper:
         return [(first, half), (second, end)], relative_difference(self.solve(state, whole, start=end), end)
 
     def _relaxation(self, body: Body) -> Relaxation:
-        return Relaxation(body, self.solve, self.equilibrium.attraction.charging is not None)
+        return Relaxation(body, self.solve, self.equilibrium.attraction.flows)
 
     def _released(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
         """Equilibrium that the body snaps to from `state`, or None; `Folded` or `LiftedOff` if impossible."""

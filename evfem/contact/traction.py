@@ -1,0 +1,284 @@
+r"""What pulls on the pad: nodal forces that depend on the pad's state, and what contact has to know of them.
+
+`PadState` is the pad as a traction sees it. A traction answers with forces on the finger, f (P, dim), their
+derivative by the places of the nodes, and three numbers per node that the contact problem solves along:
+`weakening`, -df/dg of its own vertical gap, `gain_on_pressing`, by how much it grows with the contact force,
+and `restored`, what of the pressure on closed nodes it leaves out. Forces on open nodes enter the balance as
+they are. Between two states the work is that of the forces along the straight path of the nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.common.quadrature import FINE_SHARE, FINE_WAY, LEGENDRE, SEEN, SHARE, WAY
+from evfem.rooms import Column, Room
+from evfem.surface.pad import Pad, SurfaceState, surface_state
+from evfem.surface.skin import Skin
+
+#: gaps up to this (mm) count as closed
+TOUCHING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class PadState:
+    """The P nodes of a `pad` above a `surface`: their `position` (P, dim) in mm, touching ones exactly on it,
+    the display's `voltage` (V), the contact forces `pressing` (P,) along the normal (N/mm, in space N; None
+    for none), which were `touching` (P,) when the step began, the `memory` of rooms, and the `load`, 0 to 1,
+    by which what acts without a voltage is on: the first substep raises it. On a path of W states positions
+    are (W, P, dim), voltages and loads (W,), contact forces (W, P). `below`: the surface as it has sunk.
+    """
+
+    pad: Pad | Skin
+    surface: Any
+    position: Floats
+    voltage: Any
+    pressing: Floats | None
+    touching: Any
+    memory: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    below: SurfaceState | None = None
+    load: Any = 1.0
+
+    @cached_property
+    def frame(self) -> SurfaceState:
+        """The undeformed surface below the nodes; on a path node by node and state by state."""
+        return surface_state(self.surface, self.position.reshape(-1, self.position.shape[-1]))
+
+    @cached_property
+    def gap(self) -> Floats:
+        """Vertical gaps (..., P) in mm, 0 where a trial state has sunk in."""
+        return np.maximum(self.frame.gap, 0.0).reshape(self.position.shape[:-1])
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """Tributary lengths (..., P) in mm, in space areas in mm2, 0 where the outline faces away."""
+        return self.pad.tributary(self.position)
+
+    @property
+    def pressed(self) -> Floats:
+        """Contact forces (..., P), 0 where there are none."""
+        return np.zeros(self.position.shape[:-1]) if self.pressing is None else self.pressing
+
+    @property
+    def path(self) -> PadState:
+        """The same as a path of one state."""
+        pressing = None if self.pressing is None else self.pressing[None]
+        voltage, load = np.array([self.voltage]), np.array([self.load])
+        return replace(self, position=self.position[None], voltage=voltage, load=load, pressing=pressing)
+
+    def states(self) -> list[PadState]:
+        """The states of a path, one by one."""
+        pressing = [None] * len(self.position) if self.pressing is None else list(self.pressing)
+        each = zip(self.position, self.voltage.tolist(), self.load.tolist(), pressing, strict=True)
+        return [replace(self, position=x, voltage=u, load=s, pressing=f) for x, u, s, f in each]
+
+
+@dataclass(frozen=True, eq=False)
+class PadPath:
+    """A substep as a traction sees it: the pad at both ends, how far its nodes `moved` (P, dim) relative to
+    the surface, the part of that along which the end forces alone do not give the work, `turned` (P, dim),
+    and the forces (P, dim) of the traction at both `ends`.
+    """
+
+    old: PadState
+    new: PadState
+    moved: Floats
+    turned: Floats
+    ends: tuple[Floats, Floats]
+
+    def at(self, fractions: Floats, voltage: Floats, begin: Floats | None = None) -> PadState:
+        """The states at fractions (w,) of the straight path, from `begin` (P, dim) if that is given."""
+        start, end = self.old.position if begin is None else begin, self.new.position
+        pressed = self.old.pressed, self.new.pressed
+        place = start + fractions[:, None, None] * (end - start)
+        pressing = pressed[0] + fractions[:, None] * (pressed[1] - pressed[0])
+        load = evenly(self.old.load, self.new.load, fractions)
+        return replace(self.old, position=place, voltage=voltage, load=load, pressing=pressing)
+
+    @property
+    def trapezoidal(self) -> float:
+        """Work of the mean of the end forces along what the nodes moved (N mm)."""
+        return float(0.5 * np.sum((self.ends[0] + self.ends[1]) * self.moved))
+
+
+def evenly(before: float, after: float, fractions: Floats) -> Floats:
+    """Values (w,) whose square grows evenly from that of `before` to that of `after`."""
+    return np.asarray(np.sqrt((1.0 - fractions) * before**2 + fractions * after**2))
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A number that a state has, with its derivatives by a kV and by the positions (P, dim)."""
+
+    value: float
+    by_voltage: float
+    by_position: Floats
+
+
+def smallest_gap(pad: PadState) -> Reading:
+    """The smallest vertical gap of the pad (mm)."""
+    assert pad.below is not None
+    least = int(np.argmin(pad.below.gap))
+    by_position = np.zeros_like(pad.position)
+    by_position[least, ::2], by_position[least, 1] = -pad.below.slope[least], 1.0
+    return Reading(float(pad.below.gap[least]), 0.0, by_position)
+
+
+class Entries(NamedTuple):
+    """Entries (K,) of a matrix (size, size) at these rows and columns; those of one place add up."""
+
+    size: int
+    row: Ints
+    column: Ints
+    value: Floats
+
+    @classmethod
+    def of(cls, size: int, blocks: Iterable[tuple[Any, Any, Any]]) -> Entries:
+        """From several rows, columns and values at once, broadcast."""
+        whole = [np.broadcast_arrays(*block) for block in blocks]
+        if not whole:
+            return cls(size, *(np.zeros(0, dtype=np.int64),) * 2, np.zeros(0))
+        return cls(size, *(np.concatenate([each[i].ravel() for each in whole]) for i in range(3)))
+
+    def toarray(self) -> Floats:
+        """The dense matrix."""
+        flat: Any = np.bincount(self.size * self.row + self.column, self.value, self.size**2)
+        return flat.reshape(self.size, self.size)
+
+
+class PadTraction(Room):
+    """Forces on the pad's nodes that depend on where they are; here none.
+
+    A traction of one's own has a `name` and `forces`, and `weakening` where these fall with the gap. Its
+    columns are NAME_force (N/mm, downwards), NAME_force_x and NAME_work (N). `begin`, `accept` and
+    the energies of a room get the `PadState` in the place of the state.
+    """
+
+    #: of its columns in the history
+    name = "traction"
+    #: whether it acts without a voltage: as much then as at any
+    always = True
+    #: "vertical", or "normal" to the outline: where a contact force lets it grow
+    direction = "vertical"
+    #: whether `work` is known from an energy; whether forces are more than those of columns; what rounding
+    #: does to them, as a fraction of the largest nodal one; whether charge flows in a step
+    has_energy, has_fringes, rounding, flows = False, False, 0.0, False
+    #: whether rough faces come closer under contact forces
+    rough = False
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """The tractions of which this is the sum."""
+        return (self,)
+
+    def own_columns(self, dim: int) -> tuple[Column, ...]:
+        """Columns of its force and its work."""
+        name, unit = self.name, "N/mm"
+        along = [
+            Column(f"{name}_force_{axis}", unit, f"{axis} component of {name}") for axis in "xz"[: dim - 1]
+        ]
+        work = Column(f"{name}_work", "N", f"done by {name}")
+        return Column(f"{name}_force", unit, f"{name}, downwards"), *along, work
+
+    def acts(self, voltage: float) -> bool:
+        """Whether it pulls at all at this voltage of the display (V)."""
+        return True
+
+    def forces(self, pad: PadState) -> Floats:
+        """Nodal forces on the finger (P, dim) in N/mm, in space N."""
+        return np.zeros_like(pad.position)
+
+    def forces_along(self, path: PadState) -> Floats:
+        """`forces` in the W states of a path, (W, P, dim)."""
+        return np.stack([self.forces(pad) for pad in path.states()])
+
+    def weights(self, pad: PadState) -> Floats:
+        """Lengths or areas (P,) by which the forces are tractions."""
+        return pad.lengths
+
+    def weakening(self, pad: PadState) -> Floats:
+        """Decrease of a node's pull with its own vertical gap, not negative, (P,) in N/mm per mm."""
+        return np.zeros(len(pad.position))
+
+    def gain_on_pressing(self, pad: PadState) -> Floats:
+        """Growth of a node's pull per contact force (P,)."""
+        return np.zeros(len(pad.position))
+
+    def stiffness(self, pad: PadState) -> Entries:
+        """Derivative of `forces` by node positions (dim P, dim P), ordered (node, component)."""
+        up = 1 + pad.position.shape[1] * np.arange(len(pad.position))
+        return Entries.of(pad.position.size, [(up, up, self.weakening(pad))])
+
+    def full_stiffness(self, pad: PadState) -> Entries:
+        """The same with what fringes of the field add."""
+        return self.stiffness(pad)
+
+    def restored(self, voltage: float) -> tuple[Any, Any]:
+        """Of closed nodes' pull (P,) in MPa what is left out, and what is not; 0 where nothing is."""
+        return 0.0, 0.0
+
+    @property
+    def column_law(self) -> Any:
+        """The traction whose derivative `weakening` is, and that resolves how it grows as gaps close."""
+        return self
+
+    def tangent_factor(self, pad: PadState) -> Any:
+        """Factor (P,), or 1, of the derivatives of the `column_law` in the tangent of the forces."""
+        return 1.0
+
+    def work_along(self, path: PadPath) -> float:
+        """Work on the finger in a substep (N mm)."""
+        if not path.turned.any():
+            return path.trapezoidal
+        return path.trapezoidal + self.power(path, path.turned) - self.power_of_ends(path, path.turned)
+
+    def power_of_ends(self, path: PadPath, along: Floats) -> float:
+        """Work along `along` (P, dim) by the mean of the end forces (N mm)."""
+        return float(0.5 * np.sum((path.ends[0] + path.ends[1]) * along))
+
+    def power(self, path: PadPath, along: Floats) -> float:
+        """Work along `along` (P, dim) of the straight path by quadrature (N mm)."""
+        values = self.powers(path, along, WAY)
+        size = np.abs(LEGENDRE @ values)
+        if size[-2:].max() > SEEN * size.max():
+            return float(FINE_SHARE @ self.powers(path, along, FINE_WAY))
+        return float(SHARE @ values)
+
+    def powers(self, path: PadPath, along: Floats, fractions: Floats, begin: Floats | None = None) -> Floats:
+        """Powers (w,) along `along` (P, dim) at fractions (w,) of the straight path, from `begin` (P, dim) if
+        that is given, the squared voltage growing evenly; of what has fringes that of the columns.
+        """
+        volts = evenly(path.old.voltage, path.new.voltage, fractions)
+        forces = self.column_law.forces_along(path.at(fractions, volts, begin))
+        return np.asarray(np.sum(forces * along, axis=(1, 2)))
+
+    def released_work(self, path: PadPath, along: Floats, begin: Floats, fractions: Floats) -> Floats:
+        """Work (w,) in N mm under the loads of the end up to fractions (w,) of the straight path from `begin`
+        (P, dim), along `along` (P, dim).
+        """
+        held = replace(path, old=replace(path.old, voltage=path.new.voltage, load=path.new.load))
+        power = self.powers(held, along, fractions, begin)
+        return np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(fractions)))
+
+
+class NoTraction(PadTraction):
+    """Nothing pulls: the empty sum."""
+
+    always = False
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        return ()
+
+    def acts(self, voltage: float) -> bool:
+        return False
+
+    def forces_along(self, path: PadState) -> Floats:
+        return np.zeros_like(path.position)
