@@ -285,10 +285,10 @@ class FactorisedBody:
         )
         # below the candidates an elastic surface gives way as the linear step found, which knows how the
         # attraction changed
-        pushed = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
-        given = c, update.contact.given, fraction
+        push = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
+        found = c, update.contact.given, fraction
         return after.remembering(
-            self.interface.bed.sunk(self.interface.positions(state.u), state, force, given)
+            self.interface.bed.sunk(self.interface.positions(state.u), state, push, found)
         )
 
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:
