@@ -82,7 +82,7 @@ def filled(text: str, indent: str = "  ") -> str:
 def columns(text: str) -> str:
     """The page on notation with the table of the history's columns."""
     lines = ["| name | unit | meaning |", "|---|---|---|"]
-    lines += [f"| `{name}` | {UNITS[name]} | {MEANINGS[name]} |".replace("|  |", "| |") for name in COLUMNS]
+    lines += [f"| `{name}` | {UNITS[name]} | {MEANINGS[name]} |".replace("|  |", "| |") for name in MEANINGS]
     return TABLE.sub(lambda found: found[1] + "\n".join(lines) + "\n\n", text)
 
 

@@ -8,7 +8,7 @@ rooms of a scene in the order of a step and knows none by name (docs, Inside)::
     accept(old, new)        a substep is accepted    the room's memory at its end
     stored, kinetic         of an accepted state     energies
     work, dissipation       of an accepted substep   the balance of energy closes with them
-    values(model, state)    of an accepted state     the room's `columns` in the history
+    values, works           of a state, a substep    the room's `columns` in the history
 
 Units: mm, N, MPa, s, V; in the plane per mm of depth. N nodes, P nodes of the pad, dim = 2 or 3.
 A room that keeps nothing, stores nothing and shows nothing inherits all of it from here.
@@ -78,5 +78,9 @@ class Room:
         return False
 
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
-        """Values of the `columns` in an accepted state."""
+        """Values in an accepted state of the `columns` that are no sums."""
+        return {}
+
+    def works(self, substep: Any) -> Mapping[str, float]:
+        """What a substep adds to the `columns` that end in _work or _dissipation (N mm)."""
         return {}

@@ -25,12 +25,12 @@ from evfem.errors import InputError, quoted, readable, unknown
 from evfem.scene.keys import shown
 from evfem.scene.options import Solver
 from evfem.scene.scene import DEPTH
-from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, over_depth
+from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, SPATIAL_UNITS, UNITS, over_depth
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
 
-NUMBERS = tuple(name for name in (*COLUMNS, *SPATIAL) if name != "motion")
+NUMBERS = tuple(name for name in (*COLUMNS, *ROOM_COLUMNS, *SPATIAL) if name != "motion")
 #: most measured numbers of one kind
 MOST = 100_000
 #: error of a solved column relative to its largest value, in tolerances of the solver

@@ -45,6 +45,8 @@ def attraction(u: Any, v: Any, w: Any) -> Any:
     return w.law.traction(gap, w.voltage, w.layers) * width * v[1]
 
 
+#: name of the traction of a voltage, whose columns every history has
+ELECTROSTATIC = "electrostatic"
 #: adhesion, in the place of a voltage: it is always on
 ON = 1.0
 
@@ -64,9 +66,10 @@ class Attraction(PadTraction):
     roughness: Any = None
     charging: Charging | NoCharges = NO_CHARGES
     #: of its columns in the history
-    name: str = field(default="electrostatic", kw_only=True)
+    name: str = field(default=ELECTROSTATIC, kw_only=True)
     #: whether it acts without a voltage; its law then takes the strength `ON` in the place of one
     always: bool = field(default=False, kw_only=True)
+    label: str = field(default="attraction", kw_only=True)
 
     @property
     def rough(self) -> bool:  # type: ignore[override]

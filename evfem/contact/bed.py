@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints, block
-from evfem.rooms import Room
+from evfem.rooms import Column, Room
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
@@ -181,11 +181,15 @@ class Bed(Rigid):
     """
 
     yields = True
+    columns = (Column("surface_sink", "mm", "largest displacement of an elastic surface into it"),)
 
     def __init__(self, surface: Any, pad: Pad | Skin, spacing: float, least: float) -> None:
         self.surface, self.elastic, self.pad, self.least = surface, surface.elastic, pad, least
         self.spacing, self.reach = spacing, NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
+
+    def values(self, model: Any, state: Any) -> dict[str, float]:
+        return {"surface_sink": max(0.0, float(self.sink(state).max(initial=0.0)))}
 
     def memory(self, state: Any) -> dict[str, Floats]:
         nodes, dim = state.contact_force.shape

@@ -153,6 +153,15 @@ class Entries(NamedTuple):
         return flat.reshape(self.size, self.size)
 
 
+def force_columns(name: str, label: str, dim: int = 3) -> tuple[Column, ...]:
+    """Columns of the force and the work of a traction."""
+    force = Column(f"{name}_force", "N/mm", f"{label}, downwards")
+    along = (
+        Column(f"{name}_force_{axis}", "N/mm", f"{axis} component of {label}") for axis in "xz"[: dim - 1]
+    )
+    return force, *along, Column(f"{name}_work", "N", f"done by {label}")
+
+
 class PadTraction(Room):
     """Forces on the pad's nodes that depend on where they are; here none.
 
@@ -178,14 +187,12 @@ class PadTraction(Room):
         """The tractions of which this is the sum."""
         return (self,)
 
-    def own_columns(self, dim: int) -> tuple[Column, ...]:
+    #: what it is in the columns' meanings, its name if empty
+    label = ""
+
+    def named(self, dim: int) -> tuple[Column, ...]:
         """Columns of its force and its work."""
-        name, unit = self.name, "N/mm"
-        along = [
-            Column(f"{name}_force_{axis}", unit, f"{axis} component of {name}") for axis in "xz"[: dim - 1]
-        ]
-        work = Column(f"{name}_work", "N", f"done by {name}")
-        return Column(f"{name}_force", unit, f"{name}, downwards"), *along, work
+        return force_columns(self.name, self.label or self.name, dim)
 
     def acts(self, voltage: float) -> bool:
         """Whether it pulls at all at this voltage of the display (V)."""

@@ -27,6 +27,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, check_fields, number
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
 from evfem.newton.state import State
+from evfem.rooms import Room
 from evfem.tissue.dynamics import Difference
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
@@ -37,7 +38,7 @@ _MASS = number("a mass in t, not negative", Within(0.0, 1e3), "t")
 
 
 @dataclass(frozen=True)
-class Hand:
+class Hand(Room):
     """Spring (N/mm), damper (N s/mm) and mass (t) between drive and bone, per mm of depth.
 
     >>> Hand(stiffness=0.1)
@@ -109,7 +110,7 @@ class Hand:
 
 
 @dataclass(frozen=True)
-class Drive:
+class Drive(Room):
     """What moves the bone along the display, here rigidly: its x[, z] is that of the drive.
 
     `free`: whether the bone's place along the display is an unknown; `timed`: whether it knows of time.

@@ -11,7 +11,7 @@ from typing import Any
 
 from evfem.common.checks import choice
 from evfem.errors import InputError
-from evfem.simulation.history import COLUMNS, SPATIAL, UNITS
+from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL, UNITS
 from evfem.simulation.result import FIELD_UNITS, Result
 from evfem.sweeps.table import unit_of
 
@@ -100,7 +100,7 @@ def field_label(name: str) -> str:
 
 def _computed(key: str) -> bool:
     """Whether a column of a sweep is an output: one of a motion's keys is called as a column is."""
-    return key.split(".")[0] in {*COLUMNS, *SPATIAL} - {"motion"}
+    return key.split(".")[0] in {*COLUMNS, *ROOM_COLUMNS, *SPATIAL} - {"motion"}
 
 
 def key_unit(key: str, units: Units = UNITS) -> str:

@@ -62,7 +62,7 @@ from evfem.response.parameters import Parameter, parameter_of, scene_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
-from evfem.simulation.history import COLUMNS, SPATIAL
+from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
@@ -262,7 +262,8 @@ class Sensitivities:
             columns[name] = np.asarray(self.result[name]) + more
         own: dict[str, Any] = {name: value for name, value in columns.items() if name in COLUMNS}
         space = {name: columns.get(name, value) for name, value in self.result.in_space.items()}
-        return replace(self.result, **own, in_space=space)
+        rooms = {name: columns.get(name, value) for name, value in self.result.in_rooms.items()}
+        return replace(self.result, **own, in_space=space, in_rooms=rooms)
 
     def gradient(self, function: Callable[[Result], float]) -> dict[str, float]:
         """Derivatives by every parameter of a number that a smooth `function` makes of a run.
@@ -379,8 +380,10 @@ def sensitivities(
         raise InputError("parameters", "no keys", "dotted keys of the scene, and ShapeChange objects")
     known = {one.name: one for one in given}
     with blas_limits(), notices.shown(progress):
-        wanted = _columns(scene_mesh(scene)[0].dim, columns)
+        base = COLUMNS if scene_mesh(scene)[0].dim == 2 else (*COLUMNS, *SPATIAL)
+        wanted = _columns((*base, *ROOM_COLUMNS), columns)
         run = _Differentiated(scene, known, any(map(is_work, wanted)))
+        there = run.run.model.column_names
         bar = notices.bar(scene.total_steps, "step", 0, progress)
         try:
             for request in run.run.requests():
@@ -388,7 +391,7 @@ def sensitivities(
                 bar.update(1)
         finally:
             bar.close()
-    return _gathered(run, known, wanted)
+    return _gathered(run, known, tuple(name for name in wanted if name in there))
 
 
 def _check(scene: Scene) -> None:
@@ -398,10 +401,9 @@ def _check(scene: Scene) -> None:
         raise InputError("electrostatics.coupling", given, "monolithic or staggered, to be differentiated")
 
 
-def _columns(dim: int, columns: str | Sequence[str] | None) -> tuple[str, ...]:
-    """The columns asked for."""
+def _columns(names: Sequence[str], columns: str | Sequence[str] | None) -> tuple[str, ...]:
+    """The columns asked for, of those with these names."""
     columns = [columns] if isinstance(columns, str) else columns
-    names = COLUMNS if dim == 2 else (*COLUMNS, *SPATIAL)
     numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
     for name in columns or ():
         if name not in numbers:

@@ -22,7 +22,7 @@ from evfem.common.checks import plain
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
 from evfem.newton.state import Beginning, Reusable, State, TangentPoint
-from evfem.simulation.history import COLUMNS, NEEDED, SUMS, columns_of
+from evfem.simulation.history import COLUMNS, NEEDED, columns_of
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
@@ -71,7 +71,7 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
     """The works so far, and what is known of the last accepted state."""
     end = ledger.end or Books.nothing(state.u.shape)
     return {
-        "sums": np.array([ledger.sums[name] for name in SUMS]),
+        "sums": np.array(list(ledger.sums.values())),
         "internal_forces": end.forces,
         "given_forces": end.given,
         "pull": np.array(ledger.pull),
@@ -82,7 +82,7 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
 
 def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
     """The ledger from the arrays of a checkpoint."""
-    sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
+    sums = dict(zip(Ledger(model).sums, arrays["sums"].tolist(), strict=True))
     end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
     return Ledger(model, sums, end, float(arrays["pull"]), came_off=arrays["came_off"])
 
@@ -161,7 +161,7 @@ class Checkpoint:
         try:
             owner, version = str(arrays["scene"]), str(arrays["version"])
             rows = json.loads(str(arrays["rows"]))
-            odd = sorted({*COLUMNS} ^ {*rows[0]}) if rows and not columns_of(rows[0]) else []
+            odd = sorted({*COLUMNS} - {*rows[0]}) if rows and not columns_of(rows[0]) else []
             if owner == scene_digest and not odd:
                 _check_rows(rows)
         except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
@@ -172,7 +172,7 @@ class Checkpoint:
         if owner != scene_digest:
             raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")
         if odd:
-            given = f"{self.path}, of another version: with missing or unknown columns {', '.join(odd)}"
+            given = f"{self.path}, of another version: without the columns {', '.join(odd)}"
             raise InputError("checkpoint", given, allowed)
         state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
         return Saved(state, rows)

@@ -19,6 +19,9 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints, Words
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
+from evfem.contact.bed import Bed
+from evfem.contact.chargebooks import ChargeBooks
+from evfem.contact.traction import force_columns
 from evfem.errors import readable, unknown
 
 Row = Mapping[str, Any]
@@ -27,7 +30,7 @@ DRIFT = 0.05
 #: solved lengths (mm) and forces (N/mm, N) that differ by less are the same
 SAME = 1e-9
 #: unit per mm of depth -> unit over a depth
-WHOLE = {"N/mm": "N", "N": "mJ"}
+WHOLE_OF = {"N/mm": "N", "N": "mJ"}
 
 
 def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> dict[str, Any]:
@@ -35,7 +38,7 @@ def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> d
     saved result without what is `needed` is none (what an older version did not write yet is else NaN, or 0
     if it counts something); of the last step what is `shown` is printed.
     """
-    return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE.get(unit, unit), "traits": traits}
+    return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE_OF.get(unit, unit), "traits": traits}
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +67,6 @@ class History:
     tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x", "shown"))
     electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards", "shown"))
     electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
-    adhesive_force: Floats = field(metadata=column("N/mm", "adhesion, downwards"))
-    adhesive_force_x: Floats = field(metadata=column("N/mm", "x component of adhesion"))
     contact_width: Floats = field(
         metadata=column("mm", "from the first to the last edge of contact", "shown", whole="mm2")
     )
@@ -73,26 +74,16 @@ class History:
         metadata=column("mm", "sum of what touches, between edges", whole="mm2")
     )
     min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
-    surface_sink: Floats = field(
-        metadata=column("mm", "largest displacement of an elastic surface into it, 0 of a rigid one")
-    )
     peak_contact_pressure: Floats = field(metadata=column("MPa", "largest contact pressure of a node"))
     mean_contact_pressure: Floats = field(metadata=column("MPa", "pressing forces over what touches"))
     external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))
     electrostatic_work: Floats = field(metadata=column("N", "done by the attraction of a voltage"))
-    adhesive_work: Floats = field(metadata=column("N", "done by adhesion"))
     stored_energy: Floats = field(metadata=column("N", "tissue, elastic surface, hand's spring, penalties"))
     friction_dissipation: Floats = field(metadata=column("N", "by friction"))
     viscous_dissipation: Floats = field(metadata=column("N", "in tissue and the hand's damper"))
     kinetic_energy: Floats = field(metadata=column("N", "of tissue with inertia, and of the hand"))
     integrator_dissipation: Floats = field(metadata=column("N", "by the finite step, of either sign"))
     snap_dissipation: Floats = field(metadata=column("N", "set free where stability was lost"))
-    source_work: Floats = field(metadata=column("N", "of the voltage's source, where it is resolved in time"))
-    leakage_dissipation: Floats = field(metadata=column("N", "by charge that crosses skin, gap, insulator"))
-    stretch_work: Floats = field(
-        metadata=column("N", "of the field on the pad's length, where it is resolved in time")
-    )
-    field_energy: Floats = field(metadata=column("N", "of the electric field, where it is resolved in time"))
     substeps: Ints = field(metadata=column("", "parts in which the step was reached", "needed"))
     newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts", "needed"))
     relaxations: Ints = field(metadata=column("", "releases where no equilibrium is near"))
@@ -132,7 +123,13 @@ KINDS: Mapping[str, type] = {
 }
 INTEGERS = tuple(name for name, kind in KINDS.items() if kind is int)
 #: columns to which every part of a step adds
-SUMS = tuple(name for name in COLUMNS if name.endswith(("_work", "_dissipation")))
+ADDED = ("_work", "_dissipation")
+SUMS = tuple(name for name in COLUMNS if name.endswith(ADDED))
+#: columns of the rooms of the package: a run has those of its scene's rooms
+ROOM_COLUMNS: Mapping[str, Mapping[str, Any]] = {
+    one.name: column(one.unit, one.meaning)
+    for one in (*force_columns("adhesive", "adhesion"), *Bed.columns, *ChargeBooks.columns)
+}
 #: further columns of a finger in three dimensions
 SPATIAL: Mapping[str, Mapping[str, Any]] = {
     "position_z": column("mm", "z of the bone"),
@@ -141,18 +138,20 @@ SPATIAL: Mapping[str, Mapping[str, Any]] = {
     "tangential_force_x": column("N", "sum of contact forces, against +x"),
     "tangential_force_z": column("N", "sum of contact forces, against +z", "shown"),
     "electrostatic_force_z": column("N", "z component of the attraction"),
-    "adhesive_force_z": column("N", "z component of adhesion"),
     "contact_area": column("mm2", "of the convex hull of what touches", "shown"),
     "real_contact_area": column("mm2", "of all that touches", "shown"),
 }
 #: what is known of each column, of three dimensions too
-ABOUT: Mapping[str, Mapping[str, Any]] = {**{spec.name: spec.metadata for spec in fields(History)}, **SPATIAL}
+ABOUT: Mapping[str, Mapping[str, Any]] = {
+    **{spec.name: spec.metadata for spec in fields(History)},
+    **ROOM_COLUMNS,
+    **SPATIAL,
+}
 #: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
 UNITS, WHOLE_UNITS, MEANINGS = (
-    {name: str(ABOUT[name][told]) for name in COLUMNS} for told in ("unit", "whole", "meaning")
+    {name: str(ABOUT[name][told]) for name in (*COLUMNS, *ROOM_COLUMNS)}
+    for told in ("unit", "whole", "meaning")
 )
-#: attractions that have columns of their own
-PULLS = ("electrostatic", "adhesive")
 #: columns that a finger in three dimensions leaves empty
 WIDTHS = tuple(name for name in COLUMNS if WHOLE_UNITS[name] == "mm2")
 SPATIAL_UNITS: Mapping[str, str] = {
@@ -166,9 +165,14 @@ NEEDED, SHOWN = (
 
 
 def columns_of(names: Iterable[str]) -> tuple[str, ...]:
-    """The columns in their order if these are all their names, of the plane or of space; else nothing."""
-    found = set(names)
-    return next((columns for columns in (COLUMNS, (*COLUMNS, *SPATIAL)) if set(columns) == found), ())
+    """The columns in their order if all of the plane or of space are among these names, those of rooms last;
+    else nothing.
+    """
+    found = tuple(names)
+    base = COLUMNS if set(SPATIAL).isdisjoint(found) else (*COLUMNS, *SPATIAL)
+    further = tuple(name for name in found if name not in base)
+    whole = set(base) <= set(found) and all(name.isidentifier() for name in further)
+    return (*base, *further) if whole else ()
 
 
 def over_depth(columns: Mapping[str, Any], depth: float) -> dict[str, Any]:
@@ -178,7 +182,8 @@ def over_depth(columns: Mapping[str, Any], depth: float) -> dict[str, Any]:
     {'normal_force': 0.5, 'contact_width': 45.0, 'min_gap': 0.1}
     """
     return {
-        name: value if WHOLE_UNITS[name] == UNITS[name] else value * depth for name, value in columns.items()
+        name: value if WHOLE_UNITS.get(name) == UNITS.get(name) else value * depth
+        for name, value in columns.items()
     }
 
 
@@ -226,8 +231,10 @@ def read_rows(text: str) -> list[dict[str, Any]]:
     found = csv.DictReader(text.splitlines(), strict=True)
     names = found.fieldnames or ()
     columns = COLUMNS if set(SPATIAL).isdisjoint(names) else (*COLUMNS, *SPATIAL)
-    if not set(NEEDED) <= set(names) <= set(columns):
+    further = tuple(name for name in names if name not in columns)
+    if not set(NEEDED) <= set(names) or not all(name.isidentifier() for name in further):
         raise ValueError("no history")
+    columns = (*columns, *further)
     unknown_yet = {name: "0" if name in INTEGERS else "nan" for name in columns}
     return [
         {name: _value_of(name, row[name]) for name in columns} for row in (unknown_yet | row for row in found)

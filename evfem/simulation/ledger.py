@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.contact.attraction import ELECTROSTATIC
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.newton.state import State
-from evfem.simulation.history import PULLS, SUMS, WIDTHS
+from evfem.simulation.history import ADDED, SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, SubstepWork, charged_of, source_of
+from evfem.simulation.works import Books, SubstepWork
 from evfem.surface.pad import Pad, reach, surface_state
 
 
@@ -37,11 +38,15 @@ class Ledger:
     """
 
     model: Model
-    sums: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SUMS, 0.0))
+    sums: dict[str, float] = field(default_factory=dict)
     end: Books | None = None
     pull: float = 0.0
     let_go: float = 0.0
     came_off: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        names = (one.name for one in self.model.columns if one.name.endswith(ADDED))
+        self.sums = dict.fromkeys((*SUMS, *names), 0.0) | self.sums
 
     def accept(self, old: State, new: State) -> bool:
         """Adds the works of one converged part; returns whether stability was lost in it."""
@@ -86,7 +91,6 @@ class Ledger:
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
         pulls = self._pulls(state, withheld)
         real, extent = _extent(model, state, position, contact)
-        source = source_of(model)
         pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
         return {
             "step": step,
@@ -104,19 +108,18 @@ class Ledger:
             **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
-            "surface_sink": max(0.0, float(model.equilibrium.interface.bed.sink(state).max(initial=0.0))),
             "peak_contact_pressure": float((pressing / shares(model, position)).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
             "stored_energy": end.stored + end.springs,
             "kinetic_energy": end.kinetic,
-            "field_energy": 0.0 if source is None else source.field_energy(charged_of(model, state)),
+            **reduce(or_, (room.values(model, state) for room in model.shown), {}),
         }
 
     def _pulls(self, state: State, withheld: Floats) -> dict[str, tuple[Floats, float]]:
         """Of every attraction by name: its force on the pad (dim,), its part of what cores withhold."""
         model, none = self.model, np.zeros(state.bone.size)
-        found: dict[str, tuple[Floats, float]] = dict.fromkeys(PULLS, (none, 0.0))
+        found: dict[str, tuple[Floats, float]] = {ELECTROSTATIC: (none, 0.0)}
         pulls = model.equilibrium.pulls(state)
         interface, both = model.equilibrium.interface, model.attraction.restored(state.voltage)[0]
         every = np.where(both > 0.0, both, np.inf)

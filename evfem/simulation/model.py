@@ -10,7 +10,8 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import Attraction
+from evfem.contact.attraction import ELECTROSTATIC, Attraction
+from evfem.contact.chargebooks import ChargeBooks
 from evfem.contact.charging import NO_CHARGES, Charging, NoCharges
 from evfem.contact.traction import PadTraction
 from evfem.contact.tractions import sum_of
@@ -27,9 +28,11 @@ from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits, State
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
+from evfem.rooms import Column, Room
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
+from evfem.simulation.history import COLUMNS, SPATIAL
 from evfem.solver.linearbody import LinearBody
 from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
@@ -63,8 +66,28 @@ class Model:
 
     @cached_property
     def terms(self) -> tuple[Any, ...]:
-        """What has energies beside tissue, contact and attraction (`evfem.protocols.EnergyTerm`)."""
+        """What has energies beside tissue, contact and attraction (`evfem.rooms.Room`)."""
         return (*self.body.rooms, *self.drive.books)
+
+    @cached_property
+    def shown(self) -> tuple[Room, ...]:
+        """Rooms with columns of their own."""
+        charges = (ChargeBooks(one) for one in self.attraction.parts[:1] if one.flows)
+        every = (*self.terms, *self.equilibrium.interface.rooms, *charges)
+        return tuple(room for room in every if room.columns)
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """All columns of its history."""
+        base = COLUMNS if self.mesh.dim == 2 else (*COLUMNS, *SPATIAL)
+        return (*base, *(one.name for one in self.columns))
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the scene's rooms in the history."""
+        parts = (one for one in self.attraction.parts if one.name != ELECTROSTATIC)
+        forces = (column for one in parts for column in one.named(self.mesh.dim))
+        return (*forces, *(column for room in self.shown for column in room.columns))
 
     @cached_property
     def shear_modulus(self) -> Floats:
@@ -204,7 +227,9 @@ def make_adhesion(closing: Closing, pad: Any, surface: Any) -> Attraction:
     """The scene's adhesion as the mesh resolves it."""
     scene, rough = closing.scene, roughness_of(closing.scene.roughness_gap)
     common = (pad, surface, scene.direction)
-    return Attraction(closing.adhesion, None, *common, roughness=rough, name="adhesive", always=True)
+    return Attraction(
+        closing.adhesion, None, *common, roughness=rough, name="adhesive", always=True, label="adhesion"
+    )
 
 
 def _check_quadratic(scene: Scene) -> None:

@@ -29,10 +29,12 @@ from evfem.simulation.history import (
     DRIFT,
     KINDS,
     NEEDED,
+    ROOM_COLUMNS,
     SHOWN,
     SPATIAL,
     SPATIAL_UNITS,
     UNITS,
+    WHOLE_OF,
     WHOLE_UNITS,
     WIDTHS,
     History,
@@ -95,6 +97,15 @@ LATER_FIELDS = ("surface_sink",)
 CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
 
+def _of_room(name: str) -> Any:
+    """A column of a room as an attribute: 0 in a run whose scene has no such room."""
+
+    def found(result: Result) -> Floats:
+        return result.in_rooms.get(name, np.zeros_like(result.position))
+
+    return property(found, doc=f"{ABOUT[name]['meaning']}; 0 without")
+
+
 def _component(name: str) -> Any:
     """A column of three dimensions as an attribute; in the plane all is along x, and nothing along z."""
 
@@ -126,6 +137,7 @@ class Result(History):
     mesh: Mesh
     provenance: dict[str, Any] = field(default_factory=dict)
     in_space: Mapping[str, Floats] = field(default_factory=dict)
+    in_rooms: Mapping[str, Floats] = field(default_factory=dict)
     probes: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -145,17 +157,23 @@ class Result(History):
         columns = {name: column_of(name, [row[name] for row in rows]) for name in COLUMNS}
         further = SPATIAL if mesh.dim == 3 else ()
         in_space = {name: column_of(name, [row[name] for row in rows]) for name in further}
-        kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "probes": probes or {}}
+        names = [name for name in (rows[0] if rows else ()) if name not in (*COLUMNS, *SPATIAL)]
+        in_rooms = {name: column_of(name, [row[name] for row in rows]) for name in names}
+        kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "in_rooms": in_rooms}
+        kept["probes"] = probes or {}
         return cls(**columns, frames=list(frames), mesh=mesh, **kept)
 
     @property
     def columns(self) -> tuple[str, ...]:
         """The names of its columns."""
-        return (*COLUMNS, *self.in_space)
+        return (*COLUMNS, *self.in_space, *self.in_rooms)
 
     def __getitem__(self, name: str) -> Any:
         """A column by its name."""
-        return self.in_space[name] if name in self.in_space else super().__getitem__(name)
+        for further in (self.in_space, self.in_rooms):
+            if name in further:
+                return further[name]
+        return getattr(self, name) if name in ROOM_COLUMNS else super().__getitem__(name)
 
     position_z = _component("position_z")
     tangential_force_x = _component("tangential_force_x")
@@ -163,14 +181,29 @@ class Result(History):
     applied_tangential_force_x = _component("applied_tangential_force_x")
     applied_tangential_force_z = _component("applied_tangential_force_z")
     electrostatic_force_z = _component("electrostatic_force_z")
-    adhesive_force_z = _component("adhesive_force_z")
+    adhesive_force = _of_room("adhesive_force")
+    adhesive_force_x = _of_room("adhesive_force_x")
+    adhesive_force_z = _of_room("adhesive_force_z")
+    adhesive_work = _of_room("adhesive_work")
+    surface_sink = _of_room("surface_sink")
+    source_work = _of_room("source_work")
+    leakage_dissipation = _of_room("leakage_dissipation")
+    stretch_work = _of_room("stretch_work")
+    field_energy = _of_room("field_energy")
 
     @property
     def units(self) -> Mapping[str, str]:
         """The unit of each column."""
+        whole = bool(self.in_space) or WHOLE in self.provenance
+        own = {name: WHOLE_OF.get(unit, unit) if whole else unit for name, unit, _ in self._room_columns}
         if self.in_space:
-            return SPATIAL_UNITS
-        return WHOLE_UNITS if WHOLE in self.provenance else UNITS
+            return {**SPATIAL_UNITS, **own}
+        return {**(WHOLE_UNITS if WHOLE in self.provenance else UNITS), **own}
+
+    @property
+    def _room_columns(self) -> list[tuple[str, str, str]]:
+        """Name, unit per mm of depth and meaning of the columns of rooms that the package does not know."""
+        return [tuple(one) for one in self.provenance.get("columns", [])]
 
     @property
     def depth(self) -> float | None:
@@ -190,7 +223,10 @@ class Result(History):
         if (depth := self.depth) is None:
             raise InputError("depth", ABSENT, "a depth in mm, by Scene(depth=...) or depth in [finger]")
         columns = over_depth({name: self[name] for name in COLUMNS}, depth)
-        return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
+        longer = {name: depth if unit in WHOLE_OF else 1.0 for name, unit in self.units.items()}
+        in_rooms = {name: longer.get(name, 1.0) * value for name, value in self.in_rooms.items()}
+        about = {**self.provenance, WHOLE: depth}
+        return replace(self, **columns, in_rooms=in_rooms, provenance=about)
 
     @property
     def load_drift(self) -> float:
@@ -302,6 +338,11 @@ class Result(History):
             found.append((words.replace("_", " "), f"{plus(self[name][-1]):.4g} {self.units[name]}"))
         return found
 
+    @property
+    def _meanings(self) -> dict[str, str]:
+        own = {name: meaning for name, _, meaning in self._room_columns}
+        return {name: own[name] if name in own else str(ABOUT[name]["meaning"]) for name in self.columns}
+
     def to_xarray(self) -> Any:
         """The result as an `xarray.Dataset`: every column over `step`, the fields kept over `frame` (the
         number of its step) and `node` or `cell`, with `units` and `long_name`; places of the undeformed
@@ -310,7 +351,7 @@ class Result(History):
         Raises InputError where xarray is not installed (the extra `xarray`).
         """
         variables: dict[str, Any] = {
-            name: ("step", self[name], {"units": self.units[name], "long_name": ABOUT[name]["meaning"]})
+            name: ("step", self[name], {"units": self.units[name], "long_name": self._meanings[name]})
             for name in self.columns[1:]
         }
         for name, shape in _SHAPES.items() if self.frames else ():
@@ -362,14 +403,18 @@ def load(path: str | Path) -> Result:
         columns = {name: _column_of(arrays, name) for name in COLUMNS}
         mesh = mesh_of(arrays)
         in_space = {name: _column_of(arrays, name) for name in (SPATIAL if mesh.dim == 3 else ())}
+        there = [key.removeprefix("history/") for key in arrays if key.startswith("history/")]
+        names = [name for name in there if name not in (*COLUMNS, *SPATIAL)]
+        in_rooms = {name: _column_of(arrays, name) for name in names}
         frames = _frames_from(arrays, mesh)
         provenance = json.loads(str(arrays["provenance"]))
-        if len({len(column) for column in (*columns.values(), *in_space.values())}) > 1:
+        if len({len(column) for column in (*columns.values(), *in_space.values(), *in_rooms.values())}) > 1:
             raise ValueError("columns of different length")
         if not isinstance(provenance, dict):
             raise ValueError("no provenance")
         probes = _probes_from(arrays, len(columns["step"]))
-        kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "probes": probes}
+        kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "in_rooms": in_rooms}
+        kept["probes"] = probes
         return Result(**columns, frames=frames, mesh=mesh, **kept)
     except (KeyError, ValueError, TypeError, IndexError, RecursionError) as error:
         raise InputError("result", f"{path}, damaged: {error}", "a file written by Result.save") from error

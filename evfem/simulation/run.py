@@ -53,6 +53,7 @@ from evfem.simulation.checkpoint import (
     usable,
 )
 from evfem.simulation.doubtful import advice, deepest, doubtful, off, outside, through, unheld
+from evfem.simulation.history import ROOM_COLUMNS
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, linearised, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
@@ -273,7 +274,8 @@ class Run:
         row = self.rows[rows_before - 1]
         start |= {name: row[name] for name in START if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
-        pulled = row["electrostatic_force"] != 0.0 or row["adhesive_force"] != 0.0
+        names = ("electrostatic", *(one.name for one in self.model.attraction.parts))
+        pulled = any(row[f"{name}_force"] != 0.0 for name in names)
         start["loose"] = float(row["normal_force"] <= least and not pulled)
         return self.model.drive.begin_at(start, self._travelled(rows_before))
 
@@ -384,6 +386,8 @@ class Run:
         if (core := self.model.closing.core) is not None:
             about["core"] = core.told
         said = (*through(self.model, self.sunk), *off(self.ledger.came_off, self.model.mesh.dim))
+        if further := [one for one in self.model.columns if one.name not in ROOM_COLUMNS]:
+            about["columns"] = [[one.name, one.unit, one.meaning] for one in further]
         about["warnings"] = [*said, *doubtful(self.scene, self.rows)]
         probes = None if self.probes is None else self.probes.histories(self.probed)
         return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes)

@@ -83,14 +83,12 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.quadrature import PART, SHARE, SLIDE, WAY
+from evfem.common.quadrature import PART, SLIDE
 from evfem.contact.bed import Rigid
-from evfem.contact.charging import Charged, Charging
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.contact.traction import PadPath, PadState
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
-from evfem.simulation.history import PULLS, SUMS
 from evfem.simulation.model import Model
 
 #: share of the work of the change of internal forces or shear that no small smooth part sets free
@@ -121,20 +119,6 @@ class Books:
         return cls(none, none, 0.0, 0.0, 0.0)
 
 
-def source_of(model: Model) -> Charging | None:
-    """The charges whose source's work is known: of a voltage resolved in time and Strong and Troxel's law."""
-    for part in model.attraction.parts[:1]:
-        if part.flows and getattr(part.law, "of_a_field", False):
-            return part.charging
-    return None
-
-
-def charged_of(model: Model, state: State) -> Charged:
-    """The electric state of the voltage's traction in an accepted state."""
-    found: Charged = model.attraction.parts[0].charged(model.equilibrium.pad_state(state))
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class SubstepWork:
     """One accepted part of a run of `model`, from `old` to `new`; the `first` begins without any load."""
@@ -154,27 +138,28 @@ class SubstepWork:
         return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
-        """Contributions of the part to `SUMS`, N mm per mm of depth."""
+        """Contributions of the substep to the columns that add up, N mm per mm of depth."""
         old, new, body = self.old, self.new, self.model.body
         moved, turned = new.u - old.u, self._turned()
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone) + turned
         given -= _mean_work(begin.given, end.given, moved)
         pulled, friction = self.pulled(), self.friction()
-        attracted = [pulled.get(name, 0.0) for name in PULLS]
+        pulls = {f"{name}_work": work for name, work in pulled.items()}
         driven = float(sum(term.work(old, new) for term in self.model.terms))
         viscous = float(sum(term.dissipation(old, new, self._seconds) for term in self.model.terms))
         given += driven
-        lost = turned + sum(attracted) - friction + driven
+        lost = turned + sum(pulls.values()) - friction + driven
         lost += _mean_work(begin.forces, end.forces, moved) - (end.energy - begin.energy) - viscous
         lost -= _mean_work(*self._on_surface, moved[self.model.pad.nodes])
         lost -= (drag := body.drag_dissipation(new.u))
         snap = drag + lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost))
         snapped = (0.0, drag + lost) if snap else (drag + lost, 0.0)
-        source = (0.0, 0.0, 0.0)
-        if (charging := source_of(self.model)) is not None:
-            source = (*self._flow(charging), self._stretching(charging))
-        added = (given, *attracted, friction, viscous, *snapped, *source)
-        return dict(zip(SUMS, added, strict=True))
+        own = {"electrostatic_work": 0.0, "external_work": given, "friction_dissipation": friction}
+        own |= {"viscous_dissipation": viscous, "integrator_dissipation": snapped[0]}
+        own |= {"snap_dissipation": snapped[1]} | pulls
+        for room in self.model.shown:
+            own |= room.works(self)
+        return own
 
     def _turned(self) -> float:
         """Work of the bone beyond the trapezoid where nodes begin to slip: their shear force changes while
@@ -207,26 +192,6 @@ class SubstepWork:
         # trapezoidal only on the way with the bone, and only where that is not stopped by the surface
         turned = self.way - np.where(open_[:, None], self.new.bone - self.old.bone, 0.0)
         return PadPath(*self.pads, self.way, turned, (before, after))
-
-    def _flow(self, charging: Charging) -> tuple[float, float]:
-        """Work of the source and leakage; the first voltage is raised before anything moves."""
-        flow = charging.flow(self.model.attraction.parts[0].charged(self.pads[1]))
-        raised = self.old.voltage != charging.old.voltage
-        return flow.source_work + (charging.field_energy(charging.old) if raised else 0.0), flow.leakage
-
-    def _stretching(self, charging: Charging) -> float:
-        """Work of the field on the tributary lengths on the path of the charged pad."""
-        attraction, (before, after) = self.model.attraction.parts[0], self.pads
-        lengths = attraction.pad.tributary
-        grown = lengths(after.position) - lengths(before.position)
-        volts, work = charging.old.voltage, 0.0
-        none = np.zeros_like(before.position)
-        path = PadPath(before, after, none, none, (none, none)).at(WAY, np.full(WAY.shape, volts))
-        for pad, share in zip(path.states(), SHARE, strict=True):
-            carried = {"charges": charging.carried(lengths(pad.position))}
-            at = attraction.charged(replace(pad, memory=carried))
-            work += share * float(charging.energy_density(at) @ grown)
-        return work
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""

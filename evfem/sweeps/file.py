@@ -30,7 +30,7 @@ from evfem.scene.keys import VERSION, names, read, shown
 from evfem.scene.scene import Scene
 from evfem.scene.schema import DRAFT, Schema, Section, section
 from evfem.scene.serialiser import dump
-from evfem.simulation.history import SPATIAL
+from evfem.simulation.history import ROOM_COLUMNS, SPATIAL
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import Distribution, Normal, Samples, Uniform
 
@@ -247,7 +247,7 @@ def put_in(tables: Any, key: str, value: Any) -> None:
 def check_output(output: Any, motions: int) -> None:
     """InputError unless `output` is COLUMN.STATISTIC[.N] of a scene with so many motions."""
     words = output.split(".") if isinstance(output, str) else []
-    columns = [name for name in (*COLUMNS, *SPATIAL) if name != "motion"]
+    columns = [name for name in (*COLUMNS, *ROOM_COLUMNS, *SPATIAL) if name != "motion"]
     allowed = f"COLUMN.STATISTIC, STATISTIC one of {', '.join(STATISTICS)}, and .N for motion N alone"
     if not 2 <= len(words) <= 3 or words[1] not in STATISTICS:
         raise InputError("outputs", shown(output), allowed)
