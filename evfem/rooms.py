@@ -84,3 +84,49 @@ class Room:
     def works(self, substep: Any) -> Mapping[str, float]:
         """What a substep adds to the `columns` that end in _work or _dissipation (N mm)."""
         return {}
+
+
+class BodyTerm(Room):
+    """Forces within the body beside those of the tissue: springs, dampers, masses on its nodes.
+
+    A term of one's own has `forces`, and `stiffness` where they depend on where the nodes are; `stored` and
+    `dissipation` close the balance of energy.
+    """
+
+    def placed(self, mesh: Any) -> None:
+        """The term acts on a finger with this mesh (`points` (N, dim) in mm, `node_sets`, `region`)."""
+
+    def forces(self, u: Floats) -> Floats:
+        """Internal nodal forces (N, dim) in N/mm at displacements u (N, dim), positive where they resist."""
+        return np.zeros_like(u)
+
+    def stiffness(self, u: Floats) -> Floats:
+        """Their derivatives, each by its own displacement, (N, dim) in N/mm per mm; not negative."""
+        return np.zeros_like(u)
+
+    def potential(self, old: Any, new: Any, fractions: Floats) -> Floats:
+        moved = new.u - old.u
+        power = np.array([float(np.sum(self.forces(old.u + s * moved) * moved)) for s in fractions])
+        return np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(fractions)))
+
+
+class Foundation(Room):
+    """An elastic surface below the pad that may remember: for `elastic=` of any surface.
+
+    `compliance` is that of the present step; to what the forces on the pad displace the surface by, `left` of
+    the displacement before the step is added, as of a surface that creeps: a Kelvin-Voigt solid with the
+    relaxation time T has the compliance C h/(h + T) in a step of h seconds and leaves T/(h + T).
+    """
+
+    def compliance(self, x: Floats, lengths: Floats) -> Floats:
+        """Mean displacements by forces on n strips (`evfem.protocols.Elastic`), (dim n, dim n)."""
+        raise NotImplementedError
+
+    @property
+    def left(self) -> float:
+        """Fraction of the displacement before the step that is left without forces, 0 to below 1."""
+        return 0.0
+
+    def energy(self, state: Any, force: Floats, displacement: Floats) -> float:
+        """Stored energy (N mm) of a displacement (P, dim) under forces on the pad (P, dim)."""
+        return 0.5 * float(np.sum(force * displacement))

@@ -13,7 +13,8 @@ surface by less than the strain of the finger over the number of its nodes; no f
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints, block
-from evfem.rooms import Column, Room
+from evfem.rooms import Column, Foundation, Room
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
@@ -36,24 +37,26 @@ STEP = 1e-5
 class Yielding:
     """The surface below k of P pad nodes, those `over` it (k,), in one place: `compliance` (dim k, dim k) by
     forces on the finger along x, y[, z], node by node, to what it adds to their places relative to it, and
-    its derivatives `slope` (d, dim k, dim k) by the places of the displaced nodes along x[, z].
+    its derivatives `slope` (d, dim k, dim k) by the places of the displaced nodes along x[, z]; `left` of both
+    from before the step.
     """
 
     over: Ints
     compliance: Floats
     slope: Floats
+    left: tuple[Any, Any] = (0.0, 0.0)
 
     def given(self, force: Floats) -> Floats:
         """What the surface adds to the nodes' places (P, dim) under forces on the finger (P, dim)."""
-        found = np.zeros_like(force)
-        found[self.over] = (self.compliance @ force[self.over].ravel()).reshape(-1, force.shape[1])
+        found = np.zeros_like(force) + self.left[0]
+        found[self.over] += (self.compliance @ force[self.over].ravel()).reshape(-1, force.shape[1])
         return found
 
     def change(self, force: Floats) -> Floats:
         """Derivatives of that (P, d, dim) along x[, z]: the surface's stretch, and its sinking's slope."""
-        found = np.zeros((len(force), len(self.slope), force.shape[1]))
+        found = np.zeros((len(force), len(self.slope), force.shape[1])) + self.left[1]
         moved = (self.slope @ force[self.over].ravel()).reshape(len(self.slope), -1, force.shape[1])
-        found[self.over] = moved.transpose(1, 0, 2)
+        found[self.over] += moved.transpose(1, 0, 2)
         return found
 
     def among(self, nodes: Ints) -> Floats:
@@ -129,6 +132,10 @@ class Rigid(Room):
         return length
 
 
+class Memoryless(Foundation):
+    """An elastic surface whose displacement follows its forces at once."""
+
+
 class RigidBelow:
     """A rigid surface below the candidates of a linear step."""
 
@@ -187,13 +194,34 @@ class Bed(Rigid):
         self.surface, self.elastic, self.pad, self.least = surface, surface.elastic, pad, least
         self.spacing, self.reach = spacing, NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
+        own = copy(self.elastic) if isinstance(self.elastic, Foundation) else None
+        self.elastic, self._own = own or self.elastic, own or Memoryless()
+        self.columns = (*Bed.columns, *self._own.columns)
+        self._left: tuple[Any, Any] = (0.0, 0.0)
+
+    def begin(self, old: Any, seconds: float) -> None:
+        self._own.begin(old, seconds)
+        left = self._own.left
+        self._left = left * old.memory[DISPLACEMENT], left * old.memory[GRADIENT]
+        self._last = None
+
+    def accept(self, old: Any, new: Any) -> dict[str, Floats]:
+        return self._own.accept(old, new)
+
+    def dissipation(self, old: Any, new: Any, seconds: float) -> float:
+        return self._own.dissipation(old, new, seconds)
 
     def values(self, model: Any, state: Any) -> dict[str, float]:
-        return {"surface_sink": max(0.0, float(self.sink(state).max(initial=0.0)))}
+        own = {"surface_sink": max(0.0, float(self.sink(state).max(initial=0.0)))}
+        return own | dict(self._own.values(model, state))
+
+    def works(self, substep: Any) -> Mapping[str, float]:
+        return self._own.works(substep)
 
     def memory(self, state: Any) -> dict[str, Floats]:
         nodes, dim = state.contact_force.shape
-        return {DISPLACEMENT: np.zeros((nodes, dim)), GRADIENT: np.zeros((nodes, dim - 1, dim))}
+        own = {DISPLACEMENT: np.zeros((nodes, dim)), GRADIENT: np.zeros((nodes, dim - 1, dim))}
+        return own | self._own.memory(state)
 
     def displacement(self, state: Any) -> Floats:
         return np.asarray(state.memory[DISPLACEMENT])
@@ -241,10 +269,10 @@ class Bed(Rigid):
         return {DISPLACEMENT: given, GRADIENT: below.change(force)}
 
     def energies(self, part: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
-        found = [
-            [0.5 * float(np.sum(force * self.displacement(state))) for state in part] for force in forces
-        ]
-        return np.array([found[0][0], found[0][1] + found[1][0], found[1][1]])
+        energy, sunk = self._own.energy, [self.displacement(state) for state in part]
+        pairs = list(zip(part, forces, sunk, strict=True))
+        between = 0.5 * (np.sum(forces[0] * sunk[1]) + np.sum(forces[1] * sunk[0]))
+        return np.array([energy(*pairs[0]), float(between), energy(*pairs[1])])
 
     def way(self, part: tuple[Any, Any], moved: Floats) -> Floats:
         return np.asarray(moved + self.displacement(part[1]) - self.displacement(part[0]))
@@ -269,7 +297,7 @@ class Bed(Rigid):
         x = flat[:, 0] if dim == 2 else flat
         given, changed = self.elastic.compliance(x, length), slopes(self.elastic, x, length)
         compliance, *slope = (_by_nodes(np.asarray(each), dim) for each in (given, *changed))
-        return Yielding(over, compliance, np.stack(slope))
+        return Yielding(over, compliance, np.stack(slope), self._left)
 
 
 def bed_of(surface: Any, pad: Pad | Skin, spacing: float, least: float) -> Rigid:

@@ -23,6 +23,8 @@ from evfem.rooms import Column, Room
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
+#: how far (mm) positions are shifted to difference a traction by the gap
+SHIFT = 1e-7
 #: gaps up to this (mm) count as closed
 TOUCHING = 1e-9
 
@@ -210,9 +212,20 @@ class PadTraction(Room):
         """Lengths or areas (P,) by which the forces are tractions."""
         return pad.lengths
 
+    def by_gap(self, pad: PadState) -> Floats:
+        """Derivative of the vertical forces (P,) on open nodes, each by its own gap, in N/mm per mm: above 0
+        where a pull falls with the gap, below 0 where the traction resists; differenced, as of a law of the
+        gap.
+        """
+        shift = np.zeros(pad.position.shape[1])
+        shift[1] = SHIFT
+        more, less = (self.forces(replace(pad, position=pad.position + s * shift)) for s in (1.0, -1.0))
+        slope = (more - less)[:, 1] / (2.0 * SHIFT)
+        return np.where(pad.frame.gap > TOUCHING, slope, 0.0)
+
     def weakening(self, pad: PadState) -> Floats:
         """Decrease of a node's pull with its own vertical gap, not negative, (P,) in N/mm per mm."""
-        return np.zeros(len(pad.position))
+        return np.maximum(self.by_gap(pad), 0.0)
 
     def gain_on_pressing(self, pad: PadState) -> Floats:
         """Growth of a node's pull per contact force (P,)."""
@@ -221,7 +234,7 @@ class PadTraction(Room):
     def stiffness(self, pad: PadState) -> Entries:
         """Derivative of `forces` by node positions (dim P, dim P), ordered (node, component)."""
         up = 1 + pad.position.shape[1] * np.arange(len(pad.position))
-        return Entries.of(pad.position.size, [(up, up, self.weakening(pad))])
+        return Entries.of(pad.position.size, [(up, up, self.by_gap(pad))])
 
     def full_stiffness(self, pad: PadState) -> Entries:
         """The same with what fringes of the field add."""
@@ -289,3 +302,6 @@ class NoTraction(PadTraction):
 
     def forces_along(self, path: PadState) -> Floats:
         return np.zeros_like(path.position)
+
+    def by_gap(self, pad: PadState) -> Floats:
+        return np.zeros(len(pad.position))

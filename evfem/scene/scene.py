@@ -16,6 +16,7 @@ from typing import Annotated, Any, Protocol, cast, runtime_checkable
 from evfem.common.checks import Within, check_fields, number, one_of, real, set_frozen, yes_or_no
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
+from evfem.contact.traction import PadTraction
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
@@ -24,6 +25,7 @@ from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.newton.hand import Hand
 from evfem.protocols import AdhesionLaw, CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
+from evfem.rooms import BodyTerm, Room
 from evfem.scene.electrics import Electrics, check_drive, without_field
 from evfem.scene.motion import MOTIONS, VOLTAGE, Course, Motion, Press, Slide
 from evfem.scene.options import Output, Solver
@@ -37,6 +39,8 @@ DIRECTIONS = ("vertical", "normal")
 #: the attraction column by column, by Poisson's problem, or whichever the bounds ask for
 FIELDS = ("local", "full", "auto")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
+#: names of the tractions of a voltage and of adhesion
+TAKEN = ("electrostatic", "adhesive")
 #: voltages that are no number
 SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
 DEPTH = number("a depth in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True), "mm")
@@ -91,7 +95,7 @@ class Scene:
     None and `voltage` 0: no electrostatics. Only where the field is full may the finger be not `grounded`:
     without a charge, above electrodes of different voltages. `friction_law` says what the surface's
     coefficient means (`Coulomb`, ... or one's own), `adhesion` what attracts without a voltage (`Dugdale`,
-    `Capillary`, or one's own). A `hand` is between drive and bone: motions then say where the drive goes.
+    `Capillary`, or one's own). `rooms` are capabilities of one's own (`evfem.terms`). A `hand` is between drive and bone: motions then say where the drive goes.
     `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. `motion` may be empty where steps are
     taken at will (`evfem.simulation.loop`). Raises InputError for anything that does not fit together.
     """
@@ -112,6 +116,7 @@ class Scene:
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
+    rooms: tuple[Room, ...] = field(default=(), kw_only=True)
     depth: float | None = field(default=None, kw_only=True)
     output: Output = field(default=Output(), kw_only=True)
     grounded: Grounded = field(default=True, kw_only=True)
@@ -121,7 +126,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         _check_parts(self)
-        set_frozen(self, forms=tuple(self.forms))
+        set_frozen(self, forms=tuple(self.forms), rooms=tuple(self.rooms))
         mistakes = Mistakes()
         checks = (
             _check_electrostatics,
@@ -237,6 +242,13 @@ def _check_parts(scene: Scene) -> None:
         raise InputError("name", quoted(scene.name), "a name that can be part of a file name")
     if not all(isinstance(term, Term) for term in scene.forms):
         raise InputError("forms", quoted(scene.forms), "terms as made by Scene.with_term")
+    names = [room.name for room in scene.rooms if isinstance(room, PadTraction)]
+    for i, room in enumerate(scene.rooms):
+        if not isinstance(room, PadTraction | BodyTerm):
+            allowed = "a PadTraction or a BodyTerm; a Foundation goes to elastic=, a hand to hand="
+            raise InputError(f"rooms[{i}]", quoted(room), allowed)
+        if isinstance(room, PadTraction) and (names.count(room.name) > 1 or room.name in TAKEN):
+            raise InputError(f"rooms[{i}].name", room.name, "a name that no other traction has")
     for i, motion in enumerate(scene.motion):
         if not isinstance(motion, Motion):
             raise InputError(f"motion[{i}]", quoted(motion), f"one of {_names(MOTIONS)}")
@@ -275,8 +287,8 @@ def _check_hand(scene: Scene) -> None:
     hand = scene.hand
     if hand is None:
         return
-    if not isinstance(hand, Hand):
-        raise InputError("hand", quoted(hand), "a Hand, or None")
+    if not (isinstance(hand, Hand) or (isinstance(hand, Room) and hasattr(hand, "control"))):
+        raise InputError("hand", quoted(hand), "a Hand, a room with a control, or None")
     if isinstance(scene.voltage, FollowForce):
         raise InputError("hand", "a hand together with a target friction force", "one of the two")
 

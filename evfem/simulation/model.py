@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -28,7 +29,7 @@ from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits, State
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
-from evfem.rooms import Column, Room
+from evfem.rooms import BodyTerm, Column, Room
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
@@ -67,13 +68,13 @@ class Model:
     @cached_property
     def terms(self) -> tuple[Any, ...]:
         """What has energies beside tissue, contact and attraction (`evfem.rooms.Room`)."""
-        return (*self.body.rooms, *self.drive.books)
+        return (*self.body.rooms, *self.drive.books, *self.equilibrium.interface.rooms)
 
     @cached_property
     def shown(self) -> tuple[Room, ...]:
         """Rooms with columns of their own."""
         charges = (ChargeBooks(one) for one in self.attraction.parts[:1] if one.flows)
-        every = (*self.terms, *self.equilibrium.interface.rooms, *charges)
+        every = (*self.terms, *self.attraction.parts, *charges)
         return tuple(room for room in every if room.columns)
 
     @property
@@ -125,6 +126,8 @@ def make_model(scene: Scene) -> Model:
     parts = [make_attraction(closing, pad, surface)] if needed.has("electricity") else []
     if scene.adhesion is not None:
         parts.append(make_adhesion(closing, pad, surface))
+    own = [copy(room) for room in scene.rooms]  # what it keeps of a step is that of one model
+    parts += [room for room in own if isinstance(room, PadTraction)]
     attraction = sum_of(parts)
     solver, laws = scene.solver, scene.finger.materials
     terms = [
@@ -134,7 +137,7 @@ def make_model(scene: Scene) -> Model:
     dynamics = None
     if needed.has("time"):
         dynamics = make_dynamics(space, laws, scene.finger, solver.dynamics)
-    body = Body(space, laws, terms, dynamics)
+    body = Body(space, laws, terms, dynamics, [room for room in own if isinstance(room, BodyTerm)])
     deepest = (
         0.0  # of a solid, whose dense compliance has three unknowns a node: candidates as they are needed
     )
@@ -152,8 +155,12 @@ def linearised(model: Model, state: State) -> Model:
     scene, attraction, limits = model.scene, model.attraction, model.equilibrium.body.limits
     if model.mesh.dim == 3:  # all of the skin would be kept, and was not tried
         raise InputError("linearised", "a finger in three dimensions", "a finger in the plane")
-    if scene.forms or model.body.dynamics.acts:
-        given = "a form of its own" if scene.forms else f"dynamics = {scene.solver.dynamics}"
+    if scene.forms or scene.rooms or model.body.dynamics.acts:
+        given = (
+            "a form or room of its own"
+            if scene.forms or scene.rooms
+            else f"dynamics = {scene.solver.dynamics}"
+        )
         raise InputError("linearised", f"a scene with {given}", "tissue without forms, at rest")
     body = LinearBody(model.body, model.pad.nodes, state.u, scene.solver.threads)
     interface = make_interface(model.closing, model.pad, model.surface, attraction)

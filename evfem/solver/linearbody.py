@@ -51,7 +51,7 @@ class LinearBody(Body):
     def __init__(self, full: Body, pad: Ints, u: Floats, threads: int = 1) -> None:
         self.full, self.pad, self.space = full, pad, full.space
         self.tissue: Any = LinearTissue(self)
-        self.dynamics, self.given, self.terms, self.drag_rate = Static(), (), (), 0.0
+        self.dynamics, self.given, self.terms, self.drag_rate, self._own = Static(), (), (), 0.0, ()
         dim = full.space.dim
         own = full.unknowns[pad]
         kept = np.concatenate([own.ravel(), full.bone])

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.rooms import BodyTerm
 from evfem.tissue.dynamics import Dynamics, Static
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
@@ -29,12 +30,16 @@ class Body:
         laws: Mapping[str, Any],
         terms: Sequence[Any] = (),
         dynamics: Dynamics | Static | None = None,
+        rooms: Sequence[BodyTerm] = (),
     ) -> None:
         self.space = space
         self.tissue = Tissue(space, laws)
         self.dynamics = dynamics or Static()
         self.given = tuple(terms)
         self.terms = (*terms, *self.dynamics.forms)
+        self._own = tuple(rooms)
+        for room in self._own:
+            room.placed(space.mesh)
         self.drag_rate = 0.0
         bone, dim = space.mesh.node_sets["bone"], space.mesh.dim
         held = np.zeros(space.size, dtype=bool)
@@ -89,7 +94,7 @@ class Body:
         """Internal nodal forces (N, dim)."""
         # without the bone's travel: its rounding would outweigh the small forces of a finger far from here
         total = self.tissue.forces(translated(u, -u[self.space.mesh.node_sets["bone"][0]]))
-        for term in self._acting:
+        for term in (*self._acting, *self._own):
             total = total + term.forces(u)
         return total
 
@@ -113,6 +118,8 @@ class Body:
         self.tissue.add_tangent(u, self.pattern, data, pressure)
         for term in self._acting:
             term.add_tangent(u, self.pattern, data)
+        for room in self._own:
+            np.add.at(data, self.pattern.diagonal[self.unknowns], room.stiffness(u))
         return self.pattern.finish(data)
 
     def whole(self, u: Floats) -> Floats:
@@ -122,7 +129,7 @@ class Body:
     @property
     def rooms(self) -> tuple[Any, ...]:
         """Its terms that keep something from substep to substep, or have energies of their own."""
-        return (self.dynamics,)
+        return (self.dynamics, *self._own)
 
     def begin(self, old: Any, seconds: float) -> None:
         """A trial of so many seconds begins from an accepted state, or what is kept of it."""
