@@ -64,7 +64,7 @@ _NAMES = {
     "simulation.result": ("Frame", "Result"),
     "simulation.run": ("simulate",),
     "simulation.spectrum": ("spectrum",),
-    "newton.hand": ("Hand",),
+    "terms.hand": ("Hand",),
     "newton.strategy": ("Strategy",),
     "sweeps.check": ("check",),
     "sweeps.file": ("Sweep",),

@@ -56,7 +56,6 @@ from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file
 from evfem.mesh.mesh import Mesh as Mesh
-from evfem.newton.hand import Hand as Hand
 from evfem.newton.strategy import Strategy as Strategy
 from evfem.planning.plan import plan as plan
 from evfem.response.design import design as design
@@ -120,6 +119,7 @@ from evfem.tensor import mul as mul
 from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
+from evfem.terms.hand import Hand as Hand
 from evfem.textures.texture import Texture as Texture
 from evfem.tissue import laws as _laws
 from evfem.tissue.forms import form as form

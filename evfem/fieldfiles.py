@@ -8,13 +8,13 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import replacing
-from evfem.contact.fullfield import FieldAttraction
 from evfem.errors import InputError
 from evfem.field.rigid import FieldSolution
 from evfem.mesh.file import three
 from evfem.scene.scene import Scene
 from evfem.simulation.model import make_model
 from evfem.simulation.result import Result
+from evfem.terms.fullfield import FieldAttraction
 
 
 def full_field(solution: FieldSolution, path: str | Path) -> Path:

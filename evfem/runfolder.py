@@ -3,7 +3,7 @@
 Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint to
 go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only files
 that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names
-(`evfem.common.manifest`). `kept` and `saved` say what of an earlier run is there to go on from.
+(`evfem.sweeps.manifest`). `kept` and `saved` say what of an earlier run is there to go on from.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.manifest import Manifest
 from evfem.common.notices import LOG
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
@@ -32,6 +31,7 @@ from evfem.simulation.checkpoint import PROBES as AT_PROBES
 from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import columns_of, csv_header, csv_line, read_rows
 from evfem.simulation.result import Frame, Result, Row, Saved, provenance
+from evfem.sweeps.manifest import Manifest
 
 if TYPE_CHECKING:
     from evfem.response.impedance import Impedance

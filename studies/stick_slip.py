@@ -1,7 +1,7 @@
 """Stick-slip: a mass on a spring, drawn over a surface whose friction falls with the speed.
 
 A slab that hardly deforms is pressed with 0.04 N/mm, carries a mass of 1e-6 t behind a spring of 0.02 N/mm
-(both per mm of depth, `evfem.newton.hand`) and is drawn at 1, 2 and 4 mm/s. Friction is Stribeck's: 0.4 at
+(both per mm of depth, `evfem.terms.hand`) and is drawn at 1, 2 and 4 mm/s. Friction is Stribeck's: 0.4 at
 rest, 0.2 of fast sliding, with the transition at 0.5 mm/s.
 
 Expected: it sticks until the spring carries 0.4 times the load, slips, and sticks again. The reference is the

@@ -21,7 +21,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray", "pypardiso"},
-        "constants arrays quadrature notices checks views pools digest storage manifest tables pictures",
+        "constants arrays quadrature rooms notices checks views pools digest storage tables pictures",
     ),
     "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces solids quality groups file"),
     "tissue": (
@@ -46,15 +46,16 @@ ROOMS = {
         {"numpy", "scipy"},
         "ways friction adhesion patches elastic surfaces relief textures usersurface pad skin",
     ),
-    "contact": (
+    "contact": ({"numpy", "scipy"}, "below signorini solve follower condensed stability"),
+    "terms": (
         {"numpy", "scipy"},
-        "charging attraction adhesive bed fullfield drivenfield signorini slipping solve follower condensed "
-        "stability",
+        "traction tractions charging attraction chargebooks fullfield drivenfield foundation slipping "
+        "friction hand",
     ),
     "newton": (
         {"numpy", "scipy"},
-        "strategy state hand control condensation interface linearisation pressure anderson travel "
-        "factorised equilibrium",
+        "strategy state control condensation interface linearisation pressure anderson travel factorised "
+        "equilibrium",
     ),
     "solver": ({"numpy"}, "relaxation hold path stepping linearbody"),
     "scene": (
@@ -66,7 +67,7 @@ ROOMS = {
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
-    "sweeps": ({"numpy", "tomli_w", "tqdm", "pyarrow"}, "samples file folder table run check"),
+    "sweeps": ({"numpy", "tomli_w", "tqdm", "pyarrow"}, "manifest samples file folder table run check"),
     "response": (
         {"numpy", "scipy"},
         "parameters parts tangent lines sensitivities file uncertainty design impedance",
@@ -86,10 +87,10 @@ ROOMS = {
     ),
     "studio": ({"numpy"}, "state page runs server"),
 }
-#: modules outside the rooms: below all of them, after electrostatics, and above all of them
+#: modules outside the rooms: below all of them, after one of them, and above all of them
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
-    ("reference",),
+    {"electrostatics": ("reference",)},
     ("export", "fieldfiles", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
@@ -110,7 +111,7 @@ def order():
     names = list(GROUND)
     for room, (_, files) in ROOMS.items():
         names += [f"{room}.{file}" for file in files.split()]
-        names += MIDDLE if room == "electrostatics" else ()
+        names += MIDDLE.get(room, ())
     return [*names, *EDGES]
 
 

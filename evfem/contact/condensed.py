@@ -26,7 +26,7 @@ import numpy as np
 
 from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
 from evfem.common.constants import DISC_OWN, LARGE_SYSTEM, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
-from evfem.contact.bed import RIGID_BELOW, RigidBelow
+from evfem.contact.below import RIGID_BELOW, RigidBelow
 from evfem.contact.follower import Candidates, FollowerStiffness, local
 from evfem.contact.signorini import (
     OPEN,

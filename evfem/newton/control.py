@@ -31,9 +31,9 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
-from evfem.contact.traction import PadState, Reading, smallest_gap
-from evfem.newton.hand import RIGID, Drive
 from evfem.newton.state import State, StepFailed
+from evfem.terms.hand import RIGID, Drive
+from evfem.terms.traction import PadState, Reading, smallest_gap
 
 #: a voltage (V) that is none
 TINY = 1e-300

@@ -27,12 +27,12 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.contact.traction import TOUCHING, PadState, PadTraction
 from evfem.newton.control import Force, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
 from evfem.newton.state import Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
+from evfem.terms.traction import TOUCHING, PadState, PadTraction
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"

@@ -26,7 +26,6 @@ from evfem.common.arrays import Floats
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
-from evfem.contact.traction import PadTraction
 from evfem.newton.anderson import Anderson
 from evfem.newton.control import Target, VoltageProblem
 from evfem.newton.interface import Interface
@@ -42,6 +41,7 @@ from evfem.newton.state import (
     findings,
 )
 from evfem.newton.travel import Travel
+from evfem.terms.traction import PadTraction
 from evfem.tissue.body import Body
 
 

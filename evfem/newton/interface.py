@@ -17,17 +17,17 @@ import numpy as np
 
 from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.bed import bed_of
+from evfem.common.rooms import Room
 from evfem.contact.condensed import COMPONENTS, Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
-from evfem.contact.traction import PadState
-from evfem.newton.friction import ProportionalFriction
 from evfem.newton.state import State
-from evfem.rooms import Room
 from evfem.surface.friction import with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 from evfem.surface.ways import Steps
+from evfem.terms.foundation import bed_of
+from evfem.terms.friction import ProportionalFriction
+from evfem.terms.traction import PadState
 
 
 class FrictionJumps:

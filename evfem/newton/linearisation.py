@@ -24,11 +24,11 @@ from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK, Roughness
-from evfem.contact.traction import Entries, PadState, PadTraction
 from evfem.newton.condensation import Singular, make_condensation
 from evfem.newton.interface import Interface
 from evfem.newton.state import NOTHING, Beginning, Limits, Record, State, StepFailed, TangentPoint
 from evfem.surface.pad import surface_state
+from evfem.terms.traction import Entries, PadState, PadTraction
 from evfem.tissue.body import Body
 
 

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.rooms import Room
 from evfem.errors import InputError
 from evfem.newton.linearisation import Linearisation
 from evfem.newton.state import State
-from evfem.rooms import Room
 from evfem.tissue.weakform import Tissue
 
 #: the pressure between two substeps

@@ -47,7 +47,7 @@ class State:
     Displacements u (N, 2) in mm, contact forces along normal and tangent (P, 2) in N/mm and statuses (P,),
     the bone's translation (2,), the voltage in V, the attraction (P, 2), the forces on the bone (2,), and the
     increment of the substep that led here (N, 2). What rooms keep from substep to substep is in `memory`, by
-    the names that the rooms gave (`evfem.rooms`).
+    the names that the rooms gave (`evfem.common.rooms`).
     """
 
     u: Floats

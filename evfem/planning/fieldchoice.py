@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evfem.contact.fullfield import Bounds, certificate, facing, in_line
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.electrics import without_field
 from evfem.scene.scene import Scene
 from evfem.surface.pad import make_pad
+from evfem.terms.fullfield import Bounds, certificate, facing, in_line
 
 #: `field = "auto"` solves for the field where the column law's energy may be too small by more than this
 AUTO = 0.02

@@ -19,7 +19,6 @@ from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
-from evfem.newton.hand import Hand
 from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_parts
@@ -33,6 +32,7 @@ from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, needs
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
+from evfem.terms.hand import Hand
 from evfem.tissue.branches import KEPT_BYTES, branches_in
 from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.forms import Form

@@ -58,7 +58,7 @@ class Equations:
         return replace(state, attraction=attraction)
 
     def sunk(self, state: State) -> tuple[Floats, Floats]:
-        """What an elastic surface adds to the nodes' places, and its gradient (`evfem.contact.bed`)."""
+        """What an elastic surface adds to the nodes' places, and its gradient (`evfem.terms.foundation`)."""
         force = self.interface.contact_forces(state) + self._attracted(state).attraction
         below = self.interface.bed.under(self.interface.positions(state.u), state)
         return below.given(force), below.change(force)

@@ -18,7 +18,6 @@ from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.finger.layers import TABLE_2
-from evfem.newton.hand import Hand
 from evfem.scene.format import (
     HOMES,
     SURFACES,
@@ -36,6 +35,7 @@ from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.elastic import ElasticLayer, ElasticStack
 from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.surface.surfaces import Display
+from evfem.terms.hand import Hand
 
 #: largest file in bytes
 LARGEST_SCENE = 4 * 2**20

@@ -15,17 +15,15 @@ from typing import Annotated, Any, Protocol, cast, runtime_checkable
 
 from evfem.common.checks import Within, check_fields, number, one_of, real, set_frozen, yes_or_no
 from evfem.common.digest import digest
+from evfem.common.rooms import BodyTerm, Room
 from evfem.common.views import called, changed, short, table
-from evfem.contact.traction import PadTraction
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
-from evfem.newton.hand import Hand
 from evfem.protocols import AdhesionLaw, CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
-from evfem.rooms import BodyTerm, Room
 from evfem.scene.electrics import Electrics, check_drive, without_field
 from evfem.scene.motion import MOTIONS, VOLTAGE, Course, Motion, Press, Slide
 from evfem.scene.options import Output, Solver
@@ -33,6 +31,8 @@ from evfem.scene.terms import Boundary, Region, Term
 from evfem.surface.adhesion import ADHESION, adhesion_of
 from evfem.surface.friction import Coulomb
 from evfem.surface.usersurface import completed
+from evfem.terms.hand import Hand
+from evfem.terms.traction import PadTraction
 from evfem.tissue.forms import Form
 
 DIRECTIONS = ("vertical", "normal")
@@ -95,9 +95,10 @@ class Scene:
     None and `voltage` 0: no electrostatics. Only where the field is full may the finger be not `grounded`:
     without a charge, above electrodes of different voltages. `friction_law` says what the surface's
     coefficient means (`Coulomb`, ... or one's own), `adhesion` what attracts without a voltage (`Dugdale`,
-    `Capillary`, or one's own). `rooms` are capabilities of one's own (`evfem.terms`). A `hand` is between drive and bone: motions then say where the drive goes.
-    `depth` (mm) of a plane finger adds `Result.total`, in N and mm2. `motion` may be empty where steps are
-    taken at will (`evfem.simulation.loop`). Raises InputError for anything that does not fit together.
+    `Capillary`, or one's own). `rooms` are capabilities of one's own (`evfem.terms`). A `hand` is between
+    drive and bone: motions then say where the drive goes. `depth` (mm) of a plane finger adds `Result.total`,
+    in N and mm2. `motion` may be empty where steps are taken at will (`evfem.simulation.loop`). Raises
+    InputError for anything that does not fit together.
     """
 
     finger: Finger

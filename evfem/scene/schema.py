@@ -18,7 +18,6 @@ from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
 from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.finger.fingertip import FINGERS
-from evfem.newton.hand import Hand
 from evfem.newton.strategy import Strategy
 from evfem.scene import format as file
 from evfem.scene.keys import VERSION
@@ -28,6 +27,7 @@ from evfem.scene.scene import Output, Solver
 from evfem.surface.adhesion import ADHESIONS
 from evfem.surface.elastic import ElasticLayer
 from evfem.surface.friction import KINDS as FRICTIONS
+from evfem.terms.hand import Hand
 from evfem.tissue.laws import LAWS
 
 DRAFT = "http://json-schema.org/draft-07/schema#"

@@ -19,10 +19,10 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints, Words
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
-from evfem.contact.bed import Bed
-from evfem.contact.chargebooks import ChargeBooks
-from evfem.contact.traction import force_columns
 from evfem.errors import readable, unknown
+from evfem.terms.chargebooks import ChargeBooks
+from evfem.terms.foundation import Bed
+from evfem.terms.traction import force_columns
 
 Row = Mapping[str, Any]
 #: a drift of the load that is worth a word
@@ -162,6 +162,46 @@ SPATIAL_UNITS: Mapping[str, str] = {
 NEEDED, SHOWN = (
     tuple(name for name, about in ABOUT.items() if trait in about["traits"]) for trait in ("needed", "shown")
 )
+
+
+def _of_room(name: str) -> Any:
+    """A column of a room as an attribute: 0 in a run whose scene has no such room."""
+
+    def found(result: Any) -> Floats:
+        return result.in_rooms.get(name, np.zeros_like(result.position))
+
+    return property(found, doc=f"{ABOUT[name]['meaning']}; 0 without")
+
+
+def _component(name: str) -> Any:
+    """A column of three dimensions as an attribute; in the plane all is along x, and nothing along z."""
+
+    def found(result: Any) -> Floats:
+        if name in result.in_space:
+            return result.in_space[name]
+        return result[name.removesuffix("_x")] if name.endswith("_x") else np.zeros_like(result.position)
+
+    return property(found, doc=f"{SPATIAL[name]['meaning']}; in the plane all is along x")
+
+
+class FurtherColumns:
+    """Columns of three dimensions and of rooms as attributes of a result."""
+
+    position_z = _component("position_z")
+    tangential_force_x = _component("tangential_force_x")
+    tangential_force_z = _component("tangential_force_z")
+    applied_tangential_force_x = _component("applied_tangential_force_x")
+    applied_tangential_force_z = _component("applied_tangential_force_z")
+    electrostatic_force_z = _component("electrostatic_force_z")
+    adhesive_force = _of_room("adhesive_force")
+    adhesive_force_x = _of_room("adhesive_force_x")
+    adhesive_force_z = _of_room("adhesive_force_z")
+    adhesive_work = _of_room("adhesive_work")
+    surface_sink = _of_room("surface_sink")
+    source_work = _of_room("source_work")
+    leakage_dissipation = _of_room("leakage_dissipation")
+    stretch_work = _of_room("stretch_work")
+    field_energy = _of_room("field_energy")
 
 
 def columns_of(names: Iterable[str]) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import ELECTROSTATIC
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.newton.state import State
 from evfem.simulation.history import ADDED, SUMS, WIDTHS
@@ -18,6 +17,7 @@ from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import Books, SubstepWork
 from evfem.surface.pad import Pad, reach, surface_state
+from evfem.terms.attraction import ELECTROSTATIC
 
 
 def unloaded(state: State) -> State:

@@ -11,11 +11,7 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.common.arrays import Floats
-from evfem.contact.attraction import ELECTROSTATIC, Attraction
-from evfem.contact.chargebooks import ChargeBooks
-from evfem.contact.charging import NO_CHARGES, Charging, NoCharges
-from evfem.contact.traction import PadTraction
-from evfem.contact.tractions import sum_of
+from evfem.common.rooms import BodyTerm, Column, Room
 from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
@@ -23,13 +19,10 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.factorised import FactorisedBody
-from evfem.newton.friction import LawFriction
-from evfem.newton.hand import Drive, drive_of
 from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits, State
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
-from evfem.rooms import BodyTerm, Column, Room
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
@@ -38,6 +31,13 @@ from evfem.solver.linearbody import LinearBody
 from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.skin import Skin, make_skin
+from evfem.terms.attraction import ELECTROSTATIC, Attraction
+from evfem.terms.chargebooks import ChargeBooks
+from evfem.terms.charging import NO_CHARGES, Charging, NoCharges
+from evfem.terms.friction import LawFriction
+from evfem.terms.hand import Drive, drive_of
+from evfem.terms.traction import PadTraction
+from evfem.terms.tractions import sum_of
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import make_dynamics
 from evfem.tissue.space import make_space
@@ -67,7 +67,7 @@ class Model:
 
     @cached_property
     def terms(self) -> tuple[Any, ...]:
-        """What has energies beside tissue, contact and attraction (`evfem.rooms.Room`)."""
+        """What has energies beside tissue, contact and attraction (`evfem.common.rooms.Room`)."""
         return (*self.body.rooms, *self.drive.books, *self.equilibrium.interface.rooms)
 
     @cached_property
@@ -215,8 +215,8 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
     local = (law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
     if scene.field == "local":
         return Attraction(*local)
-    from evfem.contact.fullfield import FieldAttraction, facing
     from evfem.planning.fieldchoice import chosen_field
+    from evfem.terms.fullfield import FieldAttraction, facing
 
     if not chosen_field(scene, mesh).full:
         return Attraction(*local)
@@ -224,7 +224,7 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
     full = (*local, facing(pad, mesh.points[pad.nodes]), electrics.skin, not scene.grounded)
     if not electrics.conducts:
         return FieldAttraction(*full)
-    from evfem.contact.drivenfield import DrivenFieldAttraction, Harmonic
+    from evfem.terms.drivenfield import DrivenFieldAttraction, Harmonic
 
     harmonics = tuple(Harmonic(*one) for one in electrics.permittivities)
     return DrivenFieldAttraction(*full, harmonics=harmonics)

@@ -37,6 +37,7 @@ from evfem.simulation.history import (
     WHOLE_OF,
     WHOLE_UNITS,
     WIDTHS,
+    FurtherColumns,
     History,
     Row,
     column_of,
@@ -97,28 +98,8 @@ LATER_FIELDS = ("surface_sink",)
 CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
 
-def _of_room(name: str) -> Any:
-    """A column of a room as an attribute: 0 in a run whose scene has no such room."""
-
-    def found(result: Result) -> Floats:
-        return result.in_rooms.get(name, np.zeros_like(result.position))
-
-    return property(found, doc=f"{ABOUT[name]['meaning']}; 0 without")
-
-
-def _component(name: str) -> Any:
-    """A column of three dimensions as an attribute; in the plane all is along x, and nothing along z."""
-
-    def found(result: Result) -> Floats:
-        if name in result.in_space:
-            return result.in_space[name]
-        return result[name.removesuffix("_x")] if name.endswith("_x") else np.zeros_like(result.position)
-
-    return property(found, doc=f"{SPATIAL[name]['meaning']}; in the plane all is along x")
-
-
 @dataclass(frozen=True, eq=False)
-class Result(History):
+class Result(History, FurtherColumns):
     """Every column of the history as an array over the steps, the frames kept, the mesh and the provenance.
 
     Forces are per mm of depth; `total` has them in N where the scene says how deep the finger is.
@@ -174,22 +155,6 @@ class Result(History):
             if name in further:
                 return further[name]
         return getattr(self, name) if name in ROOM_COLUMNS else super().__getitem__(name)
-
-    position_z = _component("position_z")
-    tangential_force_x = _component("tangential_force_x")
-    tangential_force_z = _component("tangential_force_z")
-    applied_tangential_force_x = _component("applied_tangential_force_x")
-    applied_tangential_force_z = _component("applied_tangential_force_z")
-    electrostatic_force_z = _component("electrostatic_force_z")
-    adhesive_force = _of_room("adhesive_force")
-    adhesive_force_x = _of_room("adhesive_force_x")
-    adhesive_force_z = _of_room("adhesive_force_z")
-    adhesive_work = _of_room("adhesive_work")
-    surface_sink = _of_room("surface_sink")
-    source_work = _of_room("source_work")
-    leakage_dissipation = _of_room("leakage_dissipation")
-    stretch_work = _of_room("stretch_work")
-    field_energy = _of_room("field_energy")
 
     @property
     def units(self) -> Mapping[str, str]:

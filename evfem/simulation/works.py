@@ -18,7 +18,7 @@ The history has
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
   ``adhesive_work`` likewise;
 - ``stored_energy`` :math:`\psi` of the tissue, with penalties of the springs of the interface, of an elastic
-  surface (`evfem.contact.bed`), relative to which ways then are, and with a hand of its spring
+  surface (`evfem.terms.foundation`), relative to which ways then are, and with a hand of its spring
   (``kinetic_energy``, ``viscous_dissipation`` and the work of the drive have its mass and damper);
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
@@ -57,7 +57,7 @@ Where no equilibrium is near, the body is released and comes to rest at another 
 :math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``. If their sum is negative, as it
 can be in the first of these steps, which moves the loads, it is ``integrator_dissipation``.
 
-Where the voltage is resolved in time (`evfem.contact.charging`) the pad first moves with the charges
+Where the voltage is resolved in time (`evfem.terms.charging`) the pad first moves with the charges
 and the voltage that it had, which is the way of :math:`W_e`, and then charge flows:
 ``source_work`` is what the source gives in both, ``leakage_dissipation`` what crosses the layers, and
 
@@ -84,12 +84,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.quadrature import PART, SLIDE
-from evfem.contact.bed import Rigid
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
-from evfem.contact.traction import PadPath, PadState
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
 from evfem.simulation.model import Model
+from evfem.terms.foundation import Rigid
+from evfem.terms.traction import PadPath, PadState
 
 #: share of the work of the change of internal forces or shear that no small smooth part sets free
 SNAP = 0.5

@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import evfem
-from evfem.common.manifest import Manifest
 from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.common.tables import csv_text
 from evfem.errors import InputError
+from evfem.sweeps.manifest import Manifest
 
 POINTS, TABLE, PARQUET, PROVENANCE = "points", "sweep.csv", "sweep.parquet", "sweep.json"
 MANIFEST = ".evfem-sweep"

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.rooms import BodyTerm
+from evfem.common.rooms import BodyTerm
 from evfem.tissue.dynamics import Dynamics, Static
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space

@@ -39,7 +39,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import LONGER, SHORTER
-from evfem.rooms import Room
+from evfem.common.rooms import Room
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
 from evfem.tissue.branches import Branches, branches_of, make_branches

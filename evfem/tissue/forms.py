@@ -10,7 +10,7 @@ gradient, i the component; theta comes last. Only the parts that a form uses are
 
 `neo_hookean`, `hyperelastic`, `kelvin_voigt`, `maxwell` and `mass` below are what runs where no
 compiled loop does; those loops are tested against them. The attraction's form stands beside its
-nodal rule, in `evfem.contact.attraction`.
+nodal rule, in `evfem.terms.attraction`.
 """
 
 from __future__ import annotations

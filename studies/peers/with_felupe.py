@@ -15,7 +15,7 @@ import scipy.sparse as sparse
 from pypardiso import PyPardisoSolver
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.attraction import Attraction
+from evfem.terms.attraction import Attraction
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.mesh.mesh import Mesh
 from evfem.surface.pad import make_pad

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from tools.grids import assembled
 
-from evfem.contact.attraction import Attraction, attraction
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.finger.fingerpad import FingerPad
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.surfaces import Flat, Sinusoid
+from evfem.terms.attraction import Attraction, attraction
 from evfem.tissue.assembly import Integral
 from evfem.tissue.forms import Parts
 from evfem.tissue.space import make_space

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.contact.charging import Charged, Charging
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.relaxation import Sandwich
+from evfem.terms.charging import Charged, Charging
 
 SKIN = ev.Layer(0.30, ev.Dielectric(1136.0, (), 2e-4))
 STACK = Sandwich.of(SKIN, ev.TOUCHSCREEN, frequency=None, gap_conductivity=1e-8)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from evfem.contact import condensed
-from evfem.contact.bed import BelowCandidates
 from evfem.contact.condensed import (
     Candidates,
     CondensedTangent,
@@ -23,6 +22,7 @@ from evfem.contact.signorini import (
     Unstable,
 )
 from evfem.surface.pad import SurfaceState
+from evfem.terms.foundation import BelowCandidates
 from evfem.tissue.kernels.blocks import contact_loop
 
 K = 5

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.contact.bed import slopes
 from evfem.surface.elastic import transfer
 from evfem.surface.patches import love
+from evfem.terms.foundation import slopes
 
 #: u_z E*/P, u_x E*/Q, u_z mu/Q at x/H, by quadrature of the inverse transform to 10 digits
 POINT_LOADS = {

@@ -10,11 +10,11 @@ from tools.refusals import refuses
 
 import evfem as ev
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.contact.slipping import OscillatingNodes, speed_under
 from evfem.planning.plan import plan
 from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
 from evfem.surface.friction import KINDS, Slipping
+from evfem.terms.slipping import OscillatingNodes, speed_under
 
 LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)
 ADHESIVE = ev.AdhesiveFriction(strength=0.004)

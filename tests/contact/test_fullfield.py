@@ -10,10 +10,10 @@ from tools.refusals import refuses
 
 import evfem as ev
 from evfem.contact import fullfield
-from evfem.contact.attraction import Attraction
-from evfem.contact.fullfield import STEEP, FieldAttraction, certificate, facing, in_line, in_sight
 from evfem.errors import Unresolved
 from evfem.simulation.model import make_model
+from evfem.terms.attraction import Attraction
+from evfem.terms.fullfield import STEEP, FieldAttraction, certificate, facing, in_line, in_sight
 
 
 def attractions(pad, points, surface, skin_thickness=0.38):

@@ -10,11 +10,11 @@ from tools.solids import bent, sheet
 
 import evfem as ev
 from evfem.common.constants import CHANGES, PIN_OFFSET
-from evfem.contact.attraction import Attraction
 from evfem.errors import InputError
 from evfem.newton.interface import FrictionJumps
 from evfem.surface.pad import surface_state
 from evfem.surface.surfaces import EQUATION_25
+from evfem.terms.attraction import Attraction
 
 GRID = np.linspace(-2.0, 2.0, 33)
 #: two waves askew, the second one at 90 degrees from the first

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.integrate import dblquad
 from tools.solids import bent, block, sheet
 
-from evfem.contact.attraction import Attraction
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.errors import InputError
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.surface.skin import make_skin
 from evfem.surface.surfaces import Flat
+from evfem.terms.attraction import Attraction
 
 FACES = {4: "bilinear", 9: "biquadratic"}
 

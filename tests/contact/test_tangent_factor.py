@@ -9,11 +9,11 @@ import pytest
 from tools.meshes import arc
 
 import evfem as ev
-from evfem.contact.attraction import Attraction
-from evfem.contact.fullfield import FieldAttraction, facing
 from evfem.contact.signorini import STICK
 from evfem.electrostatics.roughness import ExponentialRoughness
 from evfem.simulation.model import make_model
+from evfem.terms.attraction import Attraction
+from evfem.terms.fullfield import FieldAttraction, facing
 
 ROUGH = ExponentialRoughness(decay=5e-4, pressure=4.0, open_gap=4e-3)
 

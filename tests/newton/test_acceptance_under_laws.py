@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node, pushed, shifted
 
-from evfem.contact.attraction import NoAttraction
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.newton.control import GivenVoltage, Indentation, Target
@@ -18,6 +17,7 @@ from evfem.newton.state import Folded, Limits, StepFailed
 from evfem.newton.strategy import Strategy
 from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.surface.surfaces import Flat
+from evfem.terms.attraction import NoAttraction
 
 SECONDS, PENALTIES, X = 0.5, (50.0, 20.0), MESH.points[PAD.nodes, 0]
 LAWS = {

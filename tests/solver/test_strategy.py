@@ -9,7 +9,6 @@ from tools.builders import finger
 from tools.meshes import block
 from tools.refusals import refuses
 
-from evfem.contact.attraction import NoAttraction
 from evfem.newton.state import Record, StepFailed
 from evfem.newton.strategy import Strategy
 from evfem.scene.motion import Press, Slide
@@ -17,6 +16,7 @@ from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
 from evfem.solver.stepping import Stepper
 from evfem.surface.surfaces import Flat
+from evfem.terms.attraction import NoAttraction
 
 
 class Unbooked:

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from evfem.contact.attraction import NoAttraction
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.mesh.mesh import raised
 from evfem.newton.control import Target
@@ -14,6 +13,7 @@ from evfem.newton.interface import Interface
 from evfem.newton.state import Balance, Limits, Record
 from evfem.newton.strategy import Strategy
 from evfem.surface.pad import make_pad
+from evfem.terms.attraction import NoAttraction
 from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES
 from tools.meshes import block
 

@@ -1,6 +1,6 @@
 r"""The mean attraction over the cycle from the full field, in layers that conduct.
 
-As `evfem.contact.fullfield`, with Poisson's problem of complex permittivities at each harmonic n of the drive
+As `evfem.terms.fullfield`, with Poisson's problem of complex permittivities at each harmonic n of the drive
 and the mean pulls :math:`F_n` on the nodes at 1 V (`evfem.field.meanattraction`): with the weight w_n of a
 harmonic in the squared effective voltage :math:`f_j = U^2 \sum_n w_n F_{n, j}`, :math:`\sum_n w_n = 1`. The
 tangent is that of the column law with the same losses. The forces have no energy: between two states the
@@ -15,9 +15,9 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.fullfield import FieldAttraction
 from evfem.field.columns import Columns
 from evfem.field.meanattraction import mean_pull
+from evfem.terms.fullfield import FieldAttraction
 
 
 @dataclass(frozen=True)

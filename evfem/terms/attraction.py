@@ -25,13 +25,13 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
-from evfem.contact.charging import NO_CHARGES, Charged, Charging, NoCharges
-from evfem.contact.traction import TOUCHING, Entries, PadPath, PadState, PadTraction, Reading
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
 from evfem.surface.pad import Pad
 from evfem.surface.skin import Skin
 from evfem.tensor import derivative, mul, positive_part
+from evfem.terms.charging import NO_CHARGES, Charged, Charging, NoCharges
+from evfem.terms.traction import TOUCHING, Entries, PadPath, PadState, PadTraction, Reading
 from evfem.tissue.forms import deformation_gradient, form
 
 

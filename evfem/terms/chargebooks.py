@@ -1,4 +1,4 @@
-"""Works and energy of charges that move in time, as columns of the history (`evfem.contact.charging`).
+"""Works and energy of charges that move in time, as columns of the history (`evfem.terms.charging`).
 
 They are known under a law that is the pressure of the field in layers, Strong and Troxel's; 0 under another.
 """
@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from evfem.common.quadrature import SHARE, WAY
-from evfem.contact.traction import PadPath
-from evfem.rooms import Column, Room
+from evfem.common.rooms import Column, Room
+from evfem.terms.traction import PadPath
 
 
 @dataclass(frozen=True)

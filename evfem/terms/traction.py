@@ -19,7 +19,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.quadrature import FINE_SHARE, FINE_WAY, LEGENDRE, SEEN, SHARE, WAY
-from evfem.rooms import Column, Room
+from evfem.common.rooms import Column, Room
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 

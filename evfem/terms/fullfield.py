@@ -28,13 +28,13 @@ import scipy.sparse as sparse
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
 from evfem.common.quadrature import ENDS
-from evfem.contact.attraction import Attraction
-from evfem.contact.traction import TOUCHING, Entries, PadPath, PadState
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
 from evfem.field.columns import Capacitance, Columns
 from evfem.surface.pad import Pad, surface_state
+from evfem.terms.attraction import Attraction
+from evfem.terms.traction import TOUCHING, Entries, PadPath, PadState
 
 #: gap of touching nodes, as a fraction of the insulator's reduced thickness
 SERIES_GAP = 1e-4

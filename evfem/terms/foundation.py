@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints, block
-from evfem.rooms import Column, Foundation, Room
+from evfem.common.arrays import Floats, Ints
+from evfem.common.rooms import Column, Foundation, Room
+from evfem.contact.below import RIGID_BELOW, BelowCandidates, RigidBelow
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
@@ -37,8 +38,8 @@ STEP = 1e-5
 class Yielding:
     """The surface below k of P pad nodes, those `over` it (k,), in one place: `compliance` (dim k, dim k) by
     forces on the finger along x, y[, z], node by node, to what it adds to their places relative to it, and
-    its derivatives `slope` (d, dim k, dim k) by the places of the displaced nodes along x[, z]; `left` of both
-    from before the step.
+    its derivatives `slope` (d, dim k, dim k) by the places of the displaced nodes along x[, z]; what is
+    `left` of both from before the step.
     """
 
     over: Ints
@@ -134,51 +135,6 @@ class Rigid(Room):
 
 class Memoryless(Foundation):
     """An elastic surface whose displacement follows its forces at once."""
-
-
-class RigidBelow:
-    """A rigid surface below the candidates of a linear step."""
-
-    def relative(self, compliance: Floats) -> Floats:
-        """Compliance of the candidates' places relative to the surface."""
-        return compliance
-
-    def among(self, among: Floats, rows: Ints) -> Floats:
-        """The same of some rows."""
-        return among
-
-    def freed(self, free: Floats) -> Floats:
-        """Motion (dim C, 1 + p) relative to the surface, without contact forces."""
-        return free
-
-    def gives(self, whole: Floats) -> Any:
-        """By how much more it gives way (dim C,) under contact forces `whole` (dim C,)."""
-        return 0.0
-
-
-RIGID_BELOW = RigidBelow()
-
-
-@dataclass(frozen=True, eq=False)
-class BelowCandidates(RigidBelow):
-    """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
-    what it lacks without contact forces of what the present attraction asks for, `pulled` (2 c,) in mm.
-    """
-
-    compliance: Floats
-    pulled: Floats
-
-    def relative(self, compliance: Floats) -> Floats:
-        return compliance + self.compliance
-
-    def among(self, among: Floats, rows: Ints) -> Floats:
-        return among + block(self.compliance, rows, rows)
-
-    def freed(self, free: Floats) -> Floats:
-        return free + np.pad(self.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
-
-    def gives(self, whole: Floats) -> Any:
-        return self.pulled + self.compliance @ whole
 
 
 class Bed(Rigid):

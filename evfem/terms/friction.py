@@ -15,14 +15,16 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.rooms import Room
 from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, sizes
-from evfem.contact.slipping import OscillatingNodes
-from evfem.newton.state import State
 from evfem.protocols import FrictionLaw
-from evfem.rooms import Room
 from evfem.surface.friction import Slipping
 from evfem.tensor import derivative
+from evfem.terms.slipping import OscillatingNodes
+
+#: an accepted state, or an iterate (`evfem.newton.state.State`)
+State = Any
 
 #: steps of differences of a bound by contact forces (N/mm) and tributary lengths (mm)
 FORCE_STEP, LENGTH_STEP = 1e-7, 1e-6

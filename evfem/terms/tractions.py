@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.traction import Entries, NoTraction, PadState, PadTraction
+from evfem.terms.traction import Entries, NoTraction, PadState, PadTraction
 
 
 def sum_of(parts: Sequence[Any]) -> Any:

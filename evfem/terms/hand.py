@@ -25,10 +25,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, check_fields, number
+from evfem.common.rooms import Room
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
-from evfem.newton.state import State
-from evfem.rooms import Room
 from evfem.tissue.dynamics import Difference
+
+#: an accepted state, or an iterate (`evfem.newton.state.State`)
+State = Any
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
 STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
