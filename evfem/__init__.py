@@ -20,7 +20,6 @@ _NAMES = {
     "calibration.fit": ("fit",),
     "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
     "calibration.parameters": ("Parameter",),
-    "calibration.result": ("FitResult",),
     "surface.adhesion": ("Capillary", "Dugdale"),
     "surface.elastic": ("ElasticLayer", "ElasticStack"),
     "surface.friction": (
@@ -47,7 +46,7 @@ _NAMES = {
     "finger.fingertip": ("Fingertip",),
     "finger.scan": ("RidgeScan",),
     "loading": ("load",),
-    "response.impedance": ("Impedance", "impedance"),
+    "response.impedance": ("impedance",),
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),
@@ -55,13 +54,12 @@ _NAMES = {
     "planning.plan": ("plan",),
     "response.parameters": ("ShapeChange",),
     "response.design": ("design",),
-    "response.sensitivities": ("Sensitivities", "sensitivities"),
+    "response.sensitivities": ("sensitivities",),
     "response.uncertainty": ("uncertainty",),
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),
-    "simulation.checkpoint": ("Checkpoint",),
-    "simulation.loop": ("Loop", "loop"),
-    "simulation.result": ("Frame", "Result"),
+    "simulation.loop": ("loop",),
+    "simulation.result": ("Result",),
     "simulation.run": ("simulate",),
     "simulation.spectrum": ("spectrum",),
     "terms.hand": ("Hand",),
@@ -70,11 +68,9 @@ _NAMES = {
     "sweeps.file": ("Sweep",),
     "sweeps.run": ("sweep",),
     "sweeps.samples": ("Normal", "Samples", "Uniform"),
-    "sweeps.table": ("SweepResult",),
-    "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
     "textures.texture": ("Texture",),
     "estimate.touch": ("Touch",),
-    "tissue.forms": ("form", "grad"),
+    "tissue.forms": ("form",),
     "tissue.laws": ("LinearElastic", "NeoHookean", "Ogden", "Yeoh"),
     "tissue.ogden": ("relaxation_of",),
 }
@@ -98,26 +94,45 @@ _MODULES = {
     "tensor": "tensor",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
-#: public names of 0.2 that are gone, and what to use instead
+#: what a name of tensor algebra is since 0.4, and a class that is only received
+_ALGEBRA = ("ddot", "det", "dot", "grad", "inv", "mul", "positive_part", "trace", "transpose")
+_RECEIVED = {
+    "Checkpoint": ("simulation.checkpoint", "what a run keeps in its folder for `--resume`"),
+    "FitResult": ("calibration.result", "what `ev.fit` returns"),
+    "Frame": ("simulation.result", "what `result.frames` consists of"),
+    "Impedance": ("response.impedance", "what `ev.impedance` returns"),
+    "Loop": ("simulation.loop", "what `ev.loop` returns"),
+    "Sensitivities": ("response.sensitivities", "what `ev.sensitivities` returns"),
+    "SweepResult": ("sweeps.table", "what `ev.sweep` returns"),
+}
+#: names that `ev` had -> the sentence that says what to use instead
 _GONE = dict.fromkeys(
     ("FastModel", "reduce"),
     "the fast model is gone since 0.3; run the scene itself with `ev.simulate` (a coarser `resolution` is "
     "about as fast), several at a time with `ev.sweep`",
 )
+_GONE |= {name: f"since 0.4 it is `ev.tensor.{name}`" for name in _ALGEBRA}
+_GONE |= {name: f"since 0.4 it is `evfem.{home}.{name}`, {what}" for name, (home, what) in _RECEIVED.items()}
 
 __all__ = sorted([*_HOME, *_MODULES])
 
 
 class _Moved:
-    """Asked last, for a module that is nowhere: one that moved since 0.2 says its new place."""
+    """Asked last, for a module that is nowhere: one that moved since 0.2, and a name that was imported from
+    here (`from evfem import Loop`), say the new place.
+    """
 
     @staticmethod
     def find_spec(name: str, path: Any = None, target: Any = None) -> None:
-        """Raises `ModuleNotFoundError` for a name of `data/moved.csv`."""
-        if name.startswith(f"{__name__}."):
-            with open(f"{__path__[0]}/data/moved.csv", encoding="utf-8") as file:
-                if place := dict(line.strip().split(",") for line in file).get(name):
-                    raise ModuleNotFoundError(f"{name} has moved in 0.3; its new place: {place}")
+        """Raises `ModuleNotFoundError` for a name of `_GONE` and of `data/moved.csv`."""
+        package, _, own = name.partition(".")
+        if package != __name__:
+            return
+        if own in _GONE:
+            raise ModuleNotFoundError(f"{own}: {_GONE[own]}")
+        with open(f"{__path__[0]}/data/moved.csv", encoding="utf-8") as file:
+            if place := dict(line.strip().split(",") for line in file).get(name):
+                raise ModuleNotFoundError(f"{name} has moved in 0.3; its new place: {place}")
 
 
 _sys.meta_path.append(_Moved)

@@ -89,8 +89,8 @@ class WeakForm(Protocol):
 
     def __call__(self, u: Any, v: Any, w: Any) -> Any:
         """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with gradients
-        (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary. Over a
-        region also `u.theta` and `v.theta`, the element's volume change, and `w.law`, its material.
+        (`evfem.tensor.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary.
+        Over a region also `u.theta` and `v.theta`, the element's volume change, and `w.law`, its material.
         """
 
 

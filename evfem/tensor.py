@@ -101,6 +101,11 @@ def identity(n: int, trailing: int = 0) -> Array:
     return np.eye(n).reshape((n, n) + (1,) * trailing)
 
 
+def grad(field: Any) -> Any:
+    """Gradient (i, j, ...) = d u_i / d X_j of the displacement or test function in a weak form."""
+    return field.grad
+
+
 def positive_part(x: Array) -> Array:
     """max(x, 0), decided by the real part.
 

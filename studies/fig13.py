@@ -44,7 +44,7 @@ class Instant:
     result: ev.Result
 
     @property
-    def frame(self) -> ev.Frame:
+    def frame(self) -> ev.result.Frame:
         """The fields."""
         return self.result.frames[0]
 

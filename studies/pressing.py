@@ -209,7 +209,7 @@ def run(case: Case) -> Pressed:
     return _bundle(case, [result], result.frames, slice(None))
 
 
-def _bundle(case: Case, results: list[ev.Result], frames: list[ev.Frame], rows: Any) -> Pressed:
+def _bundle(case: Case, results: list[ev.Result], frames: list[ev.result.Frame], rows: Any) -> Pressed:
     mesh = results[0].mesh
     nodes = outline_nodes(mesh)
     points = mesh.points[nodes]

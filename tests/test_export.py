@@ -163,7 +163,7 @@ def solid_result(order):
     fields = dict.fromkeys(POINT_FIELDS, np.arange(N, dtype=float)) | {"J": np.arange(E, dtype=float)}
     fields["contact_status"] = np.arange(N) % 3
     stress = np.arange(6.0 * E).reshape(E, 6)
-    return mesh, ev.Frame(
+    return mesh, ev.result.Frame(
         3, 0.0, 0.5, 0.1 * mesh.points, **fields, von_mises=np.arange(E) + 0.5, cauchy_stress=stress
     )
 

@@ -1,6 +1,7 @@
-"""What 0.2 had and 0.3 has not, for one release: a sentence that says what to use instead."""
+"""What an earlier release had and this one has not: a sentence that says what to use instead."""
 
 import csv
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -14,6 +15,45 @@ def test_the_fast_model_says_what_to_use_instead(name):
     with pytest.raises(AttributeError, match=rf"^{name}: the fast model is gone since 0.3; .*`ev.simulate`"):
         getattr(ev, name)
     assert name not in dir(ev)
+
+
+@pytest.mark.parametrize("name", sorted(ev._GONE))
+def test_a_name_that_is_gone_says_what_to_use_instead(name):
+    with pytest.raises(AttributeError, match=rf"^{name}: .*since 0\.\d") as caught:
+        getattr(ev, name)
+    assert name not in ev.__all__
+    sentence = str(caught.value)
+    with pytest.raises(ImportError, match=f"^{re.escape(sentence)}$"):
+        exec(f"from evfem import {name}")
+    for place in re.findall(r"`((?:ev|evfem)\.[\w.]+)`", sentence):
+        assert resolved(place) is not None
+
+
+def resolved(dotted):
+    """What a dotted name is, from the package on."""
+    value, _, rest = ev, *dotted.partition(".")[1:]
+    for part in rest.split("."):
+        inner = hasattr(value, part)
+        value = getattr(value, part) if inner else import_module(f"{value.__name__}.{part}")
+    return value
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("mul", "mul: since 0.4 it is `ev.tensor.mul`"),
+        ("Loop", "Loop: since 0.4 it is `evfem.simulation.loop.Loop`, what `ev.loop` returns"),
+    ],
+)
+def test_the_sentence_of_a_name_that_has_moved(name, sentence):
+    assert not hasattr(ev, name)
+    with pytest.raises(AttributeError, match=f"^{re.escape(sentence)}$"):
+        getattr(ev, name)
+
+
+def test_a_module_of_others_with_such_a_name_is_no_business_of_ours():
+    with pytest.raises(ModuleNotFoundError, match=r"^No module named 'mul'$"):
+        import_module("mul")
 
 
 def test_half_of_a_finger_says_that_the_whole_is_computed():

@@ -12,6 +12,7 @@ from tools.refusals import refuses
 import evfem as ev
 from evfem.common.storage import save_arrays
 from evfem.mesh import file as meshfile
+from evfem.simulation.checkpoint import Checkpoint
 
 PRESS = f"{SQUARE_SCENE}\n[[motion]]\nkind = 'press'\nindentation = 0.1\nsteps = 2\n"
 SWEEP = "version = 1\nscene = 'square.toml'\n[grid]\nsurface.friction = [0.1, 0.2]\n"
@@ -62,7 +63,7 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "notes.txt").write_text("mine")
     (place / "empty.npz").write_text("")
     (place / "buzz.ahap").write_text("{}")
-    ev.Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
+    Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
     save_arrays("pad.npz", {"format": np.array("evfem-reduced-1")})  # as FastModel.save of 0.2 did
     cases = {
         "notes.txt": "notes.txt, of another kind; allowed: the folder of a run or a sweep, a result",
@@ -96,7 +97,7 @@ def test_the_folder_of_a_run_is_its_result(place, output):
     assert [frame.step for frame in found.frames] == ([2] if "every" in output else [1, 2])
     one, other = found.frames[-1], computed.frames[-1]
     close = 1e-6 if "single" in output else 0.0
-    for spec in fields(ev.Frame):
+    for spec in fields(ev.result.Frame):
         np.testing.assert_allclose(getattr(one, spec.name), getattr(other, spec.name), rtol=close, atol=close)
     assert called(place, "run", "square.toml", "--overwrite", "--no-fields", "--no-plots")[0] == 0
     assert ev.load("square-out").frames == []

@@ -16,6 +16,7 @@ import evfem as ev
 from evfem.errors import InputError
 from evfem.protocols import CompleteSurface, Observer, Surface
 from evfem.surface.usersurface import completed
+from evfem.tensor import ddot, det, inv, transpose
 
 FLAT = ev.Flat(friction=0.3)
 PRESS, SLIDE = ev.Press(indentation=0.15, steps=2), ev.Slide(distance=0.5, steps=3)
@@ -39,16 +40,16 @@ class Tissue:
     mu, lmbda = 0.1 / 2.8, 0.1 * 0.4 / (1.4 * 0.2)
 
     def psi(self, F: Any) -> Any:
-        J = ev.det(F)
-        return 0.5 * self.mu * (ev.ddot(F, F) - 3.0 - 2.0 * np.log(J)) + 0.5 * self.lmbda * np.log(J) ** 2
+        J = det(F)
+        return 0.5 * self.mu * (ddot(F, F) - 3.0 - 2.0 * np.log(J)) + 0.5 * self.lmbda * np.log(J) ** 2
 
 
 class StressedTissue(Tissue):
     """The same material by its stress."""
 
     def P(self, F: Any) -> Any:
-        G = ev.transpose(ev.inv(F))
-        return self.mu * (F - G) + self.lmbda * np.log(ev.det(F)) * G
+        G = transpose(inv(F))
+        return self.mu * (F - G) + self.lmbda * np.log(det(F)) * G
 
 
 class Waves:

@@ -23,7 +23,7 @@ import numpy as np
 
 from evfem.errors import InputError, quoted
 from evfem.protocols import WeakForm
-from evfem.tensor import Array, ddot, det, dot, identity, inv, mul, transpose
+from evfem.tensor import Array, ddot, det, dot, grad, identity, inv, mul, transpose
 
 Integrand = Callable[[Any, Any, Any], Any]
 
@@ -138,11 +138,6 @@ def form(function: WeakForm) -> Form:
             "form", quoted(function), "a function (u, v, w) that returns the integrand of a residual"
         )
     return Form(function)
-
-
-def grad(field: Any) -> Any:
-    """Gradient (i, j, ...) = d u_i / d X_j of the displacement or test function in a weak form."""
-    return field.grad
 
 
 def deformation_gradient(u: Any) -> Array:

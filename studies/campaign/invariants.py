@@ -185,11 +185,11 @@ def energies(scene: ev.Scene, result: ev.Result) -> Found:
 def frames(scene: ev.Scene, result: ev.Result) -> Found:
     """Contact pushes, open nodes carry nothing, no cell is inside out; shear is within the cone."""
 
-    def worst(name: str, error: Callable[[ev.Frame], float], allowed: float) -> Broken | None:
+    def worst(name: str, error: Callable[[ev.result.Frame], float], allowed: float) -> Broken | None:
         steps = [frame.step for frame in result.frames]
         return _worst(name, [error(frame) for frame in result.frames], allowed, steps)
 
-    def carried(frame: ev.Frame) -> float:
+    def carried(frame: ev.result.Frame) -> float:
         traction = np.hypot(frame.contact_pressure, frame.shear_traction)
         return _relative(np.where(frame.contact_status == OPEN, traction, 0.0), frame)
 
@@ -201,13 +201,13 @@ def frames(scene: ev.Scene, result: ev.Result) -> Found:
         yield worst("nodal cone", lambda f: _beyond_the_cone(scene, result, f), allowed)
 
 
-def _relative(values: Any, frame: ev.Frame) -> float:
+def _relative(values: Any, frame: ev.result.Frame) -> float:
     """The largest of these tractions (MPa) over the largest of contact or attraction."""
     largest = max(frame.contact_pressure.max(), frame.electrostatic_traction.max(), FORCE)
     return float(np.max(values, initial=0.0) / largest)
 
 
-def _beyond_the_cone(scene: ev.Scene, result: ev.Result, frame: ev.Frame) -> float:
+def _beyond_the_cone(scene: ev.Scene, result: ev.Result, frame: ev.result.Frame) -> float:
     """How far shear is outside the cone at any node's place; where it slips, how far from it.
 
     At a jump, and within a steep ramp, any coefficient within `NEAR` will do. Where coefficients are carried

@@ -56,7 +56,7 @@ FORMS = "docs/howto/form.md"
 #: pages with so much to compute that `.ci/run` alone runs them
 LONG = {"gallery.md", *(f"howto/{p}.md" for p in ("element", "field", "fit", "pictures", "rough", "texture"))}
 #: pages that are still to be filled to the width of the others
-UNFILLED = {"docs/theory.md", FORMS}
+UNFILLED = {"docs/theory.md"}
 #: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.surface.pad`
 NAME = re.compile(r"`((?:ev|evfem)(?:\.\w+)+)")
 DOI = re.compile(r"\b10\.\d{4,}/(?:[\w.-]|\(\w+\)|/)*\w")

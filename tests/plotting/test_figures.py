@@ -12,10 +12,12 @@ from tools.solids import block
 
 import evfem as ev
 from evfem import plotting
+from evfem.calibration.result import FitResult
 from evfem.mesh.mesh import raised
 from evfem.plotting import contact_pressure, deformed, forces, history, impedance, signal
 from evfem.plotting.figures import REGIONS
 from evfem.plotting.meshes import DIMMEST, EYE, regions
+from evfem.response.impedance import Impedance
 
 PNG = b"\x89PNG"
 #: a backend that tells which figures `plt.show()` shows, instead of opening windows
@@ -100,7 +102,7 @@ def fitted(with_sd):
     measured, scale = np.array([10.0, 20.0, 30.0, 4.0, 5.0]), np.array([2.0, 2.0, 2.0, 0.5, 0.5])
     names = [f"normal_force at indentation {x}" for x in (0.1, 0.2, 0.3)]
     names += [f"contact_width.last, motion.0.gap {x}" for x in (0.1, 0.2)]
-    return ev.FitResult(
+    return FitResult(
         parameters={"surface.friction": ev.Parameter(0.1, 1.0)},
         values={"surface.friction": 0.3},
         unknowns=np.zeros(1),
@@ -131,7 +133,7 @@ def test_residuals_are_computed_minus_measured_over_their_scale(with_sd, factor,
 
 
 def made(unit="N/mm"):
-    return ev.Impedance(np.array([1.0, 10.0, 100.0]), np.array([1.0, 1.0 + 1.0j, -2.0]), "normal", unit)
+    return Impedance(np.array([1.0, 10.0, 100.0]), np.array([1.0, 1.0 + 1.0j, -2.0]), "normal", unit)
 
 
 def test_magnitude_and_phase():

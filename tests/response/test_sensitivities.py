@@ -11,6 +11,7 @@ from tools.meshes import block as meshed
 
 import evfem as ev
 from evfem.response.parameters import parameter_of
+from evfem.tensor import ddot, det
 
 TISSUE = "finger.materials.tissue."
 THICKNESS = "electrostatics.insulator_thickness"
@@ -157,8 +158,8 @@ class Own:
     bulk: float
 
     def psi(self, F):
-        J = ev.det(F)
-        return 0.5 * self.mu * (ev.ddot(F, F) * J ** (-2 / 3) - 3.0) + 0.5 * self.bulk * np.log(J) ** 2
+        J = det(F)
+        return 0.5 * self.mu * (ddot(F, F) * J ** (-2 / 3) - 3.0) + 0.5 * self.bulk * np.log(J) ** 2
 
 
 def differenced(scene, apply, value, step, columns=FORCES):

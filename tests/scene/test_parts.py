@@ -13,6 +13,7 @@ import evfem as ev
 from evfem.errors import InputError
 from evfem.planning.parts import check_parts
 from evfem.planning.plan import plan
+from evfem.tensor import ddot, det, grad, inv, positive_part, transpose
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.38)
 PRESS, SLIDE = ev.Press(indentation=0.2, steps=2), ev.Slide(distance=1.0, steps=5)
@@ -51,14 +52,14 @@ def by_stress(P):
 
 def psi(F, mu=0.04, lmbda=0.1):
     """A neo-Hookean energy (MPa)."""
-    J = ev.det(F)
-    return 0.5 * mu * (ev.ddot(F, F) - 3.0 - 2.0 * np.log(J)) + 0.5 * lmbda * np.log(J) ** 2
+    J = det(F)
+    return 0.5 * mu * (ddot(F, F) - 3.0 - 2.0 * np.log(J)) + 0.5 * lmbda * np.log(J) ** 2
 
 
 def stress(F):
     """The stress of that energy (MPa)."""
-    G = ev.transpose(ev.inv(F))
-    return 0.04 * (F - G) + 0.1 * np.log(ev.det(F)) * G
+    G = transpose(inv(F))
+    return 0.04 * (F - G) + 0.1 * np.log(det(F)) * G
 
 
 class SplitFluid(ev.NeoHookean):
@@ -78,18 +79,18 @@ class SplitShrinking(ev.NeoHookean):
 
 @ev.form
 def prestressed(u, v, w):
-    return 0.04 * ev.ddot(ev.grad(u), ev.grad(v)) + (u.theta + 0.01) * v.theta
+    return 0.04 * ddot(grad(u), grad(v)) + (u.theta + 0.01) * v.theta
 
 
 ANY = "allowed: a function that takes arrays"
 LOST = "whose derivative is lost in a complex step; allowed: functions of numpy"
 WEAK = "MPa at rest, against {}; allowed: positive ones"
 MATERIALS = [
-    (material(lambda F: psi(F) + 0.04 * np.log(ev.det(F))), "a stress of 0.04 MPa at rest; allowed: no"),
+    (material(lambda F: psi(F) + 0.04 * np.log(det(F))), "a stress of 0.04 MPa at rest; allowed: no"),
     (by_stress(lambda F: stress(F) + 0.04 * F), "a stress of 0.04 MPa at rest; allowed: no stress at F = 1"),
     (prestressed, "a stress of 0.01 MPa at rest"),
-    (material(lambda F: psi(F) + 0.1 * np.abs(np.log(ev.det(F))) ** 2), f"psi(F) {LOST}"),
-    (by_stress(lambda F: stress(F) * np.abs(ev.det(F))), f"P(F) {LOST}"),
+    (material(lambda F: psi(F) + 0.1 * np.abs(np.log(det(F))) ** 2), f"psi(F) {LOST}"),
+    (by_stress(lambda F: stress(F) * np.abs(det(F))), f"P(F) {LOST}"),
     (material(lambda F: psi(np.array(F, dtype=float))), f"psi(F) {LOST}"),
     (material(lambda F: psi(F) + 0.0 * np.floor(F[0, 0])), "psi(F) that raises TypeError on complex numbers"),
     (material(lambda F: math.log(np.linalg.det(F))), "psi(F) that raises LinAlgError"),
@@ -98,11 +99,11 @@ MATERIALS = [
     (Part(P=stress, psi=lambda F: 1.0), "psi(F) of shape ()"),
     (material(lambda F: None), f"psi(F) that returns None; {ANY}"),
     (by_stress(lambda F: (stress(F), 0.04)), f"P(F) that returns a tuple and no array of numbers; {ANY}"),
-    (by_stress(lambda F: F / 0.0 * np.log(ev.det(F))), "P(F) that is infinite or no number"),
-    (material(lambda F: 0.0 * ev.det(F)), f"a stiffness of 0 {WEAK.format('shear')}"),
+    (by_stress(lambda F: F / 0.0 * np.log(det(F))), "P(F) that is infinite or no number"),
+    (material(lambda F: 0.0 * det(F)), f"a stiffness of 0 {WEAK.format('shear')}"),
     (material(lambda F: -psi(F)), f"a stiffness of -0.04 {WEAK.format('shear')}"),
     (material(lambda F: psi(F, lmbda=-0.08)), f"a stiffness of -0.04 {WEAK.format('widening')}"),
-    (material(lambda F: 0.05 * np.log(ev.det(F)) ** 2), f"a stiffness of 0 {WEAK.format('shear')}"),
+    (material(lambda F: 0.05 * np.log(det(F)) ** 2), f"a stiffness of 0 {WEAK.format('shear')}"),
     (SplitShrinking(E=0.1, nu=0.4), f"a stiffness of -0.0214 {WEAK.format('widening')}"),
     (SplitFluid(E=0.1, nu=0.4), f"a stiffness of 0 {WEAK.format('shear')}"),
 ]
@@ -251,7 +252,7 @@ def test_a_class_where_an_object_is_meant_is_refused(kind):
 
 def fibres(F):
     """Fibres that only pull: their stress has a kink at rest, where no derivative is compared."""
-    stretch = ev.tensor.positive_part(ev.ddot(F[:, :1], F[:, :1]) - 1.0)
+    stretch = positive_part(ddot(F[:, :1], F[:, :1]) - 1.0)
     return psi(F) + 0.01 * stretch**2
 
 
@@ -269,9 +270,9 @@ def test_a_material_without_mistakes_is_taken(law):
 def test_a_term_may_be_what_makes_a_region_stiff():
     @ev.form
     def stiff(u, v, w):
-        return 0.04 * ev.ddot(ev.grad(u), ev.grad(v))
+        return 0.04 * ddot(grad(u), grad(v))
 
-    free = material(lambda F: 0.0 * ev.det(F))
+    free = material(lambda F: 0.0 * det(F))
     assert plan(scene(free).with_term(stiff, on=ev.Region("tissue"))).warnings == ()
 
 

@@ -13,6 +13,7 @@ from evfem import plotting
 from evfem.contact.signorini import SLIP
 from evfem.simulation.history import SPATIAL, WIDTHS
 from evfem.simulation.run import simulate
+from evfem.tensor import ddot, grad
 
 PRESS = ev.Press(indentation=0.3, steps=2)
 SHEARS = ("tangential_force_x", "tangential_force_z")
@@ -82,8 +83,8 @@ def test_time_adds_viscous_stress_and_inertia():
 @ev.form
 def neo_hookean(u, v, w):
     """With mu = 0.02 and lambda = 0.1 MPa, for three dimensions alone."""
-    F = ev.grad(u) + np.eye(3)[:, :, None, None]
-    return 0.02 * ev.ddot(F, ev.grad(v)) + (0.1 * u.theta - 0.02) * v.theta
+    F = grad(u) + np.eye(3)[:, :, None, None]
+    return 0.02 * ddot(F, grad(v)) + (0.1 * u.theta - 0.02) * v.theta
 
 
 def asked(name):

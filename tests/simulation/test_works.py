@@ -20,6 +20,7 @@ from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.simulation.works import SubstepWork
 from evfem.surface.surfaces import Display, Flat, Sinusoid
+from evfem.tensor import dot
 from evfem.tissue.laws import LinearElastic
 
 ROUND, SOFT = finger(block(8, 3, sag=0.4)), finger(block(8, 3, sag=0.4), viscosity=2e-3)
@@ -33,7 +34,7 @@ SNAP = (Hover(0.05), VoltageRamp(4000.0, steps=4), VoltageRamp(0.0, steps=4))
 
 @ev.form
 def pushed(u, v, w):
-    return 2e-4 * v[1] + 1e-3 * ev.dot(u, v)
+    return 2e-4 * v[1] + 1e-3 * dot(u, v)
 
 
 def scene(surface, law=None, voltage=0.0, motion=MOTION, body=ROUND, **options):

@@ -6,6 +6,7 @@ from tools.grids import bend, rectangle
 
 import evfem as ev
 from evfem.errors import InputError
+from evfem.tensor import ddot, dot, grad
 from evfem.tissue.userforms import make_term, tried
 
 MU, LMBDA = 0.7, 1.9
@@ -23,7 +24,7 @@ def test_a_form_that_changes_what_it_uses_is_refused():
 
     @ev.form
     def late(u, v, w):
-        return ev.grad(v)[0, 0] if np.max(np.real(u)) > 1.0 else v[0]
+        return grad(v)[0, 0] if np.max(np.real(u)) > 1.0 else v[0]
 
     term = make_term(space, late, "lower", False)
     term.forces(np.zeros((9, 2)))
@@ -35,13 +36,13 @@ def test_a_form_that_changes_what_it_uses_is_refused():
     ("integrand", "on", "grad", "theta", "potential"),
     [
         (lambda u, v, w: 0.3 * v[1], "lower", False, False, True),
-        (lambda u, v, w: (1.0 + w.x[0]) * ev.dot(u, v), "lower", False, False, True),
+        (lambda u, v, w: (1.0 + w.x[0]) * dot(u, v), "lower", False, False, True),
         (lambda u, v, w: u[1] * v[0], "lower", False, False, False),
-        (lambda u, v, w: ev.ddot(ev.grad(u), ev.grad(v)), "lower", True, False, True),
+        (lambda u, v, w: ddot(grad(u), grad(v)), "lower", True, False, True),
         (lambda u, v, w: u.theta * v.theta, "lower", False, True, True),
         (lambda u, v, w: u.theta * v[0], "lower", False, True, False),
-        (lambda u, v, w: ev.dot(w.n, u) * ev.dot(w.n, v), "top", False, False, True),
-        (lambda u, v, w: ev.dot(w.n, u) * v[0], "top", False, False, False),
+        (lambda u, v, w: dot(w.n, u) * dot(w.n, v), "top", False, False, True),
+        (lambda u, v, w: dot(w.n, u) * v[0], "top", False, False, False),
     ],
 )
 def test_trial_finds_what_a_form_uses_and_whether_it_has_a_potential(integrand, on, grad, theta, potential):
@@ -53,9 +54,9 @@ def test_trial_finds_what_a_form_uses_and_whether_it_has_a_potential(integrand, 
 REFUSED = {
     "no v": (lambda u, v, w: 1e-3, "not linear in v"),
     "a constant beside v": (lambda u, v, w: v[1] + 1e-5, "not linear in v"),
-    "twice v": (lambda u, v, w: ev.dot(v, v), "not linear in v"),
+    "twice v": (lambda u, v, w: dot(v, v), "not linear in v"),
     "magnitude of v": (lambda u, v, w: np.abs(v[1]), "not linear in v"),
-    "vectors for tensors": (lambda u, v, w: ev.ddot(u, v), r"an integrand of shape \(1,\)"),
+    "vectors for tensors": (lambda u, v, w: ddot(u, v), r"an integrand of shape \(1,\)"),
     "whole v": (lambda u, v, w: 1e-5 * v, "an integrand of shape"),
     "nothing": (lambda u, v, w: None, "no integrand; allowed: a number for every point"),
     "no such place": (lambda u, v, w: w.t * v[1], "that raises AttributeError"),

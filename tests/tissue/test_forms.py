@@ -8,6 +8,7 @@ from tools.refusals import refuses
 
 import evfem as ev
 from evfem.mesh.mesh import Mesh
+from evfem.tensor import ddot, dot, grad, trace
 from evfem.tissue.assembly import Integral
 from evfem.tissue.userforms import make_term
 
@@ -19,17 +20,17 @@ every_kind = pytest.mark.parametrize("element", list(SHARES))
 
 @ev.form
 def nail_bed(u, v, w):
-    return 0.02 * ev.dot(u, v)
+    return 0.02 * dot(u, v)
 
 
 @ev.form
 def crooked(u, v, w):
     """Nonlinear, without potential, with values, gradients and places."""
-    H = ev.grad(u)
+    H = grad(u)
     return (
         np.sin(3 * u[0]) * v[1]
-        + u[1] ** 2 * H[0, 1] * ev.grad(v)[1, 0]
-        + w.x[0] * ev.trace(H) * ev.dot(u, v)
+        + u[1] ** 2 * H[0, 1] * grad(v)[1, 0]
+        + w.x[0] * trace(H) * dot(u, v)
         + np.exp(H[1, 1]) * v[0]
     )
 
@@ -103,8 +104,8 @@ def block_scene(law=NEO_HOOKEAN, element="q2", friction=0.0, **motion):
 @ev.form
 def material(u, v, w):
     """The default tissue, in the split form."""
-    F = ev.grad(u) + np.eye(2)[:, :, None, None]
-    return MU * ev.ddot(F, ev.grad(v)) + (LMBDA * u.theta - MU) * v.theta
+    F = grad(u) + np.eye(2)[:, :, None, None]
+    return MU * ddot(F, grad(v)) + (LMBDA * u.theta - MU) * v.theta
 
 
 def test_form_as_a_material_knows_the_place_and_nothing_but_gradients():
@@ -126,5 +127,5 @@ def test_plan_says_where_a_form_has_no_potential():
     assert "material, plane strain, shear modulus 0.7 MPa" in str(ev.plan(held))
     pushed = block_scene().with_term(ev.form(lambda u, v, w: 0.05 * u[1] * v[0]), on=ev.Region("tissue"))
     assert "on tissue (no potential: only the symmetric" in " ".join(str(ev.plan(pushed)).split())
-    crooked_law = ev.form(lambda u, v, w: material(u, v, w) + 0.1 * ev.grad(u)[0, 1] * ev.grad(v)[1, 1])
+    crooked_law = ev.form(lambda u, v, w: material(u, v, w) + 0.1 * grad(u)[0, 1] * grad(v)[1, 1])
     assert "(no potential: " in str(ev.plan(block_scene(crooked_law)))

@@ -18,6 +18,7 @@ from tools.solids import SOLIDS, box
 import evfem as ev
 from evfem.mesh.faces import node_places
 from evfem.mesh.mesh import CELLS as CELLS_OF
+from evfem.tensor import det
 from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.space import ELEMENTS, make_space, quadrature, shape_functions
 from evfem.tissue.weakform import Tissue, check_laws
@@ -147,13 +148,13 @@ def twin_energy(space, u):
     kind, intorder, sampling = ELEMENTS[space.element]
     x, dx, _, gradient, nodes = fine_points(space, intorder)
     F = np.einsum("ajeq,eai->ijeq", gradient, u[nodes]) + np.eye(2)[:, :, None, None]
-    theta = np.log(ev.det(F))
+    theta = np.log(det(F))
     if sampling == "centroid":
         centre = (np.array([[0.5], [0.5]]), np.array([1.0]))
         basis = skfem.Basis(grid_of(space.mesh), SHAPES[kind](), quadrature=centre)
         middle = np.stack([basis.basis[a][0].grad for a in range(basis.Nbfun)])
         F0 = np.einsum("ajeq,eai->ijeq", middle, u[nodes]) + np.eye(2)[:, :, None, None]
-        theta = np.log(ev.det(F0)) + 0.0 * theta
+        theta = np.log(det(F0)) + 0.0 * theta
     if sampling == "linear":
         planes = []
         for X, Y, w, value in zip(*x, dx, theta, strict=True):

@@ -3,6 +3,7 @@
 import numpy as np
 
 import evfem as ev
+from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.result import Saved
 from evfem.studies.stability.case import out_of_balance as balance
 from evfem.studies.stability.scenes import INSULATOR, SKIN, finger
@@ -66,7 +67,7 @@ def resumed(scene, *after, folder=None):
     for step in after:
         saved = Saved(kept[step - 1], whole.rows[:step])
         if folder is not None:
-            file = ev.Checkpoint(folder / "checkpoint.npz")
+            file = Checkpoint(folder / "checkpoint.npz")
             file.write(scene.digest(), saved.arrays, saved.rows)
             saved = file.read(scene.digest())
         found.append(ev.simulate(scene, resume=saved))
