@@ -52,7 +52,7 @@ TEXTS = [
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
 FENCED = re.compile(r"^```\w+\n(.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
-FORMS = "docs/howto/form.md"
+FORMS, WORDS = "docs/howto/form.md", "docs/words.md"
 #: pages with so much to compute that `.ci/run` alone runs them
 LONG = {"gallery.md", *(f"howto/{p}.md" for p in ("element", "field", "fit", "pictures", "rough", "texture"))}
 #: pages that are still to be filled to the width of the others
@@ -156,8 +156,10 @@ def test_files_in_sentences_exist(name):
 
 @pytest.mark.parametrize("name", [name for name in TEXTS if name not in UNFILLED])
 def test_lines_fit_a_screen(name):
+    """But for the rows of the table of words, which Markdown cannot break."""
     widest = 88 if name == "README.md" else 99
-    assert [line for line in read(name).splitlines() if len(line) > widest] == []
+    lines = [line for line in read(name).splitlines() if name != WORDS or not line.startswith("|")]
+    assert [line for line in lines if len(line) > widest] == []
 
 
 @pytest.mark.parametrize("name", TEXTS)
