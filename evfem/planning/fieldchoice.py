@@ -1,4 +1,4 @@
-"""Whether a scene needs the full field, decided by bounds that cost no solution."""
+"""Choice between the column law and the full electric field, by bounds that need no field solution."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from evfem.scene.scene import Scene
 from evfem.surface.pad import make_pad
 from evfem.terms.fullfield import Bounds, certificate, facing, in_line
 
-#: `field = "auto"` solves for the field where the column law's energy may be too small by more than this
+#: `field = "auto"` solves for the field if the relative error of the column law's energy may exceed this
 AUTO = 0.02
 
 
 @dataclass(frozen=True)
 class FieldChoice:
-    """Whether the field is solved for, and the words of the plan."""
+    """Whether the full field is solved for, and the explanation printed by `plan`."""
 
     full: bool
     reason: str
 
 
 def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
-    """The choice of a scene whose `field` is not `local`, by the worst of the bounds where motions end."""
+    """The choice for a scene whose `field` is not `local`, from the widest bounds at the ends of motions."""
     if mesh.dim == 3:
         if scene.field == "full":
             raise InputError("electrostatics.field", "full with a solid", "local or auto: the plane has it")
-        return FieldChoice(False, "column by column: a solid has no other")
+        return FieldChoice(False, "not solved for: only the column law is available in three dimensions")
     against = without_field(scene)
     if against is not None:
-        return FieldChoice(False, f"column by column: {against[0]} goes with no field")
+        return FieldChoice(False, f"not solved for: not available with {against[0]}")
     bounds, gap = max(
         ((field_bounds(scene, mesh, gap), gap) for gap in _gaps(scene)), key=lambda one: one[0].spread
     )
-    share = f"{100.0 * bounds.spread:.2g} %"
+    error = f"{100.0 * bounds.spread:.2g} %"
     where = "at first touch" if gap == 0.0 else f"at a gap of {gap:g} mm"
-    text = f"column by column the energy {where} is at most {share} too small"
+    text = f"{where} the energy of the column law is at most {error} too small"
     if scene.field == "auto":
         choice = "more than" if bounds.spread > AUTO else "less than"
-        text += f", {choice} {100.0 * AUTO:g} %"
+        text += f", {choice} the limit of {100.0 * AUTO:g} %"
     full = scene.field == "full" or bounds.spread > AUTO
     return FieldChoice(full, f"{'solved for' if full else 'not solved for'}: {text}")
 
 
 def _gaps(scene: Scene) -> list[float]:
-    """Gaps (mm) of the undeformed pad where motions end: 0 and those above, without 0 if it only hovers."""
+    """Gaps (mm) of the undeformed pad at the ends of motions; 0 (touch) included unless it only hovers."""
     moves = [course for course in scene.courses if course.distance or course.depth is not None]
     gaps = {max(-(course.indentation or 0.0), 0.0) for course in moves}
     return sorted(gaps if moves and all(course.hovers for course in moves) else {*gaps, 0.0})

@@ -1,6 +1,6 @@
-"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its reason.
+"""Active physics, unknowns and solver of a scene, each with its reason; nothing is solved.
 
-`make_model` builds what the plan says, so the printout and the run cannot disagree.
+`make_model` builds the model from this plan, so the printout and the run cannot disagree.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ from evfem.tissue.userforms import Trial, tried
 
 #: columns of a printed plan, at most
 WIDTH = 79
-#: by dimensions, memory that branches take in a run, over what they keep, as measured
+#: by dimensions, memory of a run for Maxwell branches over that of their history variables, as measured
 RELAXING = {2: 10, 3: 20}
-#: the two laws of the literature, each beside the other
+#: each of the two force laws of the literature and the other one
 OTHER_LAW: dict[type, type[StrongTroxel | Kaczmarek]] = {StrongTroxel: Kaczmarek, Kaczmarek: StrongTroxel}
 
 
 @dataclass(frozen=True)
 class Term:
-    """One ingredient of a scene: whether it is in, and why."""
+    """One kind of physics: whether it is active in the scene, and why."""
 
     name: str
     needed: bool
@@ -61,7 +61,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Plan:
-    """Terms, numbers of unknowns and solver of a scene; `str(plan)` is meant to be read."""
+    """Active physics, numbers of unknowns and solver of a scene; `str(plan)` is a page of text."""
 
     name: str
     element: str
@@ -81,7 +81,7 @@ class Plan:
         return "; ".join(self.warnings) or None
 
     def has(self, name: str) -> bool:
-        """Whether the term called `name` is in."""
+        """Whether the term called `name` is active."""
         return next(term.needed for term in self.terms if term.name == name)
 
     def __str__(self) -> str:
@@ -99,13 +99,20 @@ class Plan:
 
 
 def _wrapped(begin: str, text: str) -> list[str]:
-    """A text behind its beginning, as lines that fit a terminal."""
+    """A label and its text, wrapped to the width of a terminal with a hanging indent."""
     indent = " " * max(len(begin), 4)
-    return textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=indent, break_long_words=False)
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=begin,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def plan(scene: Scene | str | PathLike[str]) -> Plan:
-    """Terms, unknowns and solver of a scene, with reasons; builds the mesh, solves nothing.
+    """Check a scene and list its active physics, unknowns and solver; builds the mesh, solves nothing.
 
     Parameters
     ----------
@@ -115,7 +122,7 @@ def plan(scene: Scene | str | PathLike[str]) -> Plan:
     Returns
     -------
     Plan
-        It prints as a page; `terms`, `solver` and `warnings` are its parts.
+        A printable page; `terms`, `solver` and `warnings` are its sections.
 
     Raises
     ------
@@ -143,7 +150,7 @@ def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
 
 
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
-    """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
+    """The plan of a scene with its mesh; raises InputError for unusable user-defined components."""
     if not scene.motion:
         names = ", ".join(cls.__name__ for cls in MOTIONS.values())
         raise InputError("motion", ABSENT, f"at least one of {names}")
@@ -211,7 +218,7 @@ def _terms(closing: Closing, moduli: Mapping[str, float], element: str) -> Itera
 def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     materials = scene.finger.materials
     laws = ", ".join(sorted({_law_name(law, name, mesh) for name, law in materials.items()}))
-    # a modulus in kPa is seen here
+    # a modulus that was entered in kPa shows here
     soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli.values()), max(moduli.values())))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
     deep = "" if scene.depth is None else f" over {scene.depth:g} mm of depth"
@@ -220,22 +227,22 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
 
 
 def _contact(scene: Scene) -> Term:
-    shape = "a flat surface" if scene.ground.is_flat else "a textured surface: its slope and curvature enter"
+    shape = "flat surface" if scene.ground.is_flat else "textured surface, with its slope and curvature"
     if cells := getattr(scene.finger, "ridge_cells", 0.0):
         error = 100.0 * area_error(cells)
-        known = f"known to {error:.2g} %" if error < 100.0 else "not known"
-        shape += f"; with {cells:g} cells per ridge the real contact area is {known}"
-    return Term("contact", True, shape + _giving_way(scene))
+        known = f"has an error of {error:.2g} %" if error < 100.0 else "is not resolved"
+        shape += f"; with {cells:g} cells per ridge the real contact area {known}"
+    return Term("contact", True, shape + _elastic_surface(scene))
 
 
-def _giving_way(scene: Scene) -> str:
-    """What an elastic surface is made of, in words; empty for a rigid one."""
+def _elastic_surface(scene: Scene) -> str:
+    """The layers of an elastic surface, in words; empty for a rigid one."""
     elastic = scene.ground.elastic
     if elastic is None:
         return ""
     layers = getattr(elastic, "layers", ())
-    made = ", ".join(f"{one.E:g} MPa over {one.thickness:g} mm" for one in layers) or type(elastic).__name__
-    return f"; it gives way: {made}, its compliance added to the tissue's"
+    made = ", ".join(f"{one.thickness:g} mm of {one.E:g} MPa" for one in layers) or type(elastic).__name__
+    return f"; it is elastic ({made}), its compliance is added to the tissue's"
 
 
 def _friction(scene: Scene) -> Term:
@@ -244,83 +251,88 @@ def _friction(scene: Scene) -> Term:
     law = scene.friction_law
     if isinstance(law, Coulomb):
         return Term("friction", True, "Coulomb")
-    timed = ", with speed and time of contact of each node" if getattr(law, "timed", False) else ""
+    timed = ", slip speed and contact time" if getattr(law, "timed", False) else ""
     falling = ""
     if not scene.solver.inertial and weakens(scene):
-        falling = "; it falls with the speed: tissue without mass may jump, dynamics = inertial follows it"
-    return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}{falling}")
+        falling = "; velocity weakening: without inertia the finger may jump, dynamics = inertial resolves it"
+    limit = f"shear limit of each node from its pressure{timed}"
+    return Term("friction", True, f"{type(law).__name__}: {limit}{falling}")
 
 
 def _electricity(closing: Closing) -> Term:
     scene = closing.scene
     if not scene.electrics.acts:
         return Term("electricity", False, "no law or no voltage")
-    air = "with the air layer" if scene.air_layer else "only touching nodes"
+    air = "air gap included" if scene.air_layer else "touching nodes only"
     signal = scene.electrics.voltage
     over_time = (
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
-    how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
+    together = {"monolithic": "solved together with contact"}.get(
+        scene.coupling, f"{scene.coupling} with contact"
+    )
+    how = f"{type(scene.law).__name__} law, {scene.direction} traction, {air}, {together}"
     traction, core = touching_traction(scene), closing.found
-    pull = "" if traction is None else f", up to {traction:.2g} MPa where it touches{_other_law(scene)}"
+    pull = "" if traction is None else f"; at most {traction:.2g} MPa on touching skin{_other_law(scene)}"
     cored = "" if core is None else f"; {core}"
     return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")
 
 
 def _other_law(scene: Scene) -> str:
-    """What the other one of the two laws of the literature says, and where to read which to take."""
+    """Traction on touching skin by the other one of the two force laws, and the page that compares them."""
     if (other := OTHER_LAW.get(type(scene.law))) is None:
         return ""
     traction = touching_traction(scene, other(gap_eps_r=scene.electrics.gap_eps_r))
-    return f" ({other.__name__} {traction:.2g} MPa: see docs/howto/which-law.md)"
+    return f" ({other.__name__}: {traction:.2g} MPa, see docs/howto/which-law.md)"
 
 
 def _roughness(scene: Scene) -> str:
-    """Additional gap of rough faces, in words; empty without them."""
+    """Air gap between rough faces in contact, in words; empty for smooth ones."""
     rough = roughness_of(scene.roughness_gap)
     if rough is None:
         return ""
     if isinstance(rough, ConstantRoughness):
-        return f", rough faces {rough.gap:g} mm apart in contact"
+        return f", rough faces with an air gap of {rough.gap:g} mm in contact"
     apart = float(rough.separation(0.0))
-    return f", rough faces up to {apart:g} mm apart, less with a node's contact pressure"
+    return f", rough faces with an air gap of up to {apart:g} mm that falls with contact pressure"
 
 
 def _time(scene: Scene, mesh: Mesh, element: str) -> Term:
     dynamics, terms = scene.solver.dynamics, DYNAMICS[scene.solver.dynamics]
-    clock = ", the clock sets the voltage alone" if isinstance(scene.electrics.voltage, TimeSignal) else ""
-    lost = "released where no equilibrium is near" if scene.solver.strategy.relaxation else ""
+    voltage = isinstance(scene.electrics.voltage, TimeSignal)
+    snap = ""
+    if scene.solver.strategy.relaxation:
+        snap = "; after a snap the finger settles into the next equilibrium"
     if terms is None:
-        return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
-    lost = lost and f"; without speed quasi-static, {lost}"
-    return Term("time", True, f"{dynamics}, {terms.scheme}{_relaxing(scene, mesh, element)}{lost}")
+        used = "only for the voltage" if voltage else "not used"
+        return Term("time", False, f"{used} (quasi-static){snap}")
+    snap = snap and f"; motions without a speed are quasi-static{snap}"
+    return Term("time", True, f"{dynamics}, {terms.scheme}{_relaxing(scene, mesh, element)}{snap}")
 
 
 def _relaxing(scene: Scene, mesh: Mesh, element: str) -> str:
-    """Relaxation times of the tissue's branches beside the seconds of the steps, and their memory."""
+    """Relaxation times of the tissue's Maxwell branches, durations of the steps, and memory."""
     rows = {name: branches_in(scene.finger, law) for name, law in scene.finger.materials.items()}
     times = [time for several in rows.values() for _, time in several]
     if not times:
         return ""
-    parts = [(one.course, one.part(k)[2]) for one in scene.motion for k in {1, min(2, one.steps), one.steps}]
-    steps = [course.seconds(count) for course, count in parts if course.takes_time]
+    counts = [(one.course, one.part(k)[2]) for one in scene.motion for k in {1, min(2, one.steps), one.steps}]
+    steps = [course.seconds(count) for course, count in counts if course.takes_time]
     told = f"; branches relax in {min(times):.2g} to {max(times):.2g} s"
     told += f", steps take {min(steps):.2g} to {max(steps):.2g} s" if steps else ""
     cells = sum(mesh.cells_of(name).size for name, several in rows.items() if several)
     kept = cells * points_per_cell(element) * max(map(len, rows.values())) * KEPT_BYTES[mesh.dim]
-    return (
-        f"{told}; what they remember takes {kept / 1e6:.2g} MB, a run about {RELAXING[mesh.dim]} times that"
-    )
+    return f"{told}; their history variables take {kept / 1e6:.2g} MB, a run {RELAXING[mesh.dim]} times that"
 
 
 def _hand(hand: Hand) -> str:
-    """The hand between drive and bone, in words: its own frequency is to be resolved."""
-    reason = f"x of the bone an unknown, behind a spring of {hand.stiffness:g} N/mm"
+    """The hand between drive and bone, in words, with its natural frequency."""
+    reason = f"x of the bone is an unknown behind a spring of {hand.stiffness:g} N/mm"
     if hand.damping > 0.0:
         reason += f", a damper of {hand.damping:g} N s/mm"
     if hand.mass > 0.0:
         own = np.sqrt(hand.stiffness / hand.mass) / (2.0 * np.pi)
-        reason += f", a mass of {hand.mass:g} t: {own:.3g} Hz by themselves"
+        reason += f", a mass of {hand.mass:g} t, natural frequency {own:.3g} Hz"
     return f"{reason} (per mm of depth)"
 
 
@@ -334,7 +346,7 @@ def _forms(scene: Scene, mesh: Mesh) -> Term:
 
 
 def _caveat(trial: Trial) -> str:
-    """Consequences of a form with an unsymmetric tangent."""
+    """Note on a form with an unsymmetric tangent."""
     return "" if trial.has_potential else " (no potential: only the symmetric part of its tangent is used)"
 
 
@@ -349,18 +361,18 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
     if find_spec("pypardiso"):
         backend = "PARDISO (symmetric, Schur complement)"
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
-    yield f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}"
-    yield f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set"
+    yield f"symmetric stiffness matrix, factorised rarely and reused: {backend}; cell loops: {cells}"
+    yield f"contact: {scene.solver.contact}, active-set method on the nodes that may touch"
     if mesh.dim == 3:
         yield f"direct solver: {needs(scene, mesh)}"
     laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
     if stiff := [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]:
-        yield f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume"
+        yield f"pressure is an additional unknown: {', '.join(stiff)} nearly incompressible"
     acting = [t.name for t in terms if t.needed and t.name in ("friction", "electricity", "adhesion")]
     if acting:
         yield (
-            f"{' and '.join(acting)} {'act' if acting[1:] else 'acts'} on the candidates only, "
-            "so the tissue's matrix stays symmetric"
+            f"{' and '.join(acting)} {'act' if acting[1:] else 'acts'} on nodes that may touch only, "
+            "the stiffness matrix stays symmetric"
         )
     if steps := steps_line(scene):
         yield steps

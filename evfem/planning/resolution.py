@@ -1,9 +1,8 @@
-"""Whether the pad's nodes are close enough together to feel a profile, and the profile smooth
-enough; whether the steps are short enough to follow a voltage over time, a hand and the tissue; and what
-makes the end depend on the steps at all.
+"""Checks of resolution: node spacing against the surface profile; time steps against the voltage signal,
+the hand and the tissue; and the sources of step-size dependence.
 
-Between n nodes per wave a sine is up to 1 - cos(pi / n) of its amplitude higher than the line from
-node to node: five nodes miss a fifth.
+With n nodes per wavelength a sine lies up to 1 - cos(pi / n) of its amplitude above the chord between
+two nodes: a fifth with five nodes.
 """
 
 from __future__ import annotations
@@ -23,15 +22,15 @@ from evfem.scene.scene import Scene
 from evfem.surface.textures import SelfAffine
 from evfem.tissue.laws import split
 
-#: share of a profile's height that may lie between two neighbouring nodes and be missed by both
+#: largest deviation of a profile from the chord between two nodes, as a fraction of its height
 MISSED = 0.2
-#: share of a profile's slope (root mean square) that may be too fine for the nodes
+#: largest unresolved fraction of a profile's rms slope
 ROUGH = 0.25
-#: nodes that the shortest wave of roughness needs
+#: nodes per shortest wavelength of roughness, at least
 PER_WAVE = 5.0
-#: samples of the profile per node spacing, and at most
+#: samples of the profile per node spacing, and their largest number
 PER_SPACING, MOST = 8, 200_000
-#: steps that the solver chooses
+#: value of `steps` for adaptive step sizes
 AUTO = "auto"
 #: steps in a period of the voltage, at least: 10 in one of its square, which the attraction follows
 PER_PERIOD = 20.0
@@ -170,7 +169,7 @@ def path_depth(scene: Scene, mesh: Mesh, step: float) -> float:
 
 
 def path_dependence(scene: Scene) -> tuple[str, ...]:
-    """Causes of path dependence, in words; empty if there is none.
+    """Sources of path dependence, in words; empty if the end does not depend on the steps.
 
     >>> import evfem as ev
     >>> pad, press = ev.FingerPad(resolution="coarse"), [ev.Press(indentation=0.5, steps=2)]
@@ -182,24 +181,25 @@ def path_dependence(scene: Scene) -> tuple[str, ...]:
         "time": scene.solver.timed,
         "charges": scene.electrics.resolved,
         "the hand": scene.hand is not None and scene.hand.timed,
-        "who touches": scene.law is not None and not scene.air_layer,
+        "contact state": scene.law is not None and not scene.air_layer,
     }
-    return tuple(name for name, there in found.items() if there)
+    return tuple(name for name, present in found.items() if present)
 
 
 def allowed_error(scene: Scene) -> float | None:
-    """The error of a part's path that its strategy allows; None where the steps are as given."""
+    """Admissible step-size error of a substep with adaptive steps; None with prescribed steps."""
     strategy = scene.solver.strategy
     return strategy.path_error if strategy.steps == AUTO and path_dependence(scene) else None
 
 
 def steps_line(scene: Scene) -> str:
-    """A plan's line on steps that the solver chooses; empty if the scene gives them."""
+    """The plan's line on adaptive steps; empty if the steps are prescribed."""
     if scene.solver.strategy.steps != AUTO:
         return ""
     names = path_dependence(scene)
     if not names:
-        what = "nothing but a snap" if scene.electrics.acts or not scene.ground.is_flat else "nothing"
-        return f"steps auto: {what} depends on the path, each step is one part"
+        snaps = " except through snaps" if scene.electrics.acts or not scene.ground.is_flat else ""
+        return f"steps auto: no dependence on the step size{snaps}, one substep for each step"
     limit = f"{100.0 * scene.solver.strategy.path_error:g} %"
-    return f"steps auto: path dependence by {', '.join(names)}, a part errs by at most {limit} of the force"
+    causes = ", ".join(names)
+    return f"steps auto: path-dependent ({causes}), error of a substep at most {limit} of the force"

@@ -299,7 +299,7 @@ def test_the_plan_says_an_error_of_the_real_area_that_holds():
     _, fine = pressed(48)
     for cells, error in ((6, 0.36), (12, 0.09)):
         scene, found = pressed(cells)
-        told = f"with {cells} cells per ridge the real contact area is known to {100 * error:.2g} %"
+        told = f"with {cells} cells per ridge the real contact area has an error of {100 * error:.2g} %"
         assert told in " ".join(str(ev.plan(scene)).split())
         np.testing.assert_allclose(found, fine, rtol=error)
     text = (

@@ -69,7 +69,7 @@ def test_a_hovering_strip_bends_and_lands_as_beams_do(dim, voltages):
 @pytest.mark.parametrize(("nu", "said"), [(0.49, False), (0.4999, True)])
 def test_the_plan_names_what_hardly_changes_its_volume(nu, said):
     scene = ev.Scene(finger(BLOCK, nu=nu), ev.Flat(friction=0.0), motion=[ev.Press(indentation=0.1)])
-    line = "pressure an unknown of the iterations, as tissue hardly changes volume"
+    line = "pressure is an additional unknown: tissue nearly incompressible"
     assert (line in plan(scene).solver) == said
     assert make_model(scene).body.tissue.nearly_incompressible == said
 
@@ -77,8 +77,8 @@ def test_the_plan_names_what_hardly_changes_its_volume(nu, said):
 @pytest.mark.parametrize(
     ("friction", "said"),
     [
-        (0.0, "nothing depends on the path, each step is one part"),
-        (0.3, "path dependence by friction, a part errs by at most 0.5 % of the force"),
+        (0.0, "no dependence on the step size, one substep for each step"),
+        (0.3, "path-dependent (friction), error of a substep at most 0.5 % of the force"),
     ],
 )
 def test_the_plan_says_what_automatic_steps_are(friction, said):
@@ -91,7 +91,7 @@ def test_the_plan_says_what_automatic_steps_are(friction, said):
 def test_time_charges_and_the_air_layer_are_remembered_too():
     scene = replace(hovering(voltage=100.0), surface=ev.Display(friction=0.0))
     assert path_dependence(scene) == ()
-    assert path_dependence(replace(scene, air_layer=False)) == ("who touches",)
+    assert path_dependence(replace(scene, air_layer=False)) == ("contact state",)
     motion = [ev.Press(indentation=0.1, speed=1.0)]
     slow = replace(scene, motion=motion, finger=finger(BLOCK, viscosity=1e-3))
     assert path_dependence(replace(slow, solver=ev.Solver(dynamics="viscous"))) == ("time",)
@@ -108,5 +108,5 @@ def test_forces_cannot_be_wanted_to_any_error(error):
 def test_forces_to_an_error_need_what_the_plan_says():
     scene = ev.Scene(finger(BLOCK), ev.Flat(friction=0.0), motion=[ev.Press(indentation=0.1, steps=3)])
     cheap, exact = replace(scene, solver=ev.Solver.within(0.02)), ev.simulate(scene)
-    assert "steps auto: nothing depends on the path, each step is one part" in plan(cheap).solver
+    assert "steps auto: no dependence on the step size, one substep for each step" in plan(cheap).solver
     assert ev.simulate(cheap).normal_force == pytest.approx(exact.normal_force, rel=0.02)

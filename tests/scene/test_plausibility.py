@@ -247,7 +247,7 @@ def test_a_plan_tells_what_the_other_law_says(insulator, ratio):
         )
         (reason,) = [term.reason for term in plan(scene).terms if term.name == "electricity"]
         own, name, other = re.search(
-            r"up to (\S+) MPa where it touches \((\w+) (\S+) MPa: see", reason
+            r"at most (\S+) MPa on touching skin \((\w+): (\S+) MPa, see", reason
         ).groups()
         told[type(law).__name__] = float(own)
         told[f"other {name}"] = float(other)
@@ -266,7 +266,7 @@ def test_an_attraction_beyond_the_load_is_told_by_plan_run_and_sweep(tmp_path, c
     traction = 8.8541878188e-12 * 140.0**2 / (2.0 * (0.38 / 1650.0 + 0.001 / 3.9) ** 2)
     (said,) = plan(asked).warnings
     assert f"attracted with {traction:.3g} MPa" in said
-    assert f"up to {traction:.2g} MPa where it touches" in str(plan(asked)).replace("\n" + " " * 18, " ")
+    assert f"at most {traction:.2g} MPa on touching skin" in str(plan(asked)).replace("\n" + " " * 18, " ")
     (tmp_path / "pad.toml").write_text(scenefile.dump(asked))
     assert main(["run", str(tmp_path / "pad.toml"), "--out", str(tmp_path / "out"), "--no-fields"]) == 0
     result = ev.load(tmp_path / "out")

@@ -200,7 +200,7 @@ spacing = "log"
     assert told in " ".join(str(ev.plan(scene)).split())
     cells = sum(scene.finger.mesh().cells_of(name).size for name in scene.finger.materials if name != "nail")
     kept = 8 * 2 * 5 * 9 * cells / 1e6  # 2 branches of 5 numbers at 9 points
-    assert f"what they remember takes {kept:.2g} MB" in " ".join(str(ev.plan(scene)).split())
+    assert f"their history variables take {kept:.2g} MB" in " ".join(str(ev.plan(scene)).split())
     space = rectangle("q1", (1, 2), split=lambda x, y: y > 0.5)
     laws = {"lower": ev.NeoHookean(E=3.0, nu=0.3), "upper": scene.finger.materials["nail"]}
     found = branches_of(space, laws, scene.finger)
