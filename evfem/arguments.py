@@ -1,4 +1,4 @@
-"""The arguments of the command `evfem`: all commands and options, and mistakes in them as one sentence."""
+"""Command-line arguments of `evfem`: commands, options, and one-sentence error messages."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ STATUS = (
     "exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk failed, "
     "130 interrupted"
 )
-#: what a shell completes an argument with, as shtab wants it: `shtab --shell bash evfem.cli.parser`
+#: completion of an argument in a shell, in the notation of shtab: `shtab --shell bash evfem.cli.parser`
 FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}
 FOLDERS = {"bash": "_shtab_compgen_dirs", "zsh": "_files -/", "tcsh": "d"}
 
 
 class Known(tuple[str, ...]):
-    """Names that a shell completes; another one is not refused here, but by whoever looks it up."""
+    """Names offered for completion; others are accepted here and refused where they are looked up."""
 
     def __contains__(self, name: object) -> bool:
         return True
@@ -52,32 +52,33 @@ def _meant(message: str) -> str:
 def _path(
     command: argparse.ArgumentParser, name: str, metavar: str, how: dict[str, str] = FILES, **more: Any
 ) -> None:
-    given = command.add_argument(name, metavar=metavar, **{"type": Path, **more})
-    given.complete = how  # type: ignore[attr-defined]
+    argument = command.add_argument(name, metavar=metavar, **{"type": Path, **more})
+    argument.complete = how  # type: ignore[attr-defined]
 
 
 def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
-    """All commands and options; those of textures, which load numpy, where `texture` is among the words."""
+    """All commands and options; those of `texture`, which import numpy, only if it is among the words."""
     top = _Parser(
         prog="evfem",
-        description="A finger pad on an electrovibration display, by finite elements.",
-        epilog=f"`evfem run` alone computes a built-in scene; `evfem COMMAND --help` says more. {STATUS}",
+        description="Contact, friction and attraction of a finger on an electrovibration display, by finite "
+        "elements.",
+        epilog=f"`evfem run` alone runs a built-in scene; `evfem COMMAND --help` lists options. {STATUS}",
     )
     top.add_argument("--version", action="version", version=f"evfem {evfem.__version__}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", parser_class=_Parser)
     for name, does, options in (
         ("run", "run a scene and write history, fields, summary and picture", _run_options),
         ("init", "write a commented scene to begin with", _init_options),
-        ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument),
-        ("check", "run a scene by several ways and compare where they end", _scene_argument),
+        ("plan", "check a scene; list its physics, unknowns and solver; solve nothing", _scene_argument),
+        ("check", "run a scene with other steps and solvers and compare the final forces", _scene_argument),
         ("sensitivities", "derivatives of forces, works and energies by keys of a scene", _response_options),
-        ("impedance", "stiffness of the finger at the end of a scene over the frequency", _impedance_options),
+        ("impedance", "dynamic stiffness of the finger versus frequency", _impedance_options),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
-        ("sweep", "run many scenes side by side and write one table of all", _sweep_options),
+        ("sweep", "run many scenes in parallel and write one table", _sweep_options),
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
         ("signal", "write a voltage signal as .wav, .png, .hjif or .csv", _signal_options),
         ("texture", "list, make, import, slide over and estimate textures", _texture_options),
-        ("studio", "open a page in the browser, from a texture to a voltage", _studio_options),
+        ("studio", "open the studio in the browser: voltage signals for textures", _studio_options),
         ("schema", "print the keys of scenes or sweeps as a JSON schema for editors", _schema_options),
     ):
         command = commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}.")
@@ -93,14 +94,14 @@ def _scene_argument(command: argparse.ArgumentParser) -> None:
 def _run_options(run: argparse.ArgumentParser) -> None:
     _scene_argument(run)
     _results(run)
-    _again(run, "go on with the interrupted run in the folder", "replace what an earlier run left there")
+    _again(run, "continue the interrupted run in the folder", "replace the files of an earlier run")
     run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
 
 
 def _response_options(command: argparse.ArgumentParser) -> None:
     _path(command, "scene", "FILE.toml", help="a scene; without --by a file that names scene and keys")
-    said = "dotted keys of the scene, as surface.friction"
+    said = "parameters: dotted keys of the scene, such as surface.friction"
     command.add_argument("--by", nargs="+", metavar="KEY", help=said)
     _results(command)
 
@@ -109,7 +110,7 @@ def _impedance_options(command: argparse.ArgumentParser) -> None:
     _path(command, "scene", "SCENE.toml", help="the scene")
     said = "frequencies in Hz"
     command.add_argument("--frequencies", nargs="+", type=float, metavar="HZ", required=True, help=said)
-    said = "how the bone moves; default: normal"
+    said = "direction of the bone's vibration; default: normal"
     command.add_argument("--axis", choices=("normal", "tangential"), default="normal", help=said)
     _results(command)
 
@@ -120,17 +121,19 @@ def _study_options(study: argparse.ArgumentParser) -> None:
         told = f"{', '.join(names[:-1])}, or all (all but {' and '.join(studies().APART)})"
     study.add_argument("names", nargs="+", metavar="NAME", choices=names or None, help=told)
     _path(study, "--out", "DIR", FOLDERS, default=Path(), help="folder; default: here")
-    study.add_argument("--quick", action="store_true", help="coarser and shorter")
-    drawn = study.add_argument_group("campaign alone", "scenes drawn at random")
-    drawn.add_argument("--scenes", type=int, metavar="N", help="how many; default: 300, 6 with --quick")
-    drawn.add_argument("--seed", type=int, metavar="S", help="which ones; default: 0")
+    study.add_argument("--quick", action="store_true", help="coarser meshes and fewer steps")
+    drawn = study.add_argument_group("campaign only", "random scenes")
+    drawn.add_argument(
+        "--scenes", type=int, metavar="N", help="number of scenes; default: 300, 6 with --quick"
+    )
+    drawn.add_argument("--seed", type=int, metavar="S", help="seed of the random scenes; default: 0")
     drawn.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
-    drawn.add_argument("--limit", type=int, metavar="SECONDS", help="CPU time of a scene; default: 60")
+    drawn.add_argument("--limit", type=int, metavar="SECONDS", help="CPU time limit of a scene; default: 60")
 
 
 def _mesh_options(mesh: argparse.ArgumentParser) -> None:
     _scene_argument(mesh)
-    _path(mesh, "--out", "FILE", required=True, help="file to write, .vtu or .msh")
+    _path(mesh, "--out", "FILE", required=True, help="output file, .vtu or .msh")
 
 
 def _results(command: argparse.ArgumentParser) -> None:
@@ -138,14 +141,14 @@ def _results(command: argparse.ArgumentParser) -> None:
 
 
 def _pool(command: argparse.ArgumentParser) -> None:
-    """Where the points of a sweep are computed."""
+    """Options for parallel computation of the points of a sweep."""
     command.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
     said = "of a Dask cluster, tcp://HOST:PORT; local starts one"
     command.add_argument("--scheduler", metavar="ADDRESS", help=said)
 
 
 def _again(command: argparse.ArgumentParser, resume: str, overwrite: str) -> None:
-    """What to do with what an earlier run left in the folder: at most one of the two."""
+    """`--resume` or `--overwrite`, for a folder with results of an earlier run."""
     either = command.add_mutually_exclusive_group()
     either.add_argument("--resume", action="store_true", help=resume)
     either.add_argument("--overwrite", action="store_true", help=overwrite)
@@ -160,33 +163,36 @@ def _study_names() -> Known:
 
 
 def _sweep_options(sweep: argparse.ArgumentParser) -> None:
-    _path(sweep, "sweep", "SWEEP.toml", help="what is varied, and in which scene")
+    _path(sweep, "sweep", "SWEEP.toml", help="scene and varied parameters")
     _results(sweep)
-    _again(sweep, "keep the points of another sweep in the folder", "remove all points that are there")
+    _again(sweep, "keep the points of another sweep in the folder", "remove all points in the folder")
     _pool(sweep)
 
 
 def _signal_options(voltage: argparse.ArgumentParser) -> None:
-    _path(voltage, "file", "VOLTAGE", help="signal to read, .csv, .wav or .hjif")
-    _path(voltage, "--out", "FILE", required=True, help="file to write; its ending says as what")
-    voltage.add_argument("--full-scale", type=float, metavar="V", help="largest voltage the file can hold")
+    _path(voltage, "file", "VOLTAGE", help="input signal, .csv, .wav or .hjif")
+    _path(voltage, "--out", "FILE", required=True, help="output file; the suffix sets the format")
+    voltage.add_argument("--full-scale", type=float, metavar="V", help="voltage of the file's largest value")
     voltage.add_argument("--speed", type=float, metavar="MM/S", help="sliding speed, for .wav and .hjif")
-    said = "coefficients at 0 V and at full scale, for .hjif"
+    said = "friction coefficients at 0 V and at full scale, for .hjif"
     voltage.add_argument("--friction", type=float, nargs=2, metavar=("MU0", "MU1"), help=said)
-    voltage.add_argument("--rate", type=int, default=48_000, metavar="HZ", help="of the .wav; default: 48000")
-    voltage.add_argument("--carrier", type=float, metavar="HZ", help="sine that the .wav modulates")
-    voltage.add_argument("--pixel", type=float, default=0.1, metavar="MM", help="of the .png; default: 0.1")
+    said = "sampling rate of the .wav; default: 48000"
+    voltage.add_argument("--rate", type=int, default=48_000, metavar="HZ", help=said)
+    said = "carrier frequency that the .wav modulates"
+    voltage.add_argument("--carrier", type=float, metavar="HZ", help=said)
+    said = "width of a pixel of the .png; default: 0.1"
+    voltage.add_argument("--pixel", type=float, default=0.1, metavar="MM", help=said)
 
 
 def _texture_options(texture: argparse.ArgumentParser) -> None:
     commands = texture.add_subparsers(dest="what", metavar="WHAT", required=True, parser_class=_Parser)
     for name, does, options in (
         ("list", "list the reference textures", lambda command: None),
-        ("show", "say what a texture is and where it is from", _texture_argument),
-        ("make", "make a texture by a generator", _make_options),
+        ("show", "print kind, licence and origin of a texture", _texture_argument),
+        ("make", "generate a synthetic texture", _make_options),
         ("import", "make a texture from a csv file, a WAV, an image or a scan", _import_options),
-        ("simulate", "slide a finger over a texture by the full model", _simulate_options),
-        ("estimate", "estimate a friction curve from the database", _touch_options),
+        ("simulate", "slide the finite element pad over a texture", _simulate_options),
+        ("estimate", "estimate the friction curve of a texture in milliseconds", _touch_options),
         ("database", "compute the database of the estimators", _database_options),
     ):
         options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
@@ -200,7 +206,7 @@ def _texture_argument(command: argparse.ArgumentParser) -> None:
 
 
 def _about_texture(command: argparse.ArgumentParser) -> None:
-    _path(command, "--out", "FILE", required=True, help="a .json, whose .csv lies beside it, or a folder")
+    _path(command, "--out", "FILE", required=True, help="output .json (with a .csv beside it) or folder")
 
 
 def _make_options(make: argparse.ArgumentParser) -> None:
@@ -208,8 +214,8 @@ def _make_options(make: argparse.ArgumentParser) -> None:
 
     make.add_argument("kind", choices=tuple(GENERATORS))
     _about_texture(make)
-    make.add_argument("--name", help="what it is called; default: as its file")
-    make.add_argument("--licence", default="CC0-1.0", help="what others may do with it; default: CC0-1.0")
+    make.add_argument("--name", help="name of the texture; default: that of the file")
+    make.add_argument("--licence", default="CC0-1.0", help="its licence; default: CC0-1.0")
     _fields(make, Knobs)
 
 
@@ -222,12 +228,12 @@ def _import_options(command: argparse.ArgumentParser) -> None:
 
 
 def _fields(command: argparse.ArgumentParser, *classes: type, **renamed: str) -> None:
-    """An option for each annotated field of the classes, None where it is not given."""
+    """An option for each annotated field of the classes; None if it is left out."""
     from evfem.common.checks import keys_of
 
     for key in {key.name: key for one in classes for key in keys_of(one)}.values():
         name = renamed.get(key.name, key.name)
-        if bool in key.types:  # that the finger has ridges is usual
+        if bool in key.types:  # `ridged`, true by default
             command.add_argument("--smooth-finger", action="store_false", dest=name, help="without ridges")
             continue
         default = "" if key.required or key.default is None else f"; default: {key.default}"
@@ -244,22 +250,22 @@ def _touch_options(command: argparse.ArgumentParser) -> None:
     _texture_argument(command)
     _fields(command, Touch)
     _path(command, "--out", "FILE", help="csv file for the friction curve")
-    _path(command, "--signal", "FILE", help="file for the display's voltage; its ending says as what")
+    _path(command, "--signal", "FILE", help="output file of the voltage; the suffix sets the format")
     _fields(command, Device, friction="display")
 
 
 def _simulate_options(command: argparse.ArgumentParser) -> None:
     _touch_options(command)
-    command.add_argument("--exact", action="store_true", help="the voltage by the coupled model itself")
+    command.add_argument("--exact", action="store_true", help="solve the coupled model for the voltage")
 
 
 def _database_options(command: argparse.ArgumentParser) -> None:
-    _path(command, "--out", "DIR", FOLDERS, required=True, help="folder for its points")
+    _path(command, "--out", "DIR", FOLDERS, required=True, help="folder for the points of the database")
     _pool(command)
 
 
 def _studio_options(studio: argparse.ArgumentParser) -> None:
-    studio.add_argument("--port", type=int, default=8321, metavar="N", help="0: any; default: 8321")
+    studio.add_argument("--port", type=int, default=8321, metavar="N", help="0: any free port; default: 8321")
     studio.add_argument("--no-browser", action="store_true", help="do not open a browser")
 
 
@@ -271,7 +277,7 @@ def _init_options(init: argparse.ArgumentParser) -> None:
 
 def _schema_options(schema: argparse.ArgumentParser) -> None:
     schema.add_argument("of", nargs="?", choices=("scene", "sweep"), default="scene", help="default: scene")
-    _path(schema, "--out", "FILE", help="file to write instead of printing")
+    _path(schema, "--out", "FILE", help="output file, instead of printing")
 
 
 def studies() -> ModuleType:

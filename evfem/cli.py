@@ -1,4 +1,4 @@
-"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command that needs it.
+"""The command `evfem`: runs one command line and returns its exit status; heavy imports are lazy.
 
 Exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk or folder
 failed, 130 interrupted.
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from evfem.simulation.result import Row
 
 DONE, DIFFERENT, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 1, 3, 4, 130
-#: what the system says where our output cannot be written; of a file it is a `StorageError`
+#: errno of a failed write to standard output; a failed write to a file is a `StorageError`
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -222,7 +222,9 @@ def _simulate(folder: RunFolder) -> int:
         if not folder.begun:
             raise
         _finish(folder, None)
-        return _say(f"interrupted; {len(folder.rows)} steps are in {path}, go on with --resume", INTERRUPTED)
+        return _say(
+            f"interrupted; {len(folder.rows)} steps are in {path}, continue with --resume", INTERRUPTED
+        )
     return _finish(folder, result)
 
 
