@@ -268,10 +268,7 @@ def _electricity(closing: Closing) -> Term:
     over_time = (
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
-    together = {"monolithic": "solved together with contact"}.get(
-        scene.coupling, f"{scene.coupling} with contact"
-    )
-    how = f"{type(scene.law).__name__} law, {scene.direction} traction, {air}, {together}"
+    how = f"{type(scene.law).__name__} law, {scene.direction} traction, {air}, solved together with contact"
     traction, core = touching_traction(scene), closing.found
     pull = "" if traction is None else f"; at most {traction:.2g} MPa on touching skin{_other_law(scene)}"
     cored = "" if core is None else f"; {core}"
