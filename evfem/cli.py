@@ -40,7 +40,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     try:
-        given = parser(sys.argv if arguments is None else arguments).parse_args(arguments)
+        options = parser(sys.argv if arguments is None else arguments).parse_args(arguments)
     except SystemExit as done:
         return int(done.code or 0)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -51,22 +51,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("always", UserWarning)
             # what one package tells another's developers is not for who runs a command
             warnings.simplefilter("ignore", DeprecationWarning)
-            warnings.showwarning = _warner(_file(given))
+            warnings.showwarning = _warner(_file(options))
             with notices.shown():
-                return _status(given)
+                return _status(options)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-def _status(given: argparse.Namespace) -> int:
+def _status(options: argparse.Namespace) -> int:
     """Run the command; its exit status, with the message of what went wrong."""
     try:
-        return _command(given.command)(given) or DONE
+        return _command(options.command)(options) or DONE
     except InputError as error:
-        return _refuse(error, _file(given))
+        return _refuse(error, _file(options))
     except NotConverged as error:
-        return _say(_of(_file(given), error), NOT_CONVERGED)
+        return _say(_of(_file(options), error), NOT_CONVERGED)
     except BrokenPipeError:  # the reader of our output has gone
         _silence()
         return DONE
@@ -81,9 +81,9 @@ def _status(given: argparse.Namespace) -> int:
         return _say("interrupted", INTERRUPTED)
 
 
-def _file(given: argparse.Namespace) -> Path | None:
+def _file(options: argparse.Namespace) -> Path | None:
     """The scene or sweep file of a command."""
-    return getattr(given, "scene", None) or getattr(given, "sweep", None)
+    return getattr(options, "scene", None) or getattr(options, "sweep", None)
 
 
 def _of(file: Path | None, message: object) -> str:
@@ -148,7 +148,7 @@ def _kind(path: Path) -> str:
 def _command(name: str | None) -> Callable[[argparse.Namespace], int | None]:
     """Runs a command of `evfem.arguments.parser`; None is done."""
     return {
-        None: lambda given: parser().print_help(),
+        None: lambda options: parser().print_help(),
         "run": _run,
         "init": _init,
         "plan": _plan,
@@ -165,40 +165,40 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int | None]:
     }[name]
 
 
-def _init(given: argparse.Namespace) -> None:
+def _init(options: argparse.Namespace) -> None:
     from evfem.templates import write
 
-    path = given.file or Path(f"{given.template}.toml")
-    written = write(given.template, path)
+    path = options.file or Path(f"{options.template}.toml")
+    written = write(options.template, path)
     print(f"{', '.join(map(str, written))} written; evfem run {path} runs it", flush=True)
 
 
-def _schema(given: argparse.Namespace) -> None:
+def _schema(options: argparse.Namespace) -> None:
     from evfem.scene import schema as scenes
     from evfem.sweeps import file as sweeps
 
-    found = scenes.schema() if given.of == "scene" else sweeps.schema()
+    found = scenes.schema() if options.of == "scene" else sweeps.schema()
     text = json.dumps(found, indent=2)
-    if given.out is None:
+    if options.out is None:
         print(text, flush=True)
         return
     from evfem.common.storage import write_text
 
-    write_text(given.out, text + "\n")
-    print(given.out, flush=True)
+    write_text(options.out, text + "\n")
+    print(options.out, flush=True)
 
 
-def _run(given: argparse.Namespace) -> int:
-    scene = _scene(given.scene)
+def _run(options: argparse.Namespace) -> int:
+    scene = _scene(options.scene)
     from evfem.common.storage import alone_in
     from evfem.runfolder import RunFolder, finished, kept, saved
 
-    path = given.out or Path(f"{scene.name}-out")
+    path = options.out or Path(f"{scene.name}-out")
     with alone_in(path):
         resume = None
-        if not given.overwrite:
-            resume = (saved if given.resume else kept)(path, scene)
-        folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
+        if not options.overwrite:
+            resume = (saved if options.resume else kept)(path, scene)
+        folder = RunFolder(path, scene, not options.no_fields, not options.no_plots, resume)
         if resume is not None and finished(path, scene, resume):
             notices.tell(folder.completed())
             return _report(folder.path, resume.rows, scene)
@@ -259,7 +259,7 @@ class _Interruption:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._meet)
 
-    def _meet(self, number: int, place: object) -> None:
+    def _meet(self, number: int, frame: object) -> None:
         self.met = True
         raise KeyboardInterrupt
 
@@ -272,7 +272,7 @@ class _Interruption:
 
 
 class _Milestones:
-    """Progress where a bar has no place: a line for every tenth of the steps."""
+    """Progress without a terminal: a line for every tenth of the steps."""
 
     def started(self, mesh: object, scene: object, total_steps: int) -> None:
         self.total = total_steps
@@ -281,11 +281,11 @@ class _Milestones:
         notices.milestone("step", int(str(row["step"])), self.total)
 
 
-def _plan(given: argparse.Namespace) -> None:
+def _plan(options: argparse.Namespace) -> None:
     from evfem.export import FieldFiles
     from evfem.planning.plan import plan_on, scene_mesh
 
-    scene = _scene(given.scene)
+    scene = _scene(options.scene)
     with notices.status("building the mesh"):
         mesh, element = scene_mesh(scene)
         needed = plan_on(scene, mesh, element)
@@ -293,22 +293,22 @@ def _plan(given: argparse.Namespace) -> None:
     print(f"{needed}\n\nFiles of a run\n  {files}", flush=True)
 
 
-def _check(given: argparse.Namespace) -> int:
+def _check(options: argparse.Namespace) -> int:
     from evfem.sweeps.check import check
 
-    found = check(_scene(given.scene))
+    found = check(_scene(options.scene))
     print(found, flush=True)
     return DONE if found.agrees else DIFFERENT
 
 
-def _sensitivities(given: argparse.Namespace) -> None:
+def _sensitivities(options: argparse.Namespace) -> None:
     from evfem.common.storage import alone_in
     from evfem.response.file import load
     from evfem.response.sensitivities import sensitivities
     from evfem.runfolder import write_sensitivities
 
-    scene, by, columns = (_scene(given.scene), given.by, None) if given.by else load(given.scene)
-    folder = given.out or Path(f"{given.scene.stem}-out")
+    scene, by, columns = (_scene(options.scene), options.by, None) if options.by else load(options.scene)
+    folder = options.out or Path(f"{options.scene.stem}-out")
     with alone_in(folder):
         found = sensitivities(scene, by, columns, progress=True)
         for key in (key for key in columns or () if key in found.reasons):
@@ -316,64 +316,64 @@ def _sensitivities(given: argparse.Namespace) -> None:
         print(f"{found}\ntable in {write_sensitivities(found, folder)}", flush=True)
 
 
-def _impedance(given: argparse.Namespace) -> None:
+def _impedance(options: argparse.Namespace) -> None:
     from evfem.common.storage import alone_in
     from evfem.response.impedance import impedance
     from evfem.runfolder import write_impedance
 
-    scene, folder = _scene(given.scene), given.out or Path(f"{given.scene.stem}-out")
+    scene, folder = _scene(options.scene), options.out or Path(f"{options.scene.stem}-out")
     with alone_in(folder):
-        found = impedance(scene, given.frequencies, given.axis)
+        found = impedance(scene, options.frequencies, options.axis)
         print(f"{found}\ntable in {write_impedance(found, folder)}", flush=True)
 
 
-def _study(given: argparse.Namespace) -> None:
+def _study(options: argparse.Namespace) -> None:
     known = studies()
     names: list[str] = []
-    for name in given.names:
+    for name in options.names:
         names += [n for n in known.NAMES if n not in known.APART] if name == "all" else [name]
     for name in names:
         if name not in known.NAMES:
             raise InputError("study", quoted(name), f"{', '.join(known.NAMES)}, all")
-    sample = _sample(given)
+    sample = _sample(options)
     for name in dict.fromkeys(names):
-        print(f"study {name}: {known.expected(name, given.quick)}", file=sys.stderr, flush=True)
+        print(f"study {name}: {known.expected(name, options.quick)}", file=sys.stderr, flush=True)
         with notices.status(name):
-            result = known.run(name, given.quick, given.out, sample)
+            result = known.run(name, options.quick, options.out, sample)
         print(known.beside_the_paper(result), end="")
-        print(given.out / f"{name}.json", flush=True)
-    if "all" in given.names:
-        print(*known.report(given.out), sep="\n")
+        print(options.out / f"{name}.json", flush=True)
+    if "all" in options.names:
+        print(*known.report(options.out), sep="\n")
 
 
-def _sample(given: argparse.Namespace) -> Any:
-    said = {name: getattr(given, name) for name in ("scenes", "seed", "workers", "limit")}
+def _sample(options: argparse.Namespace) -> Any:
+    said = {name: getattr(options, name) for name in ("scenes", "seed", "workers", "limit")}
     said = {name: value for name, value in said.items() if value is not None}
     return studies().Sample(**said) if said else None
 
 
-def _sweep(given: argparse.Namespace) -> int:
+def _sweep(options: argparse.Namespace) -> int:
     from evfem.sweeps.file import load
     from evfem.sweeps.folder import TABLE
     from evfem.sweeps.run import sweep
     from evfem.sweeps.table import told
 
     try:
-        plan = load(given.sweep)
+        plan = load(options.sweep)
     except InputError:
-        if _kind(given.sweep) == "scene":
-            is_one = f"{given.sweep}, a scene"
-            raise InputError("sweep", is_one, f"a sweep; evfem run {given.sweep} runs this one") from None
+        if _kind(options.sweep) == "scene":
+            is_one = f"{options.sweep}, a scene"
+            raise InputError("sweep", is_one, f"a sweep; evfem run {options.sweep} runs this one") from None
         raise
-    path = given.out or Path(f"{plan.name}-out")
+    path = options.out or Path(f"{plan.name}-out")
     try:
         result = sweep(
             plan,
             path,
-            resume=given.resume,
-            overwrite=given.overwrite,
-            workers=given.workers,
-            scheduler=given.scheduler,
+            resume=options.resume,
+            overwrite=options.overwrite,
+            workers=options.workers,
+            scheduler=options.scheduler,
             progress=True,
         )
     except KeyboardInterrupt:
@@ -388,47 +388,47 @@ def _sweep(given: argparse.Namespace) -> int:
     return NOT_CONVERGED if wrong else DONE
 
 
-def _mesh(given: argparse.Namespace) -> None:
-    scene = _scene(given.scene)
+def _mesh(options: argparse.Namespace) -> None:
+    scene = _scene(options.scene)
     from evfem.mesh.file import write
     from evfem.planning.plan import scene_mesh
 
     with notices.status("building the mesh"):
         mesh, _ = scene_mesh(scene)
-        write(mesh, given.out)
+        write(mesh, options.out)
     regions = ", ".join(mesh.region_names)
     print(
-        f"{len(mesh.points)} nodes, {len(mesh.cells)} cells ({mesh.kind}); {regions}; in {given.out}",
+        f"{len(mesh.points)} nodes, {len(mesh.cells)} cells ({mesh.kind}); {regions}; in {options.out}",
         flush=True,
     )
 
 
-def _signal(given: argparse.Namespace) -> None:
+def _signal(options: argparse.Namespace) -> None:
     from evfem.common.views import plus
     from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
 
     playback = None
-    if given.full_scale is not None:
+    if options.full_scale is not None:
         playback = Playback(
-            given.full_scale, given.speed, given.friction, given.rate, given.carrier, given.pixel
+            options.full_scale, options.speed, options.friction, options.rate, options.carrier, options.pixel
         )
-    profile = read_signal(given.file)
-    write_signal(given.out, profile, playback)
+    profile = read_signal(options.file)
+    write_signal(options.out, profile, playback)
     start, stop = profile.position[0], profile.position[-1]
     largest = max(abs(profile.voltage))
-    print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {given.out}", flush=True)
+    print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {options.out}", flush=True)
 
 
-def _texture(given: argparse.Namespace) -> None:
+def _texture(options: argparse.Namespace) -> None:
     from evfem.estimate.commands import run
 
-    run(given)
+    run(options)
 
 
-def _studio(given: argparse.Namespace) -> None:
+def _studio(options: argparse.Namespace) -> None:
     from evfem.studio.server import serve
 
-    serve(given.port, not given.no_browser)
+    serve(options.port, not options.no_browser)
 
 
 if __name__ == "__main__":

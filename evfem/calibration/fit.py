@@ -155,8 +155,8 @@ class _Problem:
         self.measured = np.concatenate([[], *(np.asarray(one.values) for one in self.data)])
         self.scale = np.concatenate([[], *(_scale(one) for one in self.data)])
         if len(self.measured) <= len(self.parameters.free):
-            given = f"{len(self.measured)} for {len(self.parameters.free)} parameters"
-            raise InputError("data", given, "more measured values than parameters")
+            reason = f"{len(self.measured)} for {len(self.parameters.free)} parameters"
+            raise InputError("data", reason, "more measured values than parameters")
         self._check_scenes()
 
     def _check_scenes(self) -> None:
@@ -169,8 +169,8 @@ class _Problem:
                 try:
                     loads(self.text(self.runs[0][0], {**start, key: end}), self.paths)
                 except InputError as error:
-                    given = f"the bound {end:g}: {error}"
-                    raise InputError(f"parameters.{key}", given, "other bounds") from error
+                    reason = f"the bound {end:g}: {error}"
+                    raise InputError(f"parameters.{key}", reason, "other bounds") from error
             with suppress(InputError):
                 parameter_of(scenes[0], key)
                 self.exact.append(key)
@@ -276,8 +276,8 @@ class _Residuals:
             if not np.isfinite(beside).all():
                 step, (beside,) = -step, self.predicted([z - step * units[i]])
             if not np.isfinite(beside).all():
-                key, given = self.problem.parameters.names[i], f"a scene that is not solved: {self.failed}"
-                raise InputError(f"parameters.{key}", given, "other bounds")
+                key, reason = self.problem.parameters.names[i], f"a scene that is not solved: {self.failed}"
+                raise InputError(f"parameters.{key}", reason, "other bounds")
             columns.append((beside - here) / step)
         return columns
 

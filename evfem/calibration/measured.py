@@ -112,9 +112,9 @@ class MeasuredCurve:
     where: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, given in (("column", str(self.column)), ("over", str(self.over))):
-            if given not in NUMBERS:
-                raise unknown(f"data.{name}", given, list(NUMBERS), f"{quoted(given)}, no column")
+        for name, column in (("column", str(self.column)), ("over", str(self.over))):
+            if column not in NUMBERS:
+                raise unknown(f"data.{name}", column, list(NUMBERS), f"{quoted(column)}, no column")
         set_frozen(self, at=numbers("data.at", self.at, f"a list of places, of {self.over}"))
         set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as places"))
         if len(np.unique(self.at)) < len(self.at):
@@ -122,9 +122,9 @@ class MeasuredCurve:
         turn = np.flatnonzero(np.diff(np.sign(np.diff(self.at))))
         if turn.size:
             first, there, after = self.at[turn[0] : turn[0] + 3]
-            given = f"{self.over} {first:g}, {there:g}, then {after:g} (number {turn[0] + 3})"
+            problem = f"{self.over} {first:g}, {there:g}, then {after:g} (number {turn[0] + 3})"
             allowed = "growing or falling places: loading and unloading are a curve each, with its `motion`"
-            raise InputError("data.at", given, f"{allowed}; places that scatter, sorted")
+            raise InputError("data.at", problem, f"{allowed}; places that scatter, sorted")
         if self.motion is not None and (type(self.motion) is not int or self.motion < 0):
             raise InputError("data.motion", quoted(self.motion), "the number of a motion, from 0, or None")
         set_frozen(self, where={key: _setting(key, value) for key, value in self.where.items()})
@@ -153,13 +153,13 @@ class MeasuredCurve:
         table = read_headed(Path(path), "data")
         wanted = dict(zip(table.names, table.names, strict=True)) if columns is None else dict(columns)
         over, *others = (name for name in wanted if name != "sd")
-        given = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
+        problem = f"{Path(path).name} with the header {','.join(table.names)[:60]}"
         if len(others) != 1 or (columns is None and len(set(table.names)) < len(table.names)):
             allowed = "two columns of the history, as indentation,normal_force; and sd; or `columns`"
-            raise InputError("data", given, allowed)
+            raise InputError("data", problem, allowed)
         if columns is None and not {over, *others} <= {*NUMBERS}:
             allowed = 'columns of the history, or columns={"indentation": %s, "normal_force": %s}'
-            raise InputError("data", given, allowed % tuple(map(readable, (over, *others))))
+            raise InputError("data", problem, allowed % tuple(map(readable, (over, *others))))
         for name in {over, *others} - {*NUMBERS}:
             raise unknown("data.columns", name, list(NUMBERS), f"{quoted(name)}, no column")
         found = []
@@ -173,10 +173,10 @@ class MeasuredCurve:
 
     def _per_depth(self, depth: float) -> MeasuredCurve:
         """Numbers over a depth (mm), per mm of it."""
-        given = {"at": self.over, "values": self.column, "sd": self.column}
-        parts = {key: getattr(self, key) for key in given if getattr(self, key) is not None}
-        divided = {key: over_depth({given[key]: part}, 1.0 / depth) for key, part in parts.items()}
-        return replace(self, **{key: part[given[key]] for key, part in divided.items()})
+        columns = {"at": self.over, "values": self.column, "sd": self.column}
+        arrays = {key: getattr(self, key) for key in columns if getattr(self, key) is not None}
+        divided = {key: over_depth({columns[key]: array}, 1.0 / depth) for key, array in arrays.items()}
+        return replace(self, **{key: array[columns[key]] for key, array in divided.items()})
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -270,8 +270,8 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
         which = "the run" if motion is None else f"motion {motion}"
         raise InputError("data.over", f"{over}, which does not advance in {which}", "one that does")
     if at.min() < x[0] - slack or at.max() > x[-1] + slack:
-        given = f"{over} from {at.min():g} to {at.max():g}"
-        raise InputError("data.at", given, f"places within those of the run, {x[0]:g} to {x[-1]:g}")
+        problem = f"{over} from {at.min():g} to {at.max():g}"
+        raise InputError("data.at", problem, f"places within those of the run, {x[0]:g} to {x[-1]:g}")
     return PchipInterpolator(x, y)(np.clip(at, x[0], x[-1]))
 
 

@@ -85,13 +85,13 @@ class Parameters:
     free: Mapping[str, Parameter]
 
     @classmethod
-    def of(cls, given: Any) -> Parameters:
+    def of(cls, entry: Any) -> Parameters:
         """Parameters from {key: Parameter, or (low, high)}."""
         allowed = "{key: (low, high)} or {key: Parameter(low, high)} for one key of the scene or more"
-        if not isinstance(given, Mapping) or not given:
-            raise InputError("parameters", shown(given), allowed)
+        if not isinstance(entry, Mapping) or not entry:
+            raise InputError("parameters", shown(entry), allowed)
         free = {}
-        for key, one in given.items():
+        for key, one in entry.items():
             check_key(f"parameters.{key}", str(key))
             pair = isinstance(one, Sequence) and not isinstance(one, str) and len(one) == 2
             if not (pair or isinstance(one, Parameter)):
@@ -145,6 +145,6 @@ def number_at(tables: Any, key: str) -> float:
     except (KeyError, IndexError, TypeError, ValueError):
         here = None
     if isinstance(here, bool) or not isinstance(here, (int, float)):
-        given = "no number there" if here is None else shown(here)
-        raise InputError(f"parameters.{key}", given, "a number in the scene, for a factor or an offset")
+        entry = "no number there" if here is None else shown(here)
+        raise InputError(f"parameters.{key}", entry, "a number in the scene, for a factor or an offset")
     return float(here)

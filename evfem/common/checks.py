@@ -67,35 +67,35 @@ def plain(value: Values) -> Values:
     return value.item() if isinstance(value, (np.ndarray, np.generic)) and value.ndim == 0 else value
 
 
-def above(key: str, given: Values, lowest: float, allowed: str) -> Values:
+def above(key: str, entered: Values, lowest: float, allowed: str) -> Values:
     """`given` as float or array of floats, all finite and (by their real part) > `lowest`.
 
     >>> above("area", -1.0, 0.0, "an area in mm2 above zero")
     Traceback (most recent call last):
     evfem.errors.InputError: area: given -1.0; allowed: an area in mm2 above zero
     """
-    value = finite(key, given, allowed)
+    value = finite(key, entered, allowed)
     if not np.all(np.real(value) > lowest):  # the smallest alone, so that no long array floods the message
-        raise InputError(key, float(np.min(np.real(given))), allowed)
+        raise InputError(key, float(np.min(np.real(entered))), allowed)
     return value
 
 
-def at_least(key: str, given: Values, lowest: float, allowed: str) -> Values:
+def at_least(key: str, entered: Values, lowest: float, allowed: str) -> Values:
     """As `above`, with `lowest` itself allowed."""
-    value = finite(key, given, allowed)
+    value = finite(key, entered, allowed)
     if not np.all(np.real(value) >= lowest):
-        raise InputError(key, float(np.min(np.real(given))), allowed)
+        raise InputError(key, float(np.min(np.real(entered))), allowed)
     return value
 
 
-def finite(key: str, given: Values, allowed: str) -> Values:
+def finite(key: str, entered: Values, allowed: str) -> Values:
     """`given` as float or array of floats (complex if it was), all finite."""
     try:
-        value = np.asarray(given)
+        value = np.asarray(entered)
     except ValueError as error:  # rows of different length
-        raise InputError(key, quoted(given), allowed) from error
+        raise InputError(key, quoted(entered), allowed) from error
     if value.dtype.kind not in "iufc" or not np.all(np.isfinite(value)):
-        raise InputError(key, quoted(given), allowed)
+        raise InputError(key, quoted(entered), allowed)
     return plain(value * 1.0)
 
 
@@ -222,9 +222,9 @@ class Key:
     @property
     def types(self) -> tuple[Any, ...]:
         """What a value in a file may be; there is no None in a file."""
-        given = self.rule.get("type", self.annotation)
-        union = isinstance(given, UnionType) or get_origin(given) is Union
-        return tuple(one for one in (get_args(given) if union else (given,)) if one is not NoneType)
+        entered = self.rule.get("type", self.annotation)
+        union = isinstance(entered, UnionType) or get_origin(entered) is Union
+        return tuple(one for one in (get_args(entered) if union else (entered,)) if one is not NoneType)
 
 
 @cache

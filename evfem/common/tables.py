@@ -38,7 +38,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
 IN = {"time": "s", "voltage": "V", **dict.fromkeys(("x", "y", "z", "height", "position"), "mm")}
 
 
-def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
+def piecewise_linear(position: Floats, value: Floats, x: Any) -> Floats:
     """Value at x of rows (place, value): linear between them, constant beyond the ends; place must
     not decrease.
 
@@ -48,25 +48,27 @@ def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
     [0.0, 2.0, 9.0, 9.0]
     """
     x = np.real(x)
-    after = np.searchsorted(place, x, side="right")
-    left, right = np.maximum(after - 1, 0), np.minimum(after, len(place) - 1)
-    length = np.where(place[right] > place[left], place[right] - place[left], 1.0)
-    return value[left] + (value[right] - value[left]) * (x - place[left]) / length
+    after = np.searchsorted(position, x, side="right")
+    left, right = np.maximum(after - 1, 0), np.minimum(after, len(position) - 1)
+    length = np.where(position[right] > position[left], position[right] - position[left], 1.0)
+    return value[left] + (value[right] - value[left]) * (x - position[left]) / length
 
 
-def piecewise_slope(place: Floats, value: Floats, x: Any) -> Floats:
+def piecewise_slope(position: Floats, value: Floats, x: Any) -> Floats:
     """Slope at x of the same rows: 0 beyond the ends, jumps left out, on a row that of the piece behind it.
 
     >>> piecewise_slope(np.array([0.0, 1.0, 1.0]), np.array([0.0, 4.0, 9.0]), [-1.0, 0.5, 1.0, 2.0]).tolist()
     [0.0, 4.0, 0.0, 0.0]
     """
-    after = np.searchsorted(place, np.real(x), side="right")
-    left, right = np.maximum(after - 1, 0), np.minimum(after, len(place) - 1)
-    rises = place[right] > place[left]
-    return np.where(rises, value[right] - value[left], 0.0) / np.where(rises, place[right] - place[left], 1.0)
+    after = np.searchsorted(position, np.real(x), side="right")
+    left, right = np.maximum(after - 1, 0), np.minimum(after, len(position) - 1)
+    rises = position[right] > position[left]
+    return np.where(rises, value[right] - value[left], 0.0) / np.where(
+        rises, position[right] - position[left], 1.0
+    )
 
 
-def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
+def numbers(key: str, entry: Any, allowed: str, axes: int = 1) -> Floats:
     """`given` as a new array of finite floats with that many axes, or `InputError`.
 
     >>> numbers("x", [1, float("nan")], "lengths")
@@ -74,14 +76,14 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
     evfem.errors.InputError: x: given a value that is not finite, number 2; allowed: lengths
     """
     try:
-        array = np.array(given)
+        array = np.array(entry)
     except ValueError:  # rows of unequal length
-        raise InputError(key, quoted(given), allowed) from None
+        raise InputError(key, quoted(entry), allowed) from None
     if array.dtype.kind not in "iuf" or array.ndim != axes:
-        raise InputError(key, quoted(given), allowed)
+        raise InputError(key, quoted(entry), allowed)
     if not np.isfinite(array).all():
-        place = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(key, f"a value that is not finite, number {place}", allowed)
+        index = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(key, f"a value that is not finite, number {index}", allowed)
     return array.astype(float)
 
 
@@ -91,8 +93,8 @@ def gridded(key: str, x: Floats, z: Floats, value: Floats) -> tuple[Floats, Floa
     order = np.lexsort((x, z))
     full = len(xs) * len(zs) == len(x) and min(len(xs), len(zs)) > 1
     if not full or (x[order].reshape(len(zs), -1) != xs).any():
-        given = f"{len(x)} rows of {len(xs)} x and {len(zs)} z"
-        raise InputError(key, given, "one row for every pair of at least two x and two z")
+        problem = f"{len(x)} rows of {len(xs)} x and {len(zs)} z"
+        raise InputError(key, problem, "one row for every pair of at least two x and two z")
     return xs, zs, value[order].reshape(len(zs), len(xs))
 
 
@@ -111,8 +113,8 @@ def dataset(variables: Mapping[str, Any], coordinates: Mapping[str, Any], attrib
     try:
         from xarray import Dataset
     except ModuleNotFoundError as error:
-        given = f"a data set of xarray, and no {error.name}"
-        raise InputError("to_xarray", given, "pip install 'evfem[xarray]', or table()") from None
+        problem = f"a data set of xarray, and no {error.name}"
+        raise InputError("to_xarray", problem, "pip install 'evfem[xarray]', or table()") from None
     return Dataset(variables, coordinates, attributes)
 
 
@@ -169,11 +171,11 @@ class Headed:
         bare = self.names == [str(i) for i in range(1, len(self.names) + 1)]
         return "has no header" if bare else f"starts with {','.join(self.names)[:60]!r}"
 
-    def column(self, key: str, given: int | str, bases: Collection[str | None]) -> Floats:
+    def column(self, key: str, entry: int | str, bases: Collection[str | None]) -> Floats:
         """A column by its name or its number from 1, in one of the units `bases`."""
         called = [*self.names, *map(str, range(1, len(self.names) + 1))]
-        if (name := str(given).lower()) not in called:
-            raise unknown(key, str(given), called, f"{quoted(given)}, which is no column")
+        if (name := str(entry).lower()) not in called:
+            raise unknown(key, str(entry), called, f"{quoted(entry)}, which is no column")
         i = called.index(name) % len(self.names)
         unit = self.units[i]
         base, factor = (None, 1.0) if unit is None else UNITS.get(unit, (unit, 1.0))

@@ -163,10 +163,10 @@ def mean_law(
 ) -> tuple[Any, Layers]:
     """Law and layers of the mean attraction over the cycle at `frequency` (Hz), of drive or `signal`."""
     gap_eps_r = getattr(law, "gap_eps_r", 1.0)
-    given = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": gap_eps_r}
+    gap_layer = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": gap_eps_r}
     single = powers(signal) is None and WAVEFORMS[drive.waveform].harmonics()[0].size == 1
     if frequency is None or single:
-        return law, Layers.of(*solids, frequency=frequency, **given)
+        return law, Layers.of(*solids, frequency=frequency, **gap_layer)
     order, weight = spectrum(drive, signal)
     steady = steady_layers(solids, drive, gap_eps_r) if 0.0 in order else None
     if 0.0 in order and steady is None:
@@ -174,7 +174,7 @@ def mean_law(
     if not order.size:
         order, weight = np.ones(1), np.zeros(1)
     found = [] if steady is None else [steady]
-    found += [Layers.of(*solids, frequency=frequency * n, **given) for n in order[len(found) :]]
+    found += [Layers.of(*solids, frequency=frequency * n, **gap_layer) for n in order[len(found) :]]
     reduced, loss = (
         np.stack(np.broadcast_arrays(*(getattr(one, name) for one in found))) for name in ("reduced", "loss")
     )

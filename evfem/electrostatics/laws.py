@@ -270,12 +270,12 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
         """Pi in N/mm (= N mm per mm^2), zero at infinite gap; exact to rounding also where D = e s."""
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         ratio = np.asarray((layers.thickness - self.gap_eps_r * layers.reduced) / near)
-        share = _log1p_ratio(ratio)
+        factor = _log1p_ratio(ratio)
         if np.any(layers.loss):
             q, r = ratio**2, np.asarray(self.gap_eps_r * layers.loss / near) ** 2
-            lossy = q * share - 0.5 * ratio * r * _log1p_ratio(r) + r * _atan_ratio(np.sqrt(r))
-            share = np.where(q + r == 0.0, 1.0, lossy / np.where(q + r == 0.0, 1.0, q + r))
-        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * share)
+            lossy = q * factor - 0.5 * ratio * r * _log1p_ratio(r) + r * _atan_ratio(np.sqrt(r))
+            factor = np.where(q + r == 0.0, 1.0, lossy / np.where(q + r == 0.0, 1.0, q + r))
+        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * factor)
 
 
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:

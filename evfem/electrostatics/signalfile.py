@@ -41,12 +41,12 @@ MOST_COLUMNS, ROWS = 100_000, 64
 FRICTIONS = re.compile(r"coefficient, (\S+) to (\S+),")
 
 
-def _coefficients(key: str, given: Any) -> tuple[float, float]:
+def _coefficients(key: str, entry: Any) -> tuple[float, float]:
     allowed = "two friction coefficients, at 0 V and at full scale, the second one larger"
-    if not isinstance(given, (tuple, list)) or len(given) != 2:
-        raise InputError(key, given, allowed)
-    natural = real(key, given[0], allowed, lambda mu: mu >= 0.0)
-    return natural, real(key, given[1], allowed, lambda mu: mu > natural)
+    if not isinstance(entry, (tuple, list)) or len(entry) != 2:
+        raise InputError(key, entry, allowed)
+    natural = real(key, entry[0], allowed, lambda mu: mu >= 0.0)
+    return natural, real(key, entry[1], allowed, lambda mu: mu > natural)
 
 
 def _above(what: str) -> dict[str, Any]:
@@ -192,8 +192,8 @@ def read_voltage(path: str | Path) -> VoltageProfile | Sampled:
     return read_signal(path)
 
 
-def _too_much(given: str, playback: Playback) -> InputError:
-    return InputError("voltage", given, f"at most the full scale of {playback.full_scale:g} V")
+def _too_much(problem: str, playback: Playback) -> InputError:
+    return InputError("voltage", problem, f"at most the full scale of {playback.full_scale:g} V")
 
 
 def _positions(number: int, start: float, spacing: float) -> Floats:
@@ -236,9 +236,9 @@ def _from_wav(path: Path) -> VoltageProfile:
     if not scale or samples.dtype != np.int16:
         raise InputError("path", f"{path}, of another kind or without the comment", allowed)
     if scale["carrier_Hz"] is not None:
-        given = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
+        problem = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
         allowed = "a WAV without a carrier, or Sampled.from_wav: its samples are the voltage of the moment"
-        raise InputError("path", given, allowed)
+        raise InputError("path", problem, allowed)
     if samples.size > MOST_ROWS:  # before they take four times the memory
         raise InputError("path", f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
     try:
@@ -246,8 +246,8 @@ def _from_wav(path: Path) -> VoltageProfile:
         speed = _above(SPEED)["check"]("speed_mm_per_s", scale["speed_mm_per_s"])
         start = real("start_mm", scale["start_mm"], "a position in mm")
     except InputError as error:
-        given = f"{path}, whose {error.key} is {readable(error.given)}"
-        raise InputError("path", given, error.allowed) from None
+        problem = f"{path}, whose {error.key} is {readable(error.given)}"
+        raise InputError("path", problem, error.allowed) from None
     position = _positions(samples.size, start, speed / rate)
     return VoltageProfile(position, samples / wav.LARGEST_SAMPLE * full_scale)
 
@@ -258,8 +258,8 @@ def _from_hjif(path: Path) -> VoltageProfile:
     try:
         full_scale = float(told["reference_devices"][0]["maximum_voltage"])
         ((natural, largest),) = (map(float, pair) for pair in FRICTIONS.findall(told["description"]))
-        share = (friction - natural) / (largest - natural)
-        voltage = full_scale * np.sqrt(np.clip(share, 0.0, 1.0))
+        fraction = (friction - natural) / (largest - natural)
+        voltage = full_scale * np.sqrt(np.clip(fraction, 0.0, 1.0))
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, ZeroDivisionError):
         raise InputError("path", f"{path.name}, without them", allowed) from None
     return VoltageProfile(position, voltage)
@@ -272,8 +272,8 @@ def _map(profile: VoltageProfile, playback: Playback) -> bytes:
     columns = _number(profile, playback.pixel, MOST_COLUMNS, "columns")
     start = float(profile.position[0])
     middle = _positions(columns, start + 0.5 * playback.pixel, playback.pixel)
-    share = np.minimum((profile(middle) / playback.full_scale) ** 2, 1.0)
-    grey = np.rint(255.0 * share).astype(np.uint8)
+    fraction = np.minimum((profile(middle) / playback.full_scale) ** 2, 1.0)
+    grey = np.rint(255.0 * fraction).astype(np.uint8)
     natural, largest = playback.friction or (None, None)
     scale = {
         "format": MAP_FORM,
@@ -319,8 +319,8 @@ def ticks(length: float, speed: float) -> tuple[int, int]:
             if abs(per_second * unit - speed) <= ROUNDING * speed:
                 return exponent, per_second
             break
-    given = f"{speed:g} mm/s over {length:g} mm"
-    raise InputError("speed", given, "a speed that passes the signal in ticks of a power of ten in metres")
+    problem = f"{speed:g} mm/s over {length:g} mm"
+    raise InputError("speed", problem, "a speed that passes the signal in ticks of a power of ten in metres")
 
 
 def haptics(
@@ -348,14 +348,14 @@ def haptics(
     start, length = float(profile.position[0]), float(np.ptp(profile.position))
     exponent, timescale = ticks(length, speed)
     unit = 10.0 ** (exponent + 3)
-    place = _keyframes(profile, full_scale, unit)
+    tick_times = _keyframes(profile, full_scale, unit)
     # on the later side of a jump, whatever the last bit of the position says
-    share = (profile(start + (place + 1e-6) * unit) / full_scale) ** 2
+    fraction = (profile(start + (tick_times + 1e-6) * unit) / full_scale) ** 2
     natural, largest = friction
-    amplitude = (natural + (largest - natural) * np.minimum(share, 1.0)) / largest
+    amplitude = (natural + (largest - natural) * np.minimum(fraction, 1.0)) / largest
     keyframes = [
         {"relative_position": tick, "amplitude_modulation": round(value, 9)}
-        for tick, value in zip(place.tolist(), amplitude.tolist(), strict=True)
+        for tick, value in zip(tick_times.tolist(), amplitude.tolist(), strict=True)
     ]
     band = {
         "band_type": "Curve",
@@ -405,13 +405,19 @@ def _channel(gain: float, band: dict[str, Any]) -> dict[str, Any]:
 
 def _keyframes(profile: VoltageProfile, full_scale: float, unit: float) -> Floats:
     """Ticks (n,), rising, between which friction is straight enough; a jump takes one tick."""
-    place = (profile.position - profile.position[0]) / unit
-    jumps = place[1:][np.diff(place) == 0.0]
+    tick_times = (profile.position - profile.position[0]) / unit
+    jumps = tick_times[1:][np.diff(tick_times) == 0.0]
     rise = np.abs(np.diff(profile.voltage)) / full_scale
     pieces = np.maximum(np.ceil(rise / np.sqrt(4.0 * CHORD)), 1.0).astype(int)
     number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    between = np.repeat(place[:-1], pieces) + number * np.repeat(np.diff(place) / pieces, pieces)
-    last = np.ceil(place[-1])
+    between = np.repeat(tick_times[:-1], pieces) + number * np.repeat(np.diff(tick_times) / pieces, pieces)
+    last = np.ceil(tick_times[-1])
     # the middle: the reference software leaves out a curve of two keyframes
-    parts = [np.floor(place), np.ceil(place), np.floor(jumps) - 1.0, np.rint(between), [last // 2.0]]
+    parts = [
+        np.floor(tick_times),
+        np.ceil(tick_times),
+        np.floor(jumps) - 1.0,
+        np.rint(between),
+        [last // 2.0],
+    ]
     return np.unique(np.clip(np.concatenate(parts), 0.0, last)).astype(np.int64)

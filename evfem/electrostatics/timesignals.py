@@ -341,9 +341,11 @@ class Sampled:
 
     def __call__(self, time: Values) -> Values:
         """Voltage (V) at `time` (s, any shape)."""
-        place = (np.asarray(time, dtype=float) - self.start) * self.rate
+        sample_index = (np.asarray(time, dtype=float) - self.start) * self.rate
         size = self.voltage.size
-        return plain(np.interp(place, np.arange(size), self.voltage, period=size if self.repeat else None))
+        return plain(
+            np.interp(sample_index, np.arange(size), self.voltage, period=size if self.repeat else None)
+        )
 
     @classmethod
     def from_csv(cls, path: str | Path, *, repeat: bool = False) -> Sampled:
@@ -376,8 +378,8 @@ class Sampled:
         if full_scale is None and not scale:
             needed = "the voltage of the largest sample, in V, for a WAV that evfem did not write"
             raise InputError("full_scale", ABSENT, needed)
-        given = scale["full_scale_V"] if full_scale is None else full_scale
-        volts = above("full_scale", given, 0.0, "a voltage in V above zero")
+        scale_V = scale["full_scale_V"] if full_scale is None else full_scale
+        volts = above("full_scale", scale_V, 0.0, "a voltage in V above zero")
         return cls(volts * wav.shares(samples), rate, start, repeat)
 
     @classmethod

@@ -138,11 +138,11 @@ def _event(event: dict[str, Any], tap: float) -> tuple[float, float, float]:
     return start, start + lasts, own.get("HapticIntensity", 1.0)
 
 
-def _control(part: dict[str, Any], time: Floats) -> Any:
+def _control(chunk: dict[str, Any], time: Floats) -> Any:
     """What a part of a pattern multiplies all intensities with: straight lines between the points of a curve,
     a value from its time on.
     """
-    own = part.get("ParameterCurve") or part.get("Parameter") or {}
+    own = chunk.get("ParameterCurve") or chunk.get("Parameter") or {}
     if own.get("ParameterID") != "HapticIntensityControl":
         return 1.0
     start = float(own["Time"])
@@ -164,14 +164,14 @@ def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:
         (told, *_) = (one for one in whole["perceptions"] if one["perception_modality"] == "Friction")
         (channel,) = told["channels"]
         ((frames,),) = ([effect["keyframes"] for effect in band["effects"]] for band in channel["bands"])
-        place, share = (
+        ticks, fraction = (
             np.array([float(frame[name]) for frame in frames])
             for name in ("relative_position", "amplitude_modulation")
         )
         found = FROM.search(str(whole.get("description")))
         start = float(found.group(1)) if found else 0.0
-        position = start + place * 10.0 ** (int(told["unit_exponent"]) + 3)
-        friction = float(channel["gain"]) * share
-        if place.size < 2 or not (np.diff(position) > 0.0).all() or not np.isfinite(friction).all():
+        position = start + ticks * 10.0 ** (int(told["unit_exponent"]) + 3)
+        friction = float(channel["gain"]) * fraction
+        if ticks.size < 2 or not (np.diff(position) > 0.0).all() or not np.isfinite(friction).all():
             raise ValueError("keyframes")
     return position, friction, dict(told)

@@ -25,21 +25,21 @@ from evfem.textures.library import REFERENCES, about, find, names, reference
 from evfem.textures.texture import Texture, is_data, write
 
 
-def run(given: argparse.Namespace) -> None:
+def run(args: argparse.Namespace) -> None:
     """Do one of the commands."""
     commands = {"list": _list, "show": _show, "make": _make, "import": _import, "simulate": _simulate}
-    {**commands, "estimate": _estimate, "database": _database}[given.what](given)
+    {**commands, "estimate": _estimate, "database": _database}[args.what](args)
 
 
-def _list(given: argparse.Namespace) -> None:
+def _list(args: argparse.Namespace) -> None:
     for name in names():
         texture = reference(name)
         size = f"{np.ptp(texture.values) * 1e3:.0f} um" if texture.quantity == "height" else "friction"
         print(f"{name:<16}{texture.kind:<12}{texture.period:>6.4g} mm {size:>9}  {about(name)}")
 
 
-def _show(given: argparse.Namespace) -> None:
-    texture = find(given.name)
+def _show(args: argparse.Namespace) -> None:
+    texture = find(args.name)
     print(texture)
     print(f"licence: {texture.licence}")
     for note in texture.provenance:
@@ -49,25 +49,25 @@ def _show(given: argparse.Namespace) -> None:
         print(f"rms height {np.std(texture.values) * 1e3:.4g} um, rms slope {np.sqrt(np.mean(slope**2)):.4g}")
 
 
-def _make(given: argparse.Namespace) -> None:
-    knobs = Knobs(**_given(given, Knobs))
-    _written(make(given.kind, knobs, given.name or given.out.stem, given.licence), given.out)
+def _make(args: argparse.Namespace) -> None:
+    knobs = Knobs(**_passed(args, Knobs))
+    _written(make(args.kind, knobs, args.name or args.out.stem, args.licence), args.out)
 
 
-def _import(given: argparse.Namespace) -> None:
-    options, (_, importer) = _given(given, *IMPORTERS.values()), importer_of(given.file)
+def _import(args: argparse.Namespace) -> None:
+    options, (_, importer) = _passed(args, *IMPORTERS.values()), importer_of(args.file)
     names = {*options, *(key.name for key in keys_of(importer))}
     with at("", {name: f"--{name}" for name in names}):
-        texture = read(importer, options, "")(given.file)
-    _written(texture, given.out)
+        texture = read(importer, options, "")(args.file)
+    _written(texture, args.out)
     for note in texture.provenance:
         print(f"- {note}")
 
 
-def _given(given: argparse.Namespace, *classes: type, **renamed: str) -> dict[str, Any]:
+def _passed(args: argparse.Namespace, *classes: type, **renamed: str) -> dict[str, Any]:
     """The options that were given of those that are fields of the classes."""
     names = dict.fromkeys(key.name for one in classes for key in keys_of(one))
-    values = {name: getattr(given, renamed.get(name, name)) for name in names}
+    values = {name: getattr(args, renamed.get(name, name)) for name in names}
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -76,42 +76,42 @@ def _written(texture: Texture, out: Path) -> None:
     print(f"{texture}; in {', '.join(map(str, paths))}", flush=True)
 
 
-def _felt(given: argparse.Namespace) -> tuple[Touch, Device]:
-    return Touch(**_given(given, Touch)), Device(**_given(given, Device, friction="display"))
+def _felt(args: argparse.Namespace) -> tuple[Touch, Device]:
+    return Touch(**_passed(args, Touch)), Device(**_passed(args, Device, friction="display"))
 
 
-def _simulate(given: argparse.Namespace) -> None:
-    texture, (touch, device) = find(given.name), _felt(given)
-    _check_outputs(given)
+def _simulate(args: argparse.Namespace) -> None:
+    texture, (touch, device) = find(args.name), _felt(args)
+    _check_outputs(args)
     with status(f"sliding over {texture.name}"):
         reference = record(touch_scene(texture, touch))
-        exact, comparison = exact_voltage(reference, device) if given.exact else (None, None)
+        exact, comparison = exact_voltage(reference, device) if args.exact else (None, None)
     curve = friction_of(reference.result)
-    _curve(curve, given.out)
+    _curve(curve, args.out)
     if exact is None:
-        _render(curve, touch, device, given.signal)
+        _render(curve, touch, device, args.signal)
     else:
         print(f"exact: {comparison}")
-        _signal(VoltageProfile(exact.x, exact.voltage), touch, device, given.signal)
+        _signal(VoltageProfile(exact.x, exact.voltage), touch, device, args.signal)
 
 
-def _estimate(given: argparse.Namespace) -> None:
-    touch, device = _felt(given)
-    _check_outputs(given)
-    found = estimate(find(given.name), touch)
-    _curve(found.curve, given.out)
-    if given.name in REFERENCES:
+def _estimate(args: argparse.Namespace) -> None:
+    touch, device = _felt(args)
+    _check_outputs(args)
+    found = estimate(find(args.name), touch)
+    _curve(found.curve, args.out)
+    if args.name in REFERENCES:
         finger = "ridged" if touch.ridged else "smooth"
-        error = known_error(given.name, touch.ridged)
+        error = known_error(args.name, touch.ridged)
         print(f"at the usual touch of a {finger} finger it is off the model by {error:.1%} of the range")
     for note in found.notes:
         tell(f"note: {note}")
-    _render(found.curve, touch, device, given.signal)
+    _render(found.curve, touch, device, args.signal)
 
 
-def _check_outputs(given: argparse.Namespace) -> None:
+def _check_outputs(args: argparse.Namespace) -> None:
     endings = {"out": (".csv",), "signal": (".csv", ".wav", ".png", ".hjif")}
-    for key, path in ((key, getattr(given, key)) for key in endings):
+    for key, path in ((key, getattr(args, key)) for key in endings):
         if path is not None and path.suffix.lower() not in endings[key]:
             raise InputError(f"--{key}", quoted(str(path)), f"a file called {', '.join(endings[key])}")
         if path is not None and is_data(path):
@@ -128,9 +128,9 @@ def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path | Non
         f"slide cannot be rendered; error in force {found.force_error:.2%}, in spectrum "
         f"{found.spectrum_error:.2%}"
     )
-    for low, high, error, share in found.bands:
-        if share > 1e-3:
-            print(f"  {low:g} to {high:g} Hz: error {error:.2%}, with {share:.1%} of the wish's power")
+    for low, high, error, fraction in found.bands:
+        if fraction > 1e-3:
+            print(f"  {low:g} to {high:g} Hz: error {error:.2%}, with {fraction:.1%} of the wish's power")
     _signal(found.signal.profile, touch, device, path)
 
 
@@ -150,9 +150,9 @@ def _curve(curve: FrictionCurve, out: Path | None) -> None:
         print(out, flush=True)
 
 
-def _database(given: argparse.Namespace) -> None:
+def _database(args: argparse.Namespace) -> None:
     from evfem.estimate.database import compute_database
 
-    path, counted = compute_database(given.out, workers=given.workers, scheduler=given.scheduler)
+    path, counted = compute_database(args.out, workers=args.workers, scheduler=args.scheduler)
     told = ", ".join(f"{number} {what}" for what, number in counted.items())
     print(f"{told}; in {path}", flush=True)

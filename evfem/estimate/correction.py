@@ -30,22 +30,24 @@ def corrections(friction: Floats, linear: Floats, wavelength: Floats, slope: Flo
     >>> corrections(other, linear, np.array([0.24]), np.array([0.1])).round(6).tolist()
     [[0.05, 0.9, 0.01]]
     """
-    wanted, given = (np.fft.rfft(curve, axis=1) for curve in (friction, linear))
-    offset = (wanted[:, 0] - given[:, 0]).real / friction.shape[1] / slope
-    wanted, given = wanted[:, 1:], given[:, 1:]
-    turn = -2j * np.pi * np.arange(1, given.shape[1] + 1) / wavelength[:, None]
-    power = np.maximum(np.sum(np.abs(given) ** 2, axis=1), 1e-300)
+    wanted, linearised = (np.fft.rfft(curve, axis=1) for curve in (friction, linear))
+    offset = (wanted[:, 0] - linearised[:, 0]).real / friction.shape[1] / slope
+    wanted, linearised = wanted[:, 1:], linearised[:, 1:]
+    turn = -2j * np.pi * np.arange(1, linearised.shape[1] + 1) / wavelength[:, None]
+    power = np.maximum(np.sum(np.abs(linearised) ** 2, axis=1), 1e-300)
     shifts = np.linspace(-FARTHEST, FARTHEST, TRIED)
-    shared = np.array([np.sum((wanted * np.conj(given * np.exp(turn * d))).real, axis=1) for d in shifts])
+    shared = np.array(
+        [np.sum((wanted * np.conj(linearised * np.exp(turn * d))).real, axis=1) for d in shifts]
+    )
     best = np.argmax(shared, axis=0)
     return np.stack([offset, shared[best, np.arange(len(best))] / power, shifts[best]], axis=1)
 
 
 def importance(friction: Floats, linear: Floats, wavelength: Floats, slope: Floats) -> Floats:
     """Rms change of a curve for a unit of each, (N, 3), as a share of the range of `friction`."""
-    given = np.abs(np.fft.rfft(linear, axis=1)[:, 1:]) * np.sqrt(2.0) / linear.shape[1]
-    q = 2.0 * np.pi * np.arange(1, given.shape[1] + 1) / wavelength[:, None]
-    sizes = [slope, np.linalg.norm(given, axis=1), np.linalg.norm(q * given, axis=1)]
+    linearised = np.abs(np.fft.rfft(linear, axis=1)[:, 1:]) * np.sqrt(2.0) / linear.shape[1]
+    q = 2.0 * np.pi * np.arange(1, linearised.shape[1] + 1) / wavelength[:, None]
+    sizes = [slope, np.linalg.norm(linearised, axis=1), np.linalg.norm(q * linearised, axis=1)]
     return np.stack(sizes, axis=1) / np.ptp(friction, axis=1)[:, None]
 
 

@@ -106,13 +106,13 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
 
 def _compared(curve: FrictionCurve, signal: rendering.Signal, felt: Floats, speed: float) -> Rendering:
     frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
-    _, given = spectrum_of(curve.x, felt, speed)
+    _, rendered = spectrum_of(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
     bands = []
     for low, high in pairwise(BANDS):
         inside = (frequency > low) & (frequency <= high)
-        share = float(np.sum(wanted[inside] ** 2) / max(np.sum(wanted**2), 1e-300))
-        bands.append((low, high, _relative(given[inside], wanted[inside]), share))
+        fraction = float(np.sum(wanted[inside] ** 2) / max(np.sum(wanted**2), 1e-300))
+        bands.append((low, high, _relative(rendered[inside], wanted[inside]), fraction))
     return Rendering(
         curve=curve,
         signal=signal,
@@ -120,7 +120,7 @@ def _compared(curve: FrictionCurve, signal: rendering.Signal, felt: Floats, spee
         lost=np.abs(felt - curve.friction) > 10.0 * rendering.NOISE * np.abs(curve.friction).max(),
         force_error=_relative(felt, curve.friction),
         change_error=_relative(felt - felt.mean(), change),
-        spectrum_error=_relative(given, wanted),
+        spectrum_error=_relative(rendered, wanted),
         bands=tuple(bands),
     )
 

@@ -118,12 +118,12 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
         return Estimate(FrictionCurve(x, values, "as measured"), ())
     found = reduced(texture)
     steep = 2.0 * np.pi * found.amplitude / found.wavelength
-    c, d = (float(np.clip(share, -10.0, 10.0)) for share in (found.in_phase, found.in_quadrature))
+    c, d = (float(np.clip(ratio, -10.0, 10.0)) for ratio in (found.in_phase, found.in_quadrature))
     wanted = Parametric(found.wavelength, steep, c, d, touch.friction, touch.load, touch.ridged)
-    place = np.clip(wanted.point(), 0.0, 1.0)
-    near = at(place, touch.ridged)
+    location = np.clip(wanted.point(), 0.0, 1.0)
+    near = at(location, touch.ridged)
     database = shipped(touch.ridged)
-    response, near_by = database.estimator(place), database.estimator.near(place)
+    response, near_by = database.estimator(location), database.estimator.near(location)
     error = float(np.sqrt(near_by @ database.errors**2))
     x, mu, missing = _friction(texture, touch, near, response)
     notes = _notes(wanted, found, touch)
@@ -131,7 +131,7 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
         notes.append("the error of the estimate is more than half of the range that it shows")
     if missing:
         notes.append(f"no equilibrium was found on {missing:.0%} of the slide")
-    if not database.estimator.holds(place):
+    if not database.estimator.holds(location):
         notes.append("the texture is outside the hull of the database's points")
     curve = FrictionCurve(x, mu, "estimate", near.slope * error)
     return Estimate(curve, tuple(f"{note}: the model has no such limit" for note in notes), found)

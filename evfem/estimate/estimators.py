@@ -37,22 +37,22 @@ class Estimator:
     scale: Floats
     smoothing: float = 0.0
 
-    def __call__(self, place: Floats) -> Floats:
+    def __call__(self, location: Floats) -> Floats:
         """The response (M,) at a place (6,)."""
-        return np.asarray(self._surface((place * self.scale)[None])[0])
+        return np.asarray(self._surface((location * self.scale)[None])[0])
 
-    def near(self, place: Floats) -> Floats:
+    def near(self, location: Floats) -> Floats:
         """Weights (N,) of the points around a place, of sum 1."""
-        square = np.sum(((self.points - place) * self.scale) ** 2, axis=1)
+        square = np.sum(((self.points - location) * self.scale) ** 2, axis=1)
         weight = np.exp(-0.5 * (square - square.min()))
         return np.asarray(weight / weight.sum())
 
-    def holds(self, place: Floats) -> bool:
+    def holds(self, location: Floats) -> bool:
         """Whether a place is inside the hull of the points: a mean with weights that are not negative."""
         from scipy.optimize import linprog
 
         equations = np.concatenate([self.points.T, np.ones((1, len(self.points)))])
-        found = linprog(np.zeros(len(self.points)), A_eq=equations, b_eq=np.append(place, 1.0))
+        found = linprog(np.zeros(len(self.points)), A_eq=equations, b_eq=np.append(location, 1.0))
         return found.status == 0
 
     @cached_property
@@ -64,7 +64,7 @@ class Estimator:
 
     def left_out(self) -> Floats:
         """Leave-one-out prediction of each point's response, (N, M)."""
-        return np.array([self.without(i)(place) for i, place in enumerate(self.points)])
+        return np.array([self.without(i)(location) for i, location in enumerate(self.points)])
 
     def without(self, i: int) -> Estimator:
         """The same without point i."""

@@ -95,8 +95,8 @@ def at(point: Floats, ridged: bool) -> Parametric:
     3.0
     """
     values = {}
-    for share, (name, (low, high, logarithmic)) in zip(point.tolist(), RANGES.items(), strict=True):
-        value = low * (high / low) ** share if logarithmic else low + share * (high - low)
+    for fraction, (name, (low, high, logarithmic)) in zip(point.tolist(), RANGES.items(), strict=True):
+        value = low * (high / low) ** fraction if logarithmic else low + fraction * (high - low)
         values[name] = float(f"{value:.6g}")  # what stands in the shipped file is what was computed
     return Parametric(**values, ridged=ridged)
 

@@ -57,7 +57,7 @@ def slid(pad: PressedPad, ground: Any, friction: float, positions: Floats, speed
     for k, position in enumerate(positions.tolist()):
         start = late * (pad.base + lag * moved)
         moved, before = 2.0 * moved - before, moved
-        given, rest = moved, np.zeros(2 * n)
+        pushed, rest = moved, np.zeros(2 * n)
         for turn in range(MOST_ITERATIONS):
             x = position + pad.x + moved[n:]
             height, slope = ground.height(x), ground.slope(x)
@@ -66,10 +66,10 @@ def slid(pad: PressedPad, ground: Any, friction: float, positions: Floats, speed
             gap = pad.y - height + slope * moved[n:]
             balance = gap + start[:n] - slope * start[n:]
             force, bone = _balance(compliance, balance, slope, ways, touching, pad.load)
-            was, given_before, rest_before = touching, given, rest
-            given = start + compliance @ force
-            rest = given - moved
-            open_gap = gap + given[:n] - slope * given[n:] + bone
+            was, given_before, rest_before = touching, pushed, rest
+            pushed = start + compliance @ force
+            rest = pushed - moved
+            open_gap = gap + pushed[:n] - slope * pushed[n:] + bone
             touching = np.where(was, force[:n] > 0.0, open_gap < 0.0)
             same = np.array_equal(touching, was)
             if same and np.abs(rest).max() < AT_REST:
@@ -78,9 +78,9 @@ def slid(pad: PressedPad, ground: Any, friction: float, positions: Floats, speed
             if not (touching.any() and np.abs(rest).max() < LOST):
                 break
             change = rest - rest_before
-            share = float(rest @ change) / float(change @ change) if same and turn else 0.0
-            moved = given - share * (given - given_before)
-        moved = given
+            relaxation = float(rest @ change) / float(change @ change) if same and turn else 0.0
+            moved = pushed - relaxation * (pushed - given_before)
+        moved = pushed
         if np.isnan(found[k]):
             moved, before, touching = flat, flat, first
     return found[RUN_IN:]

@@ -71,9 +71,9 @@ class Cells:
 
     def __init__(self, eps_r: Any, shares: tuple[Floats, ...], x: Floats, levels: Floats) -> None:
         self.levels = levels
-        self.layer: Ints = np.repeat(np.arange(len(shares)), [share.size - 1 for share in shares])
-        self.low = np.concatenate([share[:-1] for share in shares])
-        self.rise = np.concatenate([np.diff(share) for share in shares])
+        self.layer: Ints = np.repeat(np.arange(len(shares)), [fraction.size - 1 for fraction in shares])
+        self.low = np.concatenate([fraction[:-1] for fraction in shares])
+        self.rise = np.concatenate([np.diff(fraction) for fraction in shares])
         self.eps = np.asarray(eps_r)[self.layer]
         self.lines, self.rows = x.size, self.layer.size
         self.per_line = 2 * self.rows + 1
@@ -111,16 +111,18 @@ class Cells:
 
     def potential(self, strips: Any | None, floating: bool) -> Any:
         """Potential (L, rows): 1 on the lowest curve (or strips), 0 on the highest; `floating`: no charge."""
-        given = np.zeros((2, self.lines, self.per_line))  # for the electrodes, and for 1 on the highest curve
-        given[1, :, -1] = 1.0
-        given[0, :, 0] = float(strips is None)
+        prescribed = np.zeros(
+            (2, self.lines, self.per_line)
+        )  # for the electrodes, and for 1 on the highest curve
+        prescribed[1, :, -1] = 1.0
+        prescribed[0, :, 0] = float(strips is None)
         held = [0, self.per_line - 1] if strips is None else [self.per_line - 1]
-        load = np.stack([self.load(one) for one in given[: 2 if floating else 1]])
+        load = np.stack([self.load(one) for one in prescribed[: 2 if floating else 1]])
         if strips is not None:
             load[0, :, 0] += strips.load()
         load[:, :, held] = 0.0
         free = _solved(self._band(strips, held), load.reshape(len(load), -1).T).T
-        phi = free.reshape(load.shape) + given[: len(load)]
+        phi = free.reshape(load.shape) + prescribed[: len(load)]
         if not floating:
             return phi[0]
         charges = [np.sum(self.load(one)[:, -1]) for one in phi]
@@ -155,7 +157,7 @@ class Cells:
         by_xi = (_BY_XI.reshape(6, 4).T @ parts).reshape(shape)
         by_eta = (_BY_ETA.reshape(6, 4).T @ parts).reshape(shape)
         weight = WEIGHTS[0] * WEIGHTS[1] * self.eps.real
-        along, across = (weight * (part * part.conj()).real for part in (by_xi, by_eta))
+        along, across = (weight * (term * term.conj()).real for term in (by_xi, by_eta))
         return Squares(along, 2.0 * weight * (by_xi * by_eta.conj()).real, across)
 
     def energy(self, found: Squares) -> float:
@@ -164,7 +166,7 @@ class Cells:
         parts = h / X * found.along - Y / X * found.mixed + (X + Y**2 / X) / h * found.across
         return float(np.sum(parts))
 
-    def by_x(self, found: Squares, share: Floats, rise: Floats) -> Floats:
+    def by_x(self, found: Squares, fraction: Floats, rise: Floats) -> Floats:
         """Derivative (L,) of the integral by the places of what moves along x with the lines: all of a
         row, or between its lower and upper side growing `share` (2, R) of it, by `rise` (R,).
         """
@@ -172,7 +174,7 @@ class Cells:
         turned = found.across / h
         normal = 0.5 * (h / X * found.along - Y / X * found.mixed + (Y**2 / X - X) * turned)
         shear = 0.5 * found.mixed - Y * turned
-        by_share = np.sum(-2.0 / X * share[:, None] * np.sum(normal, axis=0), axis=(0, 2))
+        by_share = np.sum(-2.0 / X * fraction[:, None] * np.sum(normal, axis=0), axis=(0, 2))
         by_rise = np.sum(-2.0 * rise / h * (shear - Y / X * normal), axis=(1, 3))  # (2, E)
         left, right = (_N[end] @ by_rise for end in (0, 1))
         return np.append(left - by_share, 0.0) + np.append(0.0, right + by_share)
@@ -187,18 +189,18 @@ class Cells:
         upper, lower = (np.sum(s[:, None] * by_slope, axis=0) for s in (self.share, 1.0 - self.share))
         for end, sign in ((0, -1.0), (1, 1.0)):
             own = np.tensordot(_N[end], by_height, 1)
-            for k, part in ((1, own + sign * upper), (0, sign * lower - own)):
+            for k, term in ((1, own + sign * upper), (0, sign * lower - own)):
                 for layer in range(len(self.levels) - 1):
                     at = self.layer == layer
-                    result[layer + k, end : end + self.lines - 1] += part[:, at].sum(axis=1)
+                    result[layer + k, end : end + self.lines - 1] += term[:, at].sum(axis=1)
         return result
 
     def heights(self) -> Floats:
         """Heights (L, rows) of the unknowns."""
         y = np.empty((self.lines, self.per_line))
         for r, layer in enumerate(self.layer):
-            for k, share in enumerate(self.low[r] + self.rise[r] * np.array([0.0, 0.5, 1.0])):
-                y[:, 2 * r + k] = (1.0 - share) * self.levels[layer] + share * self.levels[layer + 1]
+            for k, fraction in enumerate(self.low[r] + self.rise[r] * np.array([0.0, 0.5, 1.0])):
+                y[:, 2 * r + k] = (1.0 - fraction) * self.levels[layer] + fraction * self.levels[layer + 1]
         return y
 
 

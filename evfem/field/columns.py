@@ -104,16 +104,15 @@ class Strips:
         ends = np.sort([begin - depth, begin + depth, end - depth, end + depth], axis=0)
         self.width = np.diff(x)
         low, high = (
-            np.clip((place.ravel()[:, None] - x[:-1]) / self.width, 0.0, 1.0)
-            for place in (ends[:-1], ends[1:])
+            np.clip((edge.ravel()[:, None] - x[:-1]) / self.width, 0.0, 1.0) for edge in (ends[:-1], ends[1:])
         )  # (3 K, E)
         at = low[..., None] + (high - low)[..., None] * AT  # (3 K, E, q)
         over = self.over(x[:-1, None] + at * self.width[:, None], np.tile(np.arange(begin.size), 3))
-        share = over * (high - low)[..., None] * WEIGHTS
-        self.weight = eps_r / depth * share
+        fraction = over * (high - low)[..., None] * WEIGHTS
+        self.weight = eps_r / depth * fraction
         self.voltage = np.tile(voltage, 3)[:, None, None]
         self.shapes = np.stack([1.0 - at, at])  # (2, 3 K, E, q)
-        whole = self.width * (1.0 - 2.0 / 3.0 * share.sum(axis=(0, 2)))
+        whole = self.width * (1.0 - 2.0 / 3.0 * fraction.sum(axis=(0, 2)))
         self.along = eps_r * depth * whole / self.width**2  # (E,)
         every = np.arange(begin.size)
         lines = self.over(np.broadcast_to(x, (begin.size, x.size))[..., None], every)[..., 0]  # (K, L)
@@ -123,7 +122,7 @@ class Strips:
     def over(self, x: Floats, electrode: Ints) -> Floats:
         """The share within the depth to either side of places (k, ..., q) that is electrode k."""
         begin, end, _ = self.pieces[electrode].T[:, :, None, None]
-        up, down = (np.clip((x - place) / (2.0 * self.depth) + 0.5, 0.0, 1.0) for place in (begin, end))
+        up, down = (np.clip((x - edge) / (2.0 * self.depth) + 0.5, 0.0, 1.0) for edge in (begin, end))
         return np.asarray(up - down)
 
     def matrix(self) -> tuple[Floats, Floats]:

@@ -109,9 +109,9 @@ def _cut(p: Any, begin: Floats, end: Floats, parts: Ints) -> tuple[Any, Floats]:
     """Points (M,) of the curve, complex, and the curvatures (2, M) on their left and on their right."""
     chord = np.repeat(np.arange(parts.size), parts)
     t = (np.arange(chord.size) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[chord]
-    way = np.diff(p)[chord]
+    chords = np.diff(p)[chord]
     bulge = t * (1.0 - t) / 6.0 * ((2.0 - t) * begin[chord] + (1.0 + t) * end[chord])
-    points = np.append(p[:-1][chord] + way * (1.0 * t - 1j * np.abs(way) * bulge), p[-1])
+    points = np.append(p[:-1][chord] + chords * (1.0 * t - 1j * np.abs(chords) * bulge), p[-1])
     right = np.append((1.0 - t) * begin[chord] + t * end[chord], begin[0])
     left = np.append(end[-1], right[1:])
     left[np.cumsum(parts)] = end
@@ -120,11 +120,11 @@ def _cut(p: Any, begin: Floats, end: Floats, parts: Ints) -> tuple[Any, Floats]:
 
 def _outwards(outline: Outline, points: Any, sides: Floats, smooth: Any) -> Any:
     """By how much points (complex) are moved so that chords have the curve's area."""
-    way = np.diff(points)
+    chords = np.diff(points)
     if outline.periodic:
-        around = np.concatenate([way[-1:], way, way[:1]])
+        around = np.concatenate([chords[-1:], chords, chords[:1]])
     else:
-        around = np.concatenate([way[:1], way, way[-1:]])
+        around = np.concatenate([chords[:1], chords, chords[-1:]])
         sides = sides.copy()
         sides[0, 0], sides[1, -1] = sides[1, 0], sides[0, -1]
         smooth = smooth | (np.arange(points.size) % (points.size - 1) == 0)

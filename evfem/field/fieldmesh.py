@@ -67,10 +67,10 @@ class FieldMesh:
         local = np.empty((2, x.size))
         for k in range(x.size):
             own = slice(ends[at[k]], ends[at[k] + 1])
-            share = (x[k] - edges[at[k]]) / (edges[at[k] + 1] - edges[at[k]])
+            fraction = (x[k] - edges[at[k]]) / (edges[at[k] + 1] - edges[at[k]])
             corners = self.points[1][cells[:, own]]
-            low = (1.0 - share) * corners[0] + share * corners[1]
-            high = (1.0 - share) * corners[3] + share * corners[2]
+            low = (1.0 - fraction) * corners[0] + fraction * corners[1]
+            high = (1.0 - fraction) * corners[3] + fraction * corners[2]
             row = min(int(np.searchsorted(low, y[k], side="right")) - 1, low.size - 1)
             if np.isinf(y[k]):  # the end of the air below the body, not of that above it
                 gaps = np.flatnonzero(cells[3, own][:-1] != cells[0, own][1:])
@@ -78,7 +78,7 @@ class FieldMesh:
             if row < 0 or (np.isfinite(y[k]) and y[k] > high[row]):
                 raise InputError("y", float(y[k]), f"places in slab or air: {low[0]:g} to {high[-1]:g} mm")
             found[k] = own.start + row
-            local[:, k] = share, min(1.0, (y[k] - low[row]) / (high[row] - low[row]))
+            local[:, k] = fraction, min(1.0, (y[k] - low[row]) / (high[row] - low[row]))
         return order[found], local
 
 
@@ -142,8 +142,8 @@ def rows_of(runs: list[Run], corners: list[Floats], near: list[Floats], thicknes
         if run.rank == 1:
             lower = min(lower, float(np.min(size / run.height)))
             continue
-        share = np.interp(run.x, run.x[[0, -1]], run.shares)
-        block = run.height * (1.0 - share)
+        fraction = np.interp(run.x, run.x[[0, -1]], run.shares)
+        block = run.height * (1.0 - fraction)
         high = block > 0.0
         above[1] = min(above[1], float((size[high] / block[high]).min()))
     for run, other, foot, end in _walls(runs, corners):
@@ -204,8 +204,8 @@ class _Grid:
             self._add(runs[k], lines[k], slice(places[k], places[k + 1]))
 
     def _fill(self, block: int, at: slice, low: Floats, high: Floats) -> None:
-        share = self.rows.blocks[block][:, None]
-        self.y[self.tops[block] : self.tops[block + 1] + 1, at] = low + share * (high - low)
+        fraction = self.rows.blocks[block][:, None]
+        self.y[self.tops[block] : self.tops[block + 1] + 1, at] = low + fraction * (high - low)
 
     def _add(self, run: Run, x: Floats, cells: slice) -> None:
         at = slice(cells.start, cells.stop + 1)
@@ -235,9 +235,9 @@ class _Grid:
         y = np.full((self.y.shape[0], away.size), np.nan)
         y[: self.tops[0] + 1] = self.rows.slab[:, None]
         levels = [0.0 * fan, low + 0.0 * fan, 0.5 * (low + lid + fan), lid + fan, top + 0.0 * fan]
-        for k, share in enumerate(self.rows.blocks):
+        for k, fraction in enumerate(self.rows.blocks):
             rows = slice(self.tops[k], self.tops[k + 1] + 1)
-            y[rows] = levels[k] + share[:, None] * (levels[k + 1] - levels[k])
+            y[rows] = levels[k] + fraction[:, None] * (levels[k + 1] - levels[k])
         x = self.x[end] + (away if end else -away)
         self.y[:, end] = y[:, 0]
         order = slice(1, None) if end else slice(None, 0, -1)

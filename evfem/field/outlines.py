@@ -74,8 +74,8 @@ class Outline:
         x = np.atleast_1d(np.asarray(finite("x", x, "places in mm, finite numbers"), dtype=float))
         height = np.atleast_1d(np.asarray(finite("height", height, "heights in mm"), dtype=float))
         if x.ndim != 1 or x.size < 2 or height.shape != x.shape:
-            given = f"shapes {x.shape} and {height.shape}"
-            raise InputError("x, height", given, "two rows of numbers, of the same length, at least 2")
+            shapes = f"shapes {x.shape} and {height.shape}"
+            raise InputError("x, height", shapes, "two rows of numbers, of the same length, at least 2")
         if np.any(np.diff(x) < 0.0) or x[-1] <= x[0]:
             raise InputError("x", "places that go back", "places that do not decrease; equal ones are a wall")
         if height.min() < 0.0:
@@ -182,23 +182,23 @@ def _without_end_walls(x: Floats, height: Floats) -> tuple[Floats, Floats]:
 def _upright(x: Floats, height: Floats) -> Floats:
     """The places, where what is nearly a wall between two corners stands upright on its foot."""
     x, dx, dh = x.copy(), np.diff(x), np.diff(height)
-    way = np.where(np.abs(dh) > WALL * dx, np.sign(dh), 0.0) * (dx > 0.0)
-    cuts = np.flatnonzero(np.diff(way)) + 1
-    for a, b in pairwise([0, *cuts, way.size]):
-        if way[a] == 0.0:
+    step = np.where(np.abs(dh) > WALL * dx, np.sign(dh), 0.0) * (dx > 0.0)
+    cuts = np.flatnonzero(np.diff(step)) + 1
+    for a, b in pairwise([0, *cuts, step.size]):
+        if step[a] == 0.0:
             continue
         beyond = [(dx[k] + 1j * dh[k]) / (dx[own] + 1j * dh[own])
-                  for k, own in ((a - 1, a), (b, b - 1)) if 0 <= k < way.size]  # fmt: skip
+                  for k, own in ((a - 1, a), (b, b - 1)) if 0 <= k < step.size]  # fmt: skip
         if all(abs(np.angle(ratio)) >= TURN for ratio in beyond):
-            x[a : b + 1] = x[a if way[a] > 0.0 else b]
+            x[a : b + 1] = x[a if step[a] > 0.0 else b]
     return x
 
 
 def _straight(x: Floats, height: Floats) -> Any:
     """Inner points on the line between their neighbours."""
-    way = np.diff(x) + 1j * np.diff(height)
-    turned = np.abs((way[1:] * way[:-1].conj()).imag) <= STRAIGHT * np.abs(way[1:] * way[:-1])
-    return turned & ((way[1:] * way[:-1].conj()).real > 0.0)
+    step = np.diff(x) + 1j * np.diff(height)
+    turned = np.abs((step[1:] * step[:-1].conj()).imag) <= STRAIGHT * np.abs(step[1:] * step[:-1])
+    return turned & ((step[1:] * step[:-1].conj()).real > 0.0)
 
 
 def _without_repetitions(x: Floats, height: Floats) -> Floats:
@@ -258,7 +258,7 @@ def corner_sizes(outline: Outline, runs: list[Run], reduced: float) -> list[Floa
     angle = np.pi + np.angle(out / into) if outline.periodic else np.pi + _turn(out / into)
     power = np.pi / np.maximum(angle, 1e-3)
     with np.errstate(divide="ignore", over="ignore"):
-        wide, close = ((share / (power - 1.0) ** 2) ** (0.5 / power) for share in (CORNER, TIP))
+        wide, close = ((error / (power - 1.0) ** 2) ** (0.5 / power) for error in (CORNER, TIP))
         sizes = np.maximum(np.minimum((h + reduced) * wide, h * close), still)
     at, radius = outline.smooth
     known = np.isin(x, at)

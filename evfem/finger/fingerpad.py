@@ -77,11 +77,11 @@ _MESH |= {"key": "mesh", "type": str, "file": meshfile.LARGEST}
 _REGIONS: dict[str, Any] = {"allowed": 'a table name = number, or name = "group of the file"'}
 
 
-def _regions(key: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
-    for region in given.values():
+def _regions(key: str, problem: Mapping[str, Any]) -> Mapping[str, Any]:
+    for region in problem.values():
         if isinstance(region, bool) or not isinstance(region, Integral | str):
             raise InputError(key, quoted(region), _REGIONS["allowed"])
-    return given
+    return problem
 
 
 _REGIONS["check"] = _regions
@@ -149,11 +149,11 @@ class FingerPad(LayeredFinger):
                 set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
                 _check_alone(self)
         mistakes.report()
-        self._complete()
+        self._with_default_laws()
         _check_section(self, self._shape)
 
     @property
-    def _facts(self) -> tuple[dict[str, str], set[str]]:
+    def _summary(self) -> tuple[dict[str, str], set[str]]:
         ridges = f"{self.ridge_height:g} mm high, every {self.ridge_width:g} mm" if self.ridges else "none"
         told = {"width", "height", "ridges", "ridge_scan", "ridge_height", "ridge_width", "resolution"}
         facts = {
@@ -201,8 +201,8 @@ def _check_alone(pad: FingerPad) -> None:
     """Refuse a formula of ridges, or none, beside scanned ones."""
     for name in PROFILE:
         if getattr(pad, name) != getattr(FingerPad, name):
-            given = f"{name} = {getattr(pad, name)} beside a scan"
-            raise InputError(f"finger.{name}", given, "one of the two: the scan has the ridges as they are")
+            problem = f"{name} = {getattr(pad, name)} beside a scan"
+            raise InputError(f"finger.{name}", problem, "one of the two: the scan has the ridges as they are")
 
 
 def _check_section(pad: FingerPad, section: Section) -> None:
@@ -237,9 +237,9 @@ def _check_section(pad: FingerPad, section: Section) -> None:
 def _check_scan(ridges: ScannedRidges, slope: float, spacing: float) -> None:
     missed, most = ridges.missed(spacing), MISSED * ridges.height
     if slope > STEEPEST or missed > most:
-        given = f"slopes up to {slope:.3g}, and {missed:.3g} mm of depth between two nodes"
+        problem = f"slopes up to {slope:.3g}, and {missed:.3g} mm of depth between two nodes"
         allowed = f"slopes up to {STEEPEST:g}, and at most {most:.3g} mm: a smoother scan, "
-        raise InputError("finger.ridge_scan", given, allowed + "or a finer finger.resolution")
+        raise InputError("finger.ridge_scan", problem, allowed + "or a finer finger.resolution")
 
 
 @dataclass(frozen=True)
@@ -285,8 +285,8 @@ class MeshedFinger:
         if order == 2:
             return raised(self._own)
         if self._own.order == 2:
-            given = f"a linear element on a mesh of {self._own.kind}"
-            raise InputError("solver.element", given, "q2 or q2p1 (p2 on triangles, hex27p1 on hexahedra)")
+            problem = f"a linear element on a mesh of {self._own.kind}"
+            raise InputError("solver.element", problem, "q2 or q2p1 (p2 on triangles, hex27p1 on hexahedra)")
         return self._own
 
     @cached_property

@@ -1,7 +1,7 @@
-r"""Ridges of a whole finger pad, as a depth below the crests over x and z (mm) of the smooth pad.
+r"""Fingerprint of a whole pad: depth below the crests as a function of x and z (mm) of the smooth pad.
 
-A pattern is a phase :math:`\varphi(x, z)` that grows by one from crest to crest; the profile
-across a ridge is that of the plane's ridges (`evfem.finger.outline`). With the pitch p:
+A pattern is a phase :math:`\varphi(x, z)` that increases by one from crest to crest; the profile
+across a ridge is that of the cross-section (`evfem.finger.outline`). With the pitch p:
 
 =========  ================================================================================
 along      :math:`\varphi = x/p`: the ridges run along the finger, as in its cross-section
@@ -36,9 +36,9 @@ from evfem.finger.outline import Ridges, quintic
 LOOP_TILT = 20.0
 #: rise of an arch and its half width (mm)
 ARCH_RISE, ARCH_WIDTH = 1.5, 2.5
-#: part of the fine rectangle, from its middle, in which ridges have their full height
+#: fraction of the refined rectangle, from its middle, in which ridges have their full height
 FULL = 0.875
-#: most values of a measured print, and what one is
+#: largest number of values of a measured fingerprint, and its admissible values
 MOST = 4_000_000
 ALLOWED = "increasing x and z (mm), and finite heights (mm) in one row for each z"
 
@@ -64,8 +64,8 @@ PATTERNS: Mapping[str, Callable[[Floats, Floats], Floats]] = {
 
 
 @dataclass(frozen=True)
-class Print:
-    """Ridges of a pattern with the plane's profile."""
+class FingerprintPattern:
+    """Ridges that follow a pattern, with the profile of the cross-section."""
 
     pattern: str
     profile: Ridges
@@ -77,8 +77,8 @@ class Print:
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
-    """A measured print: `height` (rows, columns) in mm at `z` (rows,) and `x` (columns,), both
-    increasing; linear in between, its edges go on beyond them.
+    """A measured fingerprint: `height` (rows, columns) in mm at `z` (rows,) and `x` (columns,), both
+    increasing; bilinear in between, constant beyond its edges.
 
     >>> flat = HeightMap(x=[0.0, 1.0], z=[0.0, 2.0], height=[[0.0, 0.1], [0.0, 0.1]])
     >>> flat.depth(np.array([0.5, 3.0]), np.array([1.0, 1.0])).tolist()
@@ -105,7 +105,7 @@ class HeightMap:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """Its data as a scene file holds them."""
+        """Its data for a scene file."""
         return {"x": self.x.tolist(), "z": self.z.tolist(), "height": self.height.tolist()}
 
     def depth(self, x: Floats, z: Floats) -> Floats:
@@ -116,15 +116,17 @@ class HeightMap:
         return np.asarray(float(h.max()) - (low * (1.0 - s) + high * s))
 
 
-def _between(grid: Floats, places: Floats) -> tuple[Any, Floats]:
-    """Interval of the grid and the part of it where the places lie."""
-    i = np.clip(np.searchsorted(grid, places, side="right") - 1, 0, len(grid) - 2)
-    return i, np.clip((places - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
+def _between(grid: Floats, positions: Floats) -> tuple[Any, Floats]:
+    """Interval of the grid that contains each position, and the fraction of it passed."""
+    i = np.clip(np.searchsorted(grid, positions, side="right") - 1, 0, len(grid) - 2)
+    return i, np.clip((positions - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
 
 
-def faded(depth: Floats, share: Floats) -> Floats:
-    """Depths fading to the fine rectangle's edge; `share` (..., 2): 0 in its middle, 1 at its edges."""
-    fade = quintic((1.0 - np.abs(share)) / (1.0 - FULL))
+def faded(depth: Floats, fraction: Floats) -> Floats:
+    """Depths that fade to 0 at the edge of the refined rectangle; `fraction` (..., 2): 0 in its middle, 1 at
+    its edges.
+    """
+    fade = quintic((1.0 - np.abs(fraction)) / (1.0 - FULL))
     return np.asarray(depth * fade[..., 0] * fade[..., 1])
 
 
@@ -153,7 +155,7 @@ def _from_image(path: Path, pixel: float, height: float, dark: str | None) -> He
     if dark is None:
         allowed = "ridges | grooves: what is dark in a picture of a print; scanners and ink show ridges dark"
         raise InputError("finger.ridge_dark", f"nothing for {path.name}", allowed)
-    share = (grey[::-1] - grey.min()) / np.ptp(grey)
+    fraction = (grey[::-1] - grey.min()) / np.ptp(grey)
     rows, columns = grey.shape
     x, z = (pixel * (np.arange(n) - 0.5 * (n - 1)) for n in (columns, rows))
-    return HeightMap(x, z, height * (1.0 - share if dark == "ridges" else share))
+    return HeightMap(x, z, height * (1.0 - fraction if dark == "ridges" else fraction))

@@ -22,7 +22,7 @@ from evfem.common.views import short
 from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
 from evfem.finger.fingerpad import FingerPad
-from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
+from evfem.finger.fingerprint import PATTERNS, HeightMap, FingerprintPattern
 from evfem.finger.layers import NAIL, thickness_of
 from evfem.finger.outline import Ridges
 from evfem.finger.sizes import (
@@ -142,7 +142,7 @@ class Fingertip(LayeredFinger):
             if not mistakes.found:
                 set_frozen(self, ridges=_ridges(self))
         mistakes.report()
-        self._complete()
+        self._with_default_laws()
         _check_shape(self, self._shape)
 
     @classmethod
@@ -152,7 +152,7 @@ class Fingertip(LayeredFinger):
         return sizes | {"length": length, "bone_length": cls.bone_length * length / cls.length}
 
     @property
-    def _facts(self) -> tuple[dict[str, str], set[str]]:
+    def _summary(self) -> tuple[dict[str, str], set[str]]:
         facts = {
             "ellipsoid": f"{self.width:g} x {self.height:g} x {self.length:g} mm",
             "ridges": short(self.ridges),
@@ -166,9 +166,9 @@ class Fingertip(LayeredFinger):
         if isinstance(self.ridges, HeightMap):
             shape = float(scaled_jacobian(mesh).min())
             if not shape > SMALLEST_SHAPE:
-                given = f"a print that leaves cells with a scaled Jacobian of {shape:.2g}"
+                problem = f"a print that leaves cells with a scaled Jacobian of {shape:.2g}"
                 allowed = "a smoother or lower print, or a finer finger.resolution or finger.ridge_width"
-                raise InputError("finger.ridges", quoted(given), allowed)
+                raise InputError("finger.ridges", quoted(problem), allowed)
         return mesh
 
     @property
@@ -179,7 +179,7 @@ class Fingertip(LayeredFinger):
         if self.ridges == "none":
             relief = None
         elif isinstance(self.ridges, str):
-            relief = Print(self.ridges, self._profile)
+            relief = FingerprintPattern(self.ridges, self._profile)
         return Solid(
             outer,
             Ellipsoid(*axes, self.bone_offset),
@@ -241,18 +241,18 @@ FINGERS: Mapping[str, Any] = {"pad": FingerPad, "fingertip": Fingertip}
 
 def _ridges(tip: Fingertip) -> str | HeightMap:
     """Name of the pattern, or the measured print."""
-    given = tip.ridges
-    if isinstance(given, HeightMap):
-        return given
-    if isinstance(given, Mapping) and set(given) == {"x", "z", "height"}:
-        return HeightMap(**given)
-    if isinstance(given, bool):
-        return "along" if given else "none"
-    if isinstance(given, str) and given in ("none", *PATTERNS):
-        return given
-    if isinstance(given, str | os.PathLike) and _is_file(os.fspath(given)):
-        return fingerprint.read(Path(given), tip.ridge_pixel, tip.ridge_height, tip.ridge_dark)
-    raise InputError("finger.ridges", quoted(given), _RIDGES)
+    pattern = tip.ridges
+    if isinstance(pattern, HeightMap):
+        return pattern
+    if isinstance(pattern, Mapping) and set(pattern) == {"x", "z", "height"}:
+        return HeightMap(**pattern)
+    if isinstance(pattern, bool):
+        return "along" if pattern else "none"
+    if isinstance(pattern, str) and pattern in ("none", *PATTERNS):
+        return pattern
+    if isinstance(pattern, str | os.PathLike) and _is_file(os.fspath(pattern)):
+        return fingerprint.read(Path(pattern), tip.ridge_pixel, tip.ridge_height, tip.ridge_dark)
+    raise InputError("finger.ridges", quoted(pattern), _RIDGES)
 
 
 def _check_shape(tip: Fingertip, solid: Solid) -> None:

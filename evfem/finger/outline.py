@@ -1,4 +1,4 @@
-"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its lower side."""
+"""Outline of a finger pad's cross-section: an ellipse with fingerprint ridges on its lower side."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from evfem.common.arrays import Floats
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x axis."""
+    """Ellipse with semi-axes a, b (mm) and centre (0, `centre`); eccentric angle theta from the +x axis."""
 
     a: float
     b: float
@@ -20,11 +20,11 @@ class Ellipse:
 
     @property
     def smallest_radius(self) -> float:
-        """Smallest radius of curvature: normal offsets inwards must stay below it."""
+        """Smallest radius of curvature; inward normal offsets must be smaller."""
         return min(self.a**2 / self.b, self.b**2 / self.a)
 
     def point(self, theta: Floats) -> Floats:
-        """Points (N, 2)."""
+        """Points (N, 2) on the ellipse."""
         return np.column_stack([self.a * np.cos(theta), self.centre + self.b * np.sin(theta)])
 
     def normal(self, theta: Floats) -> Floats:
@@ -32,14 +32,14 @@ class Ellipse:
         n = np.column_stack([self.b * np.cos(theta), self.a * np.sin(theta)])
         return n / np.hypot(n[:, 0], n[:, 1])[:, None]
 
-    def towards(self, points: Floats) -> Floats:
-        """Intersections of the ellipse with the lines from its centre to `points` (N, 2), (N, 2)."""
+    def radial_projection(self, points: Floats) -> Floats:
+        """Radial projection (N, 2) of `points` (N, 2) from the centre onto the ellipse."""
         centre = np.array([0.0, self.centre])
         away = points - centre
         return centre + away / np.hypot(away[:, 0] / self.a, away[:, 1] / self.b)[:, None]
 
-    def evenly(self, start: float, end: float, count: int) -> Floats:
-        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between them."""
+    def equal_arc_angles(self, start: float, end: float, count: int) -> Floats:
+        """`count` + 1 eccentric angles from `start` to `end` at equal arc lengths."""
         fine = np.linspace(start, end, 2001)
         middle = 0.5 * (fine[1:] + fine[:-1])
         speed = np.hypot(self.a * np.sin(middle), self.b * np.cos(middle))
@@ -49,12 +49,12 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Ridges:
-    """Depth below the crest line over the abscissa x of the ellipse (mm).
+    """Ridge profile: depth below the crest line as a function of the abscissa x of the ellipse (mm).
 
     t = |x - crest| / (pitch/2) runs from 0 at a crest to 1 in a groove; crests at x = (k + phase) pitch.
     Rounded (`crest` = 0): depth = height * t**exponent. Flat-topped: crest and groove are flat over these
     fractions of the pitch, depth = height (1 - cos(pi s)) / 2 on the walls. Faded from |x| = `full` to `end`
-    by a quintic step.
+    with a quintic step.
     """
 
     height: float
@@ -78,7 +78,7 @@ class Ridges:
         return self.below(x) * quintic((self.end - np.abs(x)) / (self.end - self.full))
 
     def below(self, x: Floats) -> Floats:
-        """The same of ridges that do not fade."""
+        """The same without the fading towards the ends."""
         t = 2.0 * np.abs((x / self.pitch - self.phase + 0.5) % 1.0 - 0.5)
         if self.crest == 0.0:
             shape = t**self.exponent
@@ -98,19 +98,19 @@ def quintic(s: Floats) -> Floats:
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
-def in_layers(
+def layer_coordinates(
     foot: Floats, normal: Floats, depth: Floats, level: Floats, to_bone: Callable[[Floats], Floats]
 ) -> Floats:
-    """Points (N, d) at levels (N,) counted in layers: 0 the surface, 1 below the outermost ...
+    """Points (N, d) at layer coordinates `level` (N,): 0 on the surface, 1 on the first interface, and so on.
 
-    Surface and interfaces lie at depths (layers, N) below the feet (N, d) of the normals; from the last one
-    straight lines lead `to_bone`.
+    Surface and interfaces lie at depths (layers, N) along the normals with feet (N, d) on the smooth
+    outline; below the last interface points lie on straight lines `to_bone`.
     """
     innermost, index = len(depth) - 1, np.arange(len(level))
     layer = np.minimum(level.astype(int), innermost)
-    part = (level - layer)[:, None]
+    fraction = (level - layer)[:, None]
     upper, lower = (depth[np.minimum(one, innermost), index][:, None] for one in (layer, layer + 1))
-    skin = foot - ((1.0 - part) * upper + part * lower) * normal
+    skin = foot - ((1.0 - fraction) * upper + fraction * lower) * normal
     inside = foot - depth[innermost][:, None] * normal
-    deep = inside + part * (to_bone(inside) - inside)
+    deep = inside + fraction * (to_bone(inside) - inside)
     return np.where((layer == innermost)[:, None], deep, skin)

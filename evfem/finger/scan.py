@@ -49,12 +49,12 @@ class RidgeScan:
     y: Any = None
 
     def __post_init__(self) -> None:
-        given = [name for name in ("height", "y") if getattr(self, name) is not None]
-        if len(given) != 1:
+        columns = [name for name in ("height", "y") if getattr(self, name) is not None]
+        if len(columns) != 1:
             raise InputError(
-                "finger.ridge_scan", " and ".join(given) or "neither height nor y", "one of the two"
+                "finger.ridge_scan", " and ".join(columns) or "neither height nor y", "one of the two"
             )
-        (name,) = given
+        (name,) = columns
         x = numbers("finger.ridge_scan.x", self.x, "a list of positions in mm")
         values = numbers(f"finger.ridge_scan.{name}", getattr(self, name), "a list of lengths in mm")
         if not 3 <= len(x) <= MOST or len(x) != len(values):
@@ -71,27 +71,27 @@ class RidgeScan:
         """The scan in a file with the header `x,height` or `x,y` and one point (mm) in each line."""
         table = read_headed(Path(path), "finger.ridge_scan", ALLOWED, gaps=False)
         if table.names not in (["x", "height"], ["x", "y"]):
-            given = f"{Path(path).name} with the header {','.join(table.names)[:60]!r}"
-            raise InputError("finger.ridge_scan", given, ALLOWED)
+            problem = f"{Path(path).name} with the header {','.join(table.names)[:60]!r}"
+            raise InputError("finger.ridge_scan", problem, ALLOWED)
         return cls(**{name: table.column("finger.ridge_scan", name, ("mm",)) for name in table.names})
 
     @classmethod
-    def of(cls, given: Any) -> RidgeScan:
+    def of(cls, source: Any) -> RidgeScan:
         """A scan, or one made of a texture of heights, whose middle comes below the middle of the finger, of
         the path of its file, or of its columns {"x": ..., "y": ...}.
         """
-        if isinstance(given, RidgeScan):
-            return given
-        if is_texture(given):
-            if given.quantity != "height":
-                raise InputError("finger.ridges", f"a texture of {given.quantity}", "a texture of heights")
-            x = np.asarray(given.x)
-            return cls(x - 0.5 * (x[0] + x[-1]), height=given.values)
-        if isinstance(given, (str, Path)):
-            return cls.from_csv(given)
-        if isinstance(given, Mapping) and set(given) in ({"x", "height"}, {"x", "y"}):
-            return cls(**given)
-        raise InputError("finger.ridge_scan", quoted(given), f"a RidgeScan, or {ALLOWED}")
+        if isinstance(source, RidgeScan):
+            return source
+        if is_texture(source):
+            if source.quantity != "height":
+                raise InputError("finger.ridges", f"a texture of {source.quantity}", "a texture of heights")
+            x = np.asarray(source.x)
+            return cls(x - 0.5 * (x[0] + x[-1]), height=source.values)
+        if isinstance(source, (str, Path)):
+            return cls.from_csv(source)
+        if isinstance(source, Mapping) and set(source) in ({"x", "height"}, {"x", "y"}):
+            return cls(**source)
+        raise InputError("finger.ridge_scan", quoted(source), f"a RidgeScan, or {ALLOWED}")
 
     @property
     def columns(self) -> dict[str, list[float]]:
@@ -112,9 +112,9 @@ class RidgeScan:
         if self.height is not None:
             return self.x, self.height.max() - self.height
         if np.abs(self.x).max() >= outer.a:
-            given = f"x from {self.x[0]:g} to {self.x[-1]:g} mm"
+            problem = f"x from {self.x[0]:g} to {self.x[-1]:g} mm"
             raise InputError(
-                "finger.ridge_scan", given, f"an outline within {outer.a:g} mm, half of finger.width"
+                "finger.ridge_scan", problem, f"an outline within {outer.a:g} mm, half of finger.width"
             )
         lift = 0.0
         for _ in range(ITERATIONS):
@@ -124,16 +124,16 @@ class RidgeScan:
                 break
             lift -= below[crest] / down[crest]
         if (np.diff(foot) <= 0.0).any():
-            given = "an outline that is folded, seen from the ellipse"
+            problem = "an outline that is folded, seen from the ellipse"
             raise InputError(
-                "finger.ridge_scan", given, "one that fits finger.width and finger.height, smoothed"
+                "finger.ridge_scan", problem, "one that fits finger.width and finger.height, smoothed"
             )
         return foot, below
 
 
-def is_texture(given: Any) -> bool:
+def is_texture(source: Any) -> bool:
     """Whether this is what `evfem texture import` made of a file."""
-    return all(hasattr(given, name) for name in ("quantity", "x", "values"))
+    return all(hasattr(source, name) for name in ("quantity", "x", "values"))
 
 
 def _projected(outer: Ellipse, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:

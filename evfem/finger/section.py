@@ -16,7 +16,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.finger.lattice import Lattice, ring
 from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
-from evfem.finger.outline import Ellipse, Ridges, in_layers
+from evfem.finger.outline import Ellipse, Ridges, layer_coordinates
 from evfem.finger.scan import ScannedRidges
 from evfem.mesh.mesh import Mesh
 
@@ -95,7 +95,7 @@ class Section:
     def _points(self, lattice: Lattice, columns: Columns, depth: Floats) -> Floats:
         foot, normal, interfaces = columns.at(lattice.u)
         level = np.interp(lattice.r, np.arange(len(depth)), depth)
-        return in_layers(foot, normal, interfaces, level, self.bone.towards)
+        return layer_coordinates(foot, normal, interfaces, level, self.bone.radial_projection)
 
     def _named(self, points: Floats, lattice: Lattice, columns: Columns, rows: list[int], order: int) -> Mesh:
         numbers = {layer.name: layer.number for layer in (*self.layers, NAIL)}
@@ -175,10 +175,14 @@ class Columns:
         right_stops = [float(pad[-1]), 0.0, edge, np.pi / 2]
         left_stops = [-1.5 * np.pi, -np.pi - edge, -np.pi, float(pad[0])]
         counts = [left, upper, side, base, side, upper, right]
-        arcs = [outer.evenly(*ends, n)[:-1] for ends, n in zip(pairwise(left_stops), counts[:3], strict=True)]
+        arcs = [
+            outer.equal_arc_angles(*ends, n)[:-1]
+            for ends, n in zip(pairwise(left_stops), counts[:3], strict=True)
+        ]
         arcs.append(pad[:-1])
         arcs += [
-            outer.evenly(*ends, n)[:-1] for ends, n in zip(pairwise(right_stops), counts[4:], strict=True)
+            outer.equal_arc_angles(*ends, n)[:-1]
+            for ends, n in zip(pairwise(right_stops), counts[4:], strict=True)
         ]
         return np.append(np.concatenate(arcs), np.pi / 2), counts
 

@@ -1,4 +1,4 @@
-"""Common to a cross-section and a whole pad: sizes with ranges and meanings, and their consistency."""
+"""Parameters of cross-section and whole pad: ranges, meanings and consistency checks."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from evfem.protocols import Material
 from evfem.tissue.laws import LAWS, NeoHookean
 from evfem.tissue.ogden import BRANCHES, BulkRelaxes, Pairs
 
-#: What can be meshed well: the largest slope of the wall of a rounded and of a flat-topped ridge, and the
+#: Limits of what can be meshed: largest slope of the walls of rounded and of flat-topped ridges, and
 #: smallest distance between bone and dermis (mm).
 STEEPEST, STEEPEST_FLAT, CLEARANCE = 4.88, 3.5, 0.3
 
-_PART = {"of": "of the pitch"}
+_PITCHES = {"of": "of the pitch"}
 
 
 def thickness_range(name: str) -> dict[str, Any]:
-    """Rule of a layer's thickness."""
+    """Admissible range of a layer's thickness."""
     (found,) = (layer.thickness for layer in (*LAYERS, NAIL) if layer.name == name and layer.thickness)
     return between(found.lowest, found.highest, "mm")
 
@@ -61,7 +61,7 @@ class Electrical(Checked):
     _table = "finger.electrical."
 
 
-#: What grows with the width of the finger from participant to participant.
+#: Parameters that are scaled with the width of a participant's finger.
 WITH_WIDTH = (
     "nail_thickness",
     "nail_width",
@@ -90,10 +90,10 @@ class LayeredFinger:
         float, between(-1.0, 1.0, "pitches"), "0: a crest in the middle, 0.5: a groove"
     ] = 0.0
     ridge_crest: Annotated[
-        float, between(0.0, 0.9, "pitches", **_PART), "flat part of a crest; 0: rounded ridges"
+        float, between(0.0, 0.9, "pitches", **_PITCHES), "flat part of a crest; 0: rounded ridges"
     ] = 0.0
     ridge_groove: Annotated[
-        float, between(0.0, 0.5, "pitches", **_PART), "flat part of a groove, with flat crests"
+        float, between(0.0, 0.5, "pitches", **_PITCHES), "flat part of a groove, with flat crests"
     ] = 0.0
     # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
     stratum_corneum_thickness: Annotated[float, thickness_range("stratum_corneum"), "at a crest"] = (
@@ -124,11 +124,11 @@ class LayeredFinger:
 
     @classmethod
     def participant(cls, name: str, resolution: str = "medium", **more: Any) -> Self:
-        """The finger of a participant, i to xi, of the paper's Table 1: as wide and as high as measured, a
-        `Fingertip` seen from above as long as measured, c cos 30 degrees; `more` are other parameters.
+        """The finger of a participant of the paper's Table 1, by its number there ("i" to "xi").
 
-        Bone, nail, epidermis and dermis are scaled with it (assumed); stratum corneum, ridges and
-        moduli are Table 2's, because nobody measured them.
+        Width and height are the measured ones, the length of a `Fingertip` seen from above is the measured
+        c cos 30 degrees; `more` are other parameters. Bone, nail, epidermis and dermis are scaled with the
+        width or height (assumed); stratum corneum, ridges and moduli were not measured and are Table 2's.
 
         >>> from evfem.finger.fingerpad import FingerPad
         >>> FingerPad.participant("ii").width, round(FingerPad.participant("ii").bone_width, 3)
@@ -142,7 +142,7 @@ class LayeredFinger:
 
     @classmethod
     def sizes_of(cls, participant: str) -> dict[str, Any]:
-        """Parameters that a participant of Table 1 has of his or her own (mm)."""
+        """Parameters (mm) that differ from the defaults for a participant of Table 1."""
         measured = data.load("table1")
         choice("finger.participant", participant, tuple(measured["participant"]))
         width, height = measured.value(participant, "a"), measured.value(participant, "b")
@@ -151,13 +151,13 @@ class LayeredFinger:
         return sizes
 
     def __repr__(self) -> str:
-        """Differences from Table 2."""
-        return called(type(self).__name__, self._own())
+        """Parameters that differ from Table 2."""
+        return called(type(self).__name__, self._non_defaults())
 
     def _repr_html_(self) -> str:
-        """For notebooks: sizes, and what differs from Table 2."""
-        facts, told = self._facts
-        own = {name: short(value) for name, value in self._own(told).items()}
+        """For notebooks: a table of sizes, and of parameters that differ from Table 2."""
+        facts, told = self._summary
+        own = {name: short(value) for name, value in self._non_defaults(told).items()}
         return table(type(self).__name__, [*(facts | own).items()])
 
     def mesh(self, order: int = 2) -> Mesh:
@@ -169,16 +169,16 @@ class LayeredFinger:
 
     @property
     def _shape(self) -> Any:
-        """Its layers, bone and ridges, divided, with a method `mesh`."""
+        """Geometry with its divisions (layers, bone, ridges); has a method `mesh`."""
         raise NotImplementedError
 
     @property
-    def _facts(self) -> tuple[dict[str, str], set[str]]:
-        """What a table says first, and the parameters that it has said so."""
+    def _summary(self) -> tuple[dict[str, str], set[str]]:
+        """Rows of the notebook table that summarise the finger, and the parameters they contain."""
         raise NotImplementedError
 
-    def _complete(self) -> None:
-        """Give the layers without a law that of Table 2."""
+    def _with_default_laws(self) -> None:
+        """Complete `materials`: layers without a law get that of Table 2."""
         if not isinstance(self.materials, Mapping):
             allowed = "a law for each region that is not to have that of Table 2"
             raise InputError("finger.materials", quoted(self.materials), allowed)
@@ -195,34 +195,34 @@ class LayeredFinger:
             for layer in (*self.layers, *self.beside)
         }
 
-    def _own(self, told: Collection[str] = ()) -> dict[str, Any]:
-        """Parameters that are not the usual ones, without those that are `told`."""
+    def _non_defaults(self, told: Collection[str] = ()) -> dict[str, Any]:
+        """Parameters that differ from their defaults, without those in `told`."""
         laws = {name: law for name, law in self.materials.items() if law != self._usual[name]}
         found = {name: value for name, value in changed(self).items() if name not in (*told, "materials")}
         return found | ({"materials": laws} if laws else {})
 
 
 def check_at_most(name: str, value: float, limit: float, meaning: str, unit: str = " mm") -> None:
-    """Refuse a size beyond a limit that follows from others."""
+    """Raise InputError if a size exceeds a limit that follows from other sizes."""
     if value > limit * (1.0 + 1e-12):
         raise InputError(f"finger.{name}", value, f"at most {limit:.4g}{unit} ({meaning})")
 
 
 def check_skin(skin: float, radius: float, factor: float) -> None:
-    """Refuse layers that are together thicker than so many times the surface's smallest radius."""
+    """Raise InputError if the layers are thicker than `factor` times the smallest radius of curvature."""
     deepest = [layer for layer in LAYERS if layer.thickness][-1]
     meaning = f"{factor:g} times the surface's smallest radius, together with the layers above it"
     check_at_most(deepest.parameter, skin, factor * radius, meaning)
 
 
 def check_nail(nail: float, layers: Sequence[TissueLayer], thickness: Sequence[float]) -> None:
-    """Refuse a nail that reaches too far into the second layer."""
+    """Raise InputError if the nail reaches too far into the second layer."""
     meaning = f"{layers[0].spoken} + 0.7 {layers[1].spoken}"
     check_at_most("nail_thickness", nail, thickness[0] + 0.7 * thickness[1], meaning)
 
 
 def check_profile(ridges: Ridges, steeper: float = 1.0) -> None:
-    """Refuse ridges whose flat parts leave no walls, or whose walls are too steep on the outline."""
+    """Raise InputError if flat crests and grooves leave no walls, or if walls are too steep to mesh."""
     check_at_most("ridge_crest", ridges.crest + ridges.groove, 0.9, "together with finger.ridge_groove", "")
     slope, limit = ridges.steepest * steeper, STEEPEST_FLAT if ridges.crest > 0.0 else STEEPEST
     if slope > limit:
@@ -231,8 +231,7 @@ def check_profile(ridges: Ridges, steeper: float = 1.0) -> None:
 
 
 def area_error(cells: float) -> float:
-    """By how much, as a share of itself, the real contact width or area of ridges may be wrong with so
-    many `cells` (linear ones) from crest to crest.
+    """Relative error of the real contact width or area of ridges with `cells` linear cells per ridge.
 
     Measured with the ridges of Table 2 at .02 and .05 N/mm against 96 cells: 34 % with 6, 8 % with 12,
     4 % with 24, 2 % with 48.
@@ -244,7 +243,7 @@ def area_error(cells: float) -> float:
 
 
 def check_cells(cells: int | None, ridged: bool) -> None:
-    """Refuse `cells_per_ridge` that are odd, or of a pad without ridges."""
+    """Raise InputError if `cells_per_ridge` is odd, or set for a pad without ridges."""
     if cells is not None and not ridged:
         raise InputError("finger.cells_per_ridge", f"{cells} without ridges", "a pad with ridges")
     if cells is not None and cells % 2:
@@ -252,9 +251,11 @@ def check_cells(cells: int | None, ridged: bool) -> None:
 
 
 def check_bone(name: str, from_bone: Floats, axes: tuple[float, ...]) -> None:
-    """Refuse a bone without room in the dermis: inner points (N, d) from its centre, its half axes (d,)."""
+    """Raise InputError if the bone (half axes (d,)) is too close to the dermis: its inner points (N, d),
+    relative to the centre of the bone.
+    """
     clear = (1.0 - 1.0 / np.linalg.norm(from_bone / axes, axis=1)) * np.linalg.norm(from_bone, axis=1)
     if not clear.min() >= CLEARANCE:
-        given = f"a bone that leaves {clear.min():.3g} mm to the dermis"
+        problem = f"a bone that leaves {clear.min():.3g} mm to the dermis"
         allowed = f"at least {CLEARANCE:g} mm all around: a smaller or lower bone, or thinner layers"
-        raise InputError(f"finger.{name}", given, allowed)
+        raise InputError(f"finger.{name}", problem, allowed)

@@ -34,7 +34,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.finger.blocks import DIGITS, block
 from evfem.finger.fingerprint import faded
 from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
-from evfem.finger.outline import in_layers
+from evfem.finger.outline import layer_coordinates
 from evfem.mesh.hexahedron import MIRRORED
 from evfem.mesh.mesh import Mesh
 
@@ -65,7 +65,7 @@ class Ellipsoid:
         n = unit / [self.a, self.b, self.c]
         return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
 
-    def towards(self, points: Floats) -> Floats:
+    def radial_projection(self, points: Floats) -> Floats:
         """Where the ways from points (N, 3) to the centre meet the surface."""
         centre = [0.0, self.centre, 0.0]
         away = points - centre
@@ -197,8 +197,12 @@ class Solid:
             outermost += (self.nail.thickness - self.thickness[0]) * self._towards_nail(unit)
         depth = np.array([self._relief(unit, foot), outermost, *deeper])
         whole = self.nail is not None
-        return in_layers(
-            foot, normal, depth, level, self.bone.towards if whole else lambda _: self.bone.point(unit)
+        return layer_coordinates(
+            foot,
+            normal,
+            depth,
+            level,
+            self.bone.radial_projection if whole else lambda _: self.bone.point(unit),
         )
 
     def _relief(self, unit: Floats, foot: Floats) -> Floats:

@@ -119,10 +119,10 @@ def inverted(shape: Shape, nodes: Floats, target: Floats, start: Floats) -> Floa
         for _ in range(ITERATIONS):
             value, slope = shape(xi)
             away = target - np.einsum("cn,cnk->ck", value, nodes)
-            way = np.einsum("cnk,cnl->ckl", nodes, slope)
-            lost = ~((np.abs(np.linalg.det(way)) > 0.0) & (np.abs(xi - start) < FAR).all(axis=1))
-            way[lost], away[lost] = np.eye(len(target)), np.nan
-            step = np.linalg.solve(way, away[..., None])[..., 0]
+            jacobian = np.einsum("cnk,cnl->ckl", nodes, slope)
+            lost = ~((np.abs(np.linalg.det(jacobian)) > 0.0) & (np.abs(xi - start) < FAR).all(axis=1))
+            jacobian[lost], away[lost] = np.eye(len(target)), np.nan
+            step = np.linalg.solve(jacobian, away[..., None])[..., 0]
             xi = xi + step
             if not np.any(np.abs(step) > CLOSE):
                 break
@@ -144,9 +144,9 @@ def crossings(mesh: Mesh, region: str | None, level: Floats) -> list[Floats]:
 
     shape = partial(shape_functions, patches.shape[1])
     found = []
-    for place in level:
-        near = np.flatnonzero(((low <= place) & (place <= high)).all(axis=1))
-        xi = inverted(shape, flat[near], place, np.zeros(len(place)))
+    for sought in level:
+        near = np.flatnonzero(((low <= sought) & (sought <= high)).all(axis=1))
+        xi = inverted(shape, flat[near], sought, np.zeros(len(sought)))
         on = (np.abs(xi) <= 1.0 + ON).all(axis=1)
         y = np.sort(np.einsum("cn,cn->c", shape(xi[on])[0], patches[near[on], :, 1]))
         # a line through the end of two sides meets both

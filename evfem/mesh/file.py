@@ -165,8 +165,8 @@ def _one_kind(path: Path, kinds: list[str]) -> str:
         return found[0]
     allowed = f"cells of one kind: {', '.join(KINDS[:-1])} or {KINDS[-1]}"
     allowed += "".join(f" ({why})" for why in dict.fromkeys(LACKING[n] for n in found if n in LACKING))
-    given = f"{path.name} with " + (" and ".join(found) if found else "no two-dimensional") + " cells"
-    raise InputError("finger.mesh", given, allowed)
+    problem = f"{path.name} with " + (" and ".join(found) if found else "no two-dimensional") + " cells"
+    raise InputError("finger.mesh", problem, allowed)
 
 
 def _body(raw: meshio.Mesh) -> int:
@@ -180,8 +180,8 @@ def _plane(path: Path, points: np.ndarray) -> np.ndarray:
     """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is refused."""
     points = np.asarray(points, dtype=float)
     if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > 1e-9:
-        given = f"{path.name} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
-        raise InputError("finger.mesh", given, "a plane mesh: the same z everywhere")
+        problem = f"{path.name} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
+        raise InputError("finger.mesh", problem, "a plane mesh: the same z everywhere")
     return np.ascontiguousarray(points[:, :2])
 
 
@@ -200,8 +200,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:
             + " or ".join(WRITERS)
             + " (other formats cannot carry the names of regions and boundaries)",
         )
-    with replacing(path) as part, contextlib.redirect_stderr(io.StringIO()):
-        writer(mesh, part)
+    with replacing(path) as temporary, contextlib.redirect_stderr(io.StringIO()):
+        writer(mesh, temporary)
 
 
 def three(vectors: np.ndarray) -> np.ndarray:
@@ -272,8 +272,10 @@ def _all_facets(mesh: Mesh, name: str) -> Ints:
     lost = np.setdiff1d(mesh.node_sets[name], facets)
     if len(lost):
         facet = "edge" if mesh.dim == 2 else "face"
-        given = f"a .msh file for the set {name} with node {lost[0]}, which no outer {facet} of the set has"
-        raise InputError("--out", given, f".vtu, which carries sets of nodes (.msh: sets of outer {facet}s)")
+        problem = f"a .msh file for the set {name} with node {lost[0]}, which no outer {facet} of the set has"
+        raise InputError(
+            "--out", problem, f".vtu, which carries sets of nodes (.msh: sets of outer {facet}s)"
+        )
     return facets
 
 

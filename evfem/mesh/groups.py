@@ -146,22 +146,22 @@ def regions_in(
             if key in (one.name, one.number):
                 cells, found[name] = start[one.block] + one.cells, one.number
                 if both := next((other for other in owner[cells] if other not in ("", name)), None):
-                    given = f"{both} and {name} with the same cells"
+                    problem = f"{both} and {name} with the same cells"
                     allowed = f'one name per cell: those that count in [finger.regions], as {both} = "{both}"'
-                    raise InputError("finger.regions", given, allowed)
+                    raise InputError("finger.regions", problem, allowed)
                 region[cells], owner[cells] = one.number, name
         if name not in found:
             listed = dict.fromkeys(str(one.name or one.number) for one in solid)
-            given, allowed = f"{name} = {key}", f"groups that occur in {path.name}: {', '.join(listed)}"
-            raise InputError("finger.regions", given, allowed)
+            problem, allowed = f"{name} = {key}", f"groups that occur in {path.name}: {', '.join(listed)}"
+            raise InputError("finger.regions", problem, allowed)
     nameless = {one.number for one in solid if (owner[start[one.block] + one.cells] == "").any()}
     if nameless:
-        given = f"no name for {', '.join(map(str, sorted(nameless)))} of {path.name}"
+        problem = f"no name for {', '.join(map(str, sorted(nameless)))} of {path.name}"
         allowed = "name = number (or name = group) for every cell of the mesh, as tissue = "
-        raise InputError("finger.regions", given, f"{allowed}{min(nameless)}")
+        raise InputError("finger.regions", problem, f"{allowed}{min(nameless)}")
     if (owner == "").any():
-        given = f"{path.name} with {(owner == '').sum()} cells outside every named group"
-        raise InputError("finger.mesh", given, "every cell in a group with a name")
+        problem = f"{path.name} with {(owner == '').sum()} cells outside every named group"
+        raise InputError("finger.mesh", problem, "every cell in a group with a name")
     return region, found
 
 
@@ -205,8 +205,8 @@ def _point_sets(path: Path, raw: meshio.Mesh) -> dict[Name, Ints]:
             continue
         if name in ("pad", "bone"):
             if not np.isfinite(values).all():
-                given = f"{path.name} with NaN in point data `{name}`"
-                raise InputError("finger.mesh", given, "0 or 1 at every point")
+                problem = f"{path.name} with NaN in point data `{name}`"
+                raise InputError("finger.mesh", problem, "0 or 1 at every point")
         elif values.dtype.kind not in "iub" or not np.isin(values, (0, 1)).all():
             continue
         sets[name] = np.flatnonzero(values).astype(np.int64)

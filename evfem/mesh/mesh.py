@@ -107,20 +107,20 @@ class Mesh:
         >>> one.cells_at([[0.5, 0.5], [1.5, 0.5]]).tolist()
         [0, -1]
         """
-        given = np.asarray(points, dtype=float)
-        if self.dim != 2 or given.ndim != 2 or given.shape[1] != 2:
-            raise InputError("points", f"shape {given.shape} in {self.dim} dimensions", "(k, 2) in the plane")
+        query = np.asarray(points, dtype=float)
+        if self.dim != 2 or query.ndim != 2 or query.shape[1] != 2:
+            raise InputError("points", f"shape {query.shape} in {self.dim} dimensions", "(k, 2) in the plane")
         around = self.points[self.cell_sides[..., [0, 2, 1] if self.order == 2 else [0, 1]]]
         low, high = around.min(axis=(1, 2)), around.max(axis=(1, 2))
         edges = np.stack([around[:, :, :-1], around[:, :, 1:]], axis=3).reshape(len(around), -1, 2, 2)
         edges = np.take_along_axis(edges, edges[..., 1:].argsort(axis=2), axis=2)  # the lower end first
-        found = np.full(len(given), -1)
-        for i, (x, y) in enumerate(given):
-            near = np.flatnonzero(((low <= given[i]) & (given[i] <= high)).all(axis=1))
+        found = np.full(len(query), -1)
+        for i, (x, y) in enumerate(query):
+            near = np.flatnonzero(((low <= query[i]) & (query[i] <= high)).all(axis=1))
             (x0, y0), (x1, y1) = np.moveaxis(edges[near], (2, 3), (0, 1))
             passed = (y0 <= y) & (y < y1)
-            share = np.divide(y - y0, y1 - y0, out=np.zeros_like(y0), where=passed)
-            inside = near[(passed & (x < x0 + share * (x1 - x0))).sum(axis=1) % 2 == 1]
+            fraction = np.divide(y - y0, y1 - y0, out=np.zeros_like(y0), where=passed)
+            inside = near[(passed & (x < x0 + fraction * (x1 - x0))).sum(axis=1) % 2 == 1]
             found[i] = inside[0] if inside.size else -1
         return found
 

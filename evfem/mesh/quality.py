@@ -147,7 +147,7 @@ def _turns(corners: Ints) -> Floats:
     if count == 2:
         return 1.0 - 2.0 * first
     after, before = (
-        np.take_along_axis(corners, (first[..., None] + way) % count, axis=2)[..., 0] for way in (1, -1)
+        np.take_along_axis(corners, (first[..., None] + sense) % count, axis=2)[..., 0] for sense in (1, -1)
     )
     return np.where(after < before, 1.0, -1.0)
 

@@ -85,8 +85,8 @@ def check_parts(scene: Scene, dim: int) -> None:
         _check_force_law(scene, scene.law, voltage)
 
 
-def _is_own(part: Any) -> bool:
-    return not type(part).__module__.startswith("evfem.")
+def _is_own(component: Any) -> bool:
+    return not type(component).__module__.startswith("evfem.")
 
 
 def _check_material(key: str, law: Any, dim: int) -> None:
@@ -110,8 +110,8 @@ def _check_material(key: str, law: Any, dim: int) -> None:
         shape = evaluated(key, f"{name}(F)", method, F).shape
         expected = F.shape if name == "P" else F.shape[2:]
         if shape != expected:
-            given = f"{name}(F) of shape {shape} for F of shape {F.shape}"
-            raise InputError(key, given, f"an array of shape {expected}, with a value for every point")
+            problem = f"{name}(F) of shape {shape} for F of shape {F.shape}"
+            raise InputError(key, problem, f"an array of shape {expected}, with a value for every point")
     name, method = next(iter(methods.items()), ("", law))  # P where there are both
     if not name:
         split(law, dim, key)  # says what a material is
@@ -133,8 +133,8 @@ def _check_stiffness(key: str, law: Any, dim: int) -> None:
     found = {"shear": float(rate[0, 1, 0]), "widening": 0.25 * float(rate[0, 0, 1] + rate[1, 1, 1])}
     for against, stiffness in found.items():
         if not stiffness > NO_STIFFNESS * max(map(abs, found.values())):
-            given = f"a stiffness of {stiffness:.3g} MPa at rest, against {against}"
-            raise InputError(key, given, "positive ones")
+            problem = f"a stiffness of {stiffness:.3g} MPa at rest, against {against}"
+            raise InputError(key, problem, "positive ones")
 
 
 def _split_stress(law: SplitLaw, F: Array) -> Array:
@@ -155,8 +155,8 @@ def _check_complex(key: str, what: str, function: Callable[[Array], Any], F: Arr
             warnings.simplefilter("ignore")
             exact = np.imag(np.asarray(function(F + 1j * STEP * along))) / STEP
     except Exception as error:  # whatever a user's code raises
-        given = f"{what} that raises {type(error).__name__} on complex numbers: {error}"
-        raise InputError(key, given, allowed) from error
+        problem = f"{what} that raises {type(error).__name__} on complex numbers: {error}"
+        raise InputError(key, problem, allowed) from error
     near = difference(lambda t: np.asarray(function(F + t * along)), np.zeros(()), STRAIN_STEP)
     if not np.abs(exact - near).max() <= DERIVATIVE * np.abs(near).max():
         raise InputError(key, f"{what} whose derivative is lost in a complex step", allowed)
@@ -178,8 +178,8 @@ def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:
     what = "traction(gap, voltage, layers)"
     found = evaluated(key, what, lambda gap: seen.traction(gap, at, layers), GAPS)
     if found.shape != GAPS.shape and (voltage > 0.0 or found.shape != ()):  # without any it is not asked
-        given = f"a traction of shape {found.shape} at gaps of shape {GAPS.shape}"
-        raise InputError(key, given, "a value for every gap")
+        problem = f"a traction of shape {found.shape} at gaps of shape {GAPS.shape}"
+        raise InputError(key, problem, "a value for every gap")
     _check_traction(key, np.broadcast_to(found, GAPS.shape), StrongTroxel().traction(GAPS, at, layers))
     if voltage == 0.0 or scene.electrics.resolved:  # charges give another voltage
         return
@@ -187,8 +187,8 @@ def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:
         what = f"a traction at {lowest:g} V"
         found = evaluated(key, what, lambda gap: seen.traction(gap, lowest, layers), GAPS)
         if (found < 0.0).any():
-            given = f"a traction of {found.min():.3g} MPa at {lowest:g} V"
-            raise InputError(key, given, "positive values, which attract")
+            problem = f"a traction of {found.min():.3g} MPa at {lowest:g} V"
+            raise InputError(key, problem, "positive values, which attract")
     _check_rates(key, scene, lambda name: lambda gap: getattr(seen, name)(gap, voltage, layers))
 
 
@@ -197,12 +197,12 @@ def _check_traction(key: str, traction: Array, rigid: Any) -> None:
     if (traction < 0.0).any():
         raise InputError(key, f"a traction of {traction.min():.3g} MPa", "positive values, which attract")
     if (np.diff(traction) > 0.0).all():
-        given = f"a traction that grows from {traction[0]:.3g} MPa in contact to {traction[-1]:.3g} at 1 mm"
-        raise InputError(key, given, "an attraction that falls with the gap")
+        problem = f"a traction that grows from {traction[0]:.3g} MPa in contact to {traction[-1]:.3g} at 1 mm"
+        raise InputError(key, problem, "an attraction that falls with the gap")
     over = float(np.median(traction / rigid))
     if over > STRONGEST:
-        given = f"{over:.1e} times the attraction of parallel plates"
-        raise InputError(key, given, "a traction in MPa, not in Pa, of gaps in mm")
+        problem = f"{over:.1e} times the attraction of parallel plates"
+        raise InputError(key, problem, "a traction in MPa, not in Pa, of gaps in mm")
 
 
 def _lowest(scene: Scene) -> float:
@@ -232,8 +232,8 @@ def _check_rates(key: str, scene: Scene, method: Callable[[str], Callable[[Array
         near = difference(method(of), gaps, GAP_STEP)
         error = np.abs(found - near) / (np.abs(near) + NO_RATE * np.abs(values) + np.finfo(float).tiny)
         if float(np.median(error)) > BY_GAP:
-            given = f"a {rate} that is not the derivative of {of} by the gap"
-            raise InputError(key, given, "two that agree, in mm and MPa")
+            problem = f"a {rate} that is not the derivative of {of} by the gap"
+            raise InputError(key, problem, "two that agree, in mm and MPa")
 
 
 def evaluated(key: str, what: str, function: Callable[[Array], Any], at: Array) -> Array:
@@ -243,16 +243,16 @@ def evaluated(key: str, what: str, function: Callable[[Array], Any], at: Array) 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            given = function(at)
+            problem = function(at)
         except Exception as error:  # whatever a user's code raises
             raise InputError(key, f"{what} that raises {type(error).__name__}: {error}", FUNCTION) from error
-        if given is None:
+        if problem is None:
             raise InputError(key, f"{what} that returns None", FUNCTION)
         try:
-            value = np.asarray(given)
+            value = np.asarray(problem)
             finite = bool(np.isfinite(value).all())
         except (TypeError, ValueError) as error:  # ragged, or no numbers
-            name = type(given).__name__
+            name = type(problem).__name__
             raise InputError(
                 key, f"{what} that returns a {name} and no array of numbers", FUNCTION
             ) from error
@@ -281,8 +281,8 @@ def shaped(key: str, what: str, function: Callable[[Array], Any], at: Array, *, 
     """The same with a value for every point, or `one` for all."""
     found = evaluated(key, what, function, at)
     if found.shape != at.shape and not (one and found.shape == ()):
-        given = f"{what} of shape {found.shape} for arrays of shape {at.shape}"
-        raise InputError(key, given, f"an array of shape {at.shape}, with a value for every point")
+        problem = f"{what} of shape {found.shape} for arrays of shape {at.shape}"
+        raise InputError(key, problem, f"an array of shape {at.shape}, with a value for every point")
     return found
 
 
@@ -302,8 +302,8 @@ def check_surface(scene: Scene) -> None:
 
 def _check_slope(key: str, scene: Scene, x: Floats) -> None:
     """Whether the slope that a run takes, given or derived, is near that of differences."""
-    given = getattr(scene.surface, "slope", None) is not None
-    slope = evaluated(key, "slope(x)" if given else "height(x)", scene.ground.slope, x)
+    problem = getattr(scene.surface, "slope", None) is not None
+    slope = evaluated(key, "slope(x)" if problem else "height(x)", scene.ground.slope, x)
     errors = []
     for step in STEPS:
         near = evaluated(key, "height(x)", partial(difference, scene.ground.height, step=step), x)
@@ -312,7 +312,7 @@ def _check_slope(key: str, scene: Scene, x: Floats) -> None:
         errors.append(np.median(np.abs(slope - near)[counts] / size[counts]) if counts.any() else 0.0)
     if min(errors) <= SLOPE:
         return
-    if given:
+    if problem:
         raise InputError(
             key, "slope(x) that is not the derivative of height(x)", "its derivative, or no slope"
         )
@@ -345,8 +345,8 @@ def check_friction_law(scene: Scene) -> None:
         raise InputError(key, f"a bound of {bound.min():.3g} MPa", "values that are not negative")
     most = float(np.broadcast_to(bound, p.shape)[p == PRESSURES[-1]].max())
     if most > GREATEST * PRESSURES[-1]:
-        given = f"a bound of {most:.3g} at a pressure of {PRESSURES[-1]:g} MPa"
-        raise InputError(key, given, "a bound in MPa")
+        problem = f"a bound of {most:.3g} at a pressure of {PRESSURES[-1]:g} MPa"
+        raise InputError(key, problem, "a bound in MPa")
 
 
 def check_roughness(law: Any) -> None:
@@ -356,5 +356,5 @@ def check_roughness(law: Any) -> None:
     apart = shaped(key, "separation(pressure)", law.separation, PRESSURES, one=True)
     for length in (float(apart.min()), float(apart.max())):
         if not 0.0 <= length <= WIDEST:
-            given = f"a separation of {length:.3g} mm"
-            raise InputError(key, given, f"lengths in mm from 0 to {WIDEST:g}")
+            problem = f"a separation of {length:.3g} mm"
+            raise InputError(key, problem, f"lengths in mm from 0 to {WIDEST:g}")

@@ -62,16 +62,16 @@ def _unresolved(scene: Scene, mesh: Mesh, axis: int) -> str | None:
             f"{PER_WAVE:g} nodes of the pad each, which are {spacing:.2g} mm apart; use a finer mesh, or a "
             f"shortest wave of {PER_WAVE * spacing:.2g} mm"
         )
-    place = path_line(scene, mesh, spacing / PER_SPACING, axis)
+    path_points = path_line(scene, mesh, spacing / PER_SPACING, axis)
     half = 0.5 * spacing * np.eye(mesh.dim - 1)[axis]
-    before, height, after = (surface.relief(place + shift)[0] for shift in (-half, 0.0 * half, half))
+    before, height, after = (surface.relief(path_points + shift)[0] for shift in (-half, 0.0 * half, half))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
     if missed > MISSED * whole:
         return (
             f"the surface is sharper than the node spacing of the pad ({spacing:.2g} mm): up to {missed:.2g} "
             f"of its {whole:.2g} mm of height lie between two nodes; use a finer mesh or a smoother profile"
         )
-    slope = surface.relief(place)[1][:, axis]
+    slope = surface.relief(path_points)[1][:, axis]
     fine, all_of_it = (float(np.sqrt(np.mean(s**2))) for s in (slope - (after - before) / spacing, slope))
     if fine > ROUGH * all_of_it:
         return (
@@ -89,8 +89,8 @@ def _pad_edges(mesh: Mesh, axis: int) -> Ints:
         return sides[:, :2]
     faces = sides[:, :4]
     edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    way = np.abs(np.diff(mesh.points[edges], axis=1)[:, 0, ::2])
-    return edges[way[:, axis] > way[:, 1 - axis]]
+    extent = np.abs(np.diff(mesh.points[edges], axis=1)[:, 0, ::2])
+    return edges[extent[:, axis] > extent[:, 1 - axis]]
 
 
 def too_fast(scene: Scene) -> str | None:
@@ -156,16 +156,16 @@ def path_line(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:
     pad = mesh.points[mesh.node_sets["pad"], ::2]
     bone = [0.0, *accumulate(course.travel[axis] for course in scene.courses)]
     first, last = pad[:, axis].min() + min(bone), pad[:, axis].max() + max(bone)
-    place = np.zeros((int(np.clip((last - first) / step, 2, MOST)), mesh.dim - 1))
-    place[:, axis] = np.linspace(first, last, len(place))
-    return place
+    path_points = np.zeros((int(np.clip((last - first) / step, 2, MOST)), mesh.dim - 1))
+    path_points[:, axis] = np.linspace(first, last, len(path_points))
+    return path_points
 
 
 def path_depth(scene: Scene, mesh: Mesh, step: float) -> float:
     """Depth (mm) of the surface where the pad may come to, seen every `step` (mm)."""
     surface: Any = scene.ground
     lines = (path_line(scene, mesh, step, axis) for axis in range(mesh.dim - 1))
-    return float(np.ptp(np.concatenate([surface.relief(place)[0] for place in lines])))
+    return float(np.ptp(np.concatenate([surface.relief(path_points)[0] for path_points in lines])))
 
 
 def path_dependence(scene: Scene) -> tuple[str, ...]:

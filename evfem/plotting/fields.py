@@ -33,10 +33,10 @@ Height = Callable[[Floats], Floats]
 
 def height_of(result: Result, frame: Frame) -> Height:
     """Height (mm) of the surface at x (mm): the scene's, sunk as the pad's nodes say, or by their gaps."""
-    known, place = _from_scene(result), result.mesh.points + frame.displacement
+    known, position = _from_scene(result), result.mesh.points + frame.displacement
     pad = np.flatnonzero(np.isfinite(frame.gap))
-    pad = pad[np.argsort(place[pad, 0])]
-    x, y, gap, sink = place[pad, 0], place[pad, 1], frame.gap[pad], frame.surface_sink[pad]
+    pad = pad[np.argsort(position[pad, 0])]
+    x, y, gap, sink = position[pad, 0], position[pad, 1], frame.gap[pad], frame.surface_sink[pad]
     if known is None:
         return lambda at: np.interp(at, x, y - gap)
     return known if not sink.any() else lambda at: known(at) - np.interp(at, x, sink)
@@ -180,8 +180,8 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
     middle = MIDDLES.get(field)
     low, high = least, most
     if middle is not None:
-        given = vmin if vmax is None else vmax
-        reach = max(most - middle, middle - least) or 1.0 if given is None else abs(given - middle)
+        limit = vmin if vmax is None else vmax
+        reach = max(most - middle, middle - least) or 1.0 if limit is None else abs(limit - middle)
         low, high = middle - reach, middle + reach
     low, high = (low if vmin is None else vmin), (high if vmax is None else vmax)
     if not low < high:  # one value throughout, or all beyond a given end
@@ -192,10 +192,10 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
     return Scale(ONE_SIGN if middle is None else BOTH_SIGNS, low, high, extend)
 
 
-def within(place: Floats, window: Window) -> Any:
+def within(position: Floats, window: Window) -> Any:
     """Points (N, 2) in the window, (N,) bool."""
     left, right, bottom, top = window
-    x, y = place.T
+    x, y = position.T
     return (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
 
 
@@ -227,11 +227,11 @@ def half_edges(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
 
 def draw_arrows(ax: Axes, mesh: Mesh, frame: Frame, field: str, height: Height, window: Window) -> Any:
     """Tractions on the finger as arrows (a Quiver), of neighbouring nodes that of the largest traction."""
-    values, place = values_of(frame, field), mesh.points + frame.displacement
-    nodes = _thinned(place, np.where(within(place, window), np.abs(values), 0.0), window)
+    values, position = values_of(frame, field), mesh.points + frame.displacement
+    nodes = _thinned(position, np.where(within(position, window), np.abs(values), 0.0), window)
     if not nodes.size:
         return None
-    x, size = place[nodes, 0], values[nodes] / np.abs(values[nodes]).max()
+    x, size = position[nodes, 0], values[nodes] / np.abs(values[nodes]).max()
     at, width = np.column_stack([x, height(x)]), window[1] - window[0]
     longest = LONGEST * max(at[:, 1].min() - window[2], 0.05 * (window[3] - window[2]))
     normal = _normals(height, x, 1e-4 * width)
@@ -242,15 +242,15 @@ def draw_arrows(ax: Axes, mesh: Mesh, frame: Frame, field: str, height: Height, 
         arrows, pivot = size[:, None] * along * 1.5 * width / MOST_ARROWS, "middle"
         at = at - 0.4 * longest * normal
     else:
-        arrows, pivot, at = size[:, None] * np.array([0.0, -longest]), "tail", place[nodes]
+        arrows, pivot, at = size[:, None] * np.array([0.0, -longest]), "tail", position[nodes]
     quiver = ax.quiver(*at.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, width=0.0028, pivot=pivot)
     quiver.set(color=EDGE, zorder=4)
     return quiver
 
 
-def _thinned(place: Floats, size: Floats, window: Window) -> Ints:
+def _thinned(position: Floats, size: Floats, window: Window) -> Ints:
     """The node with the largest size of each of so many strips of the window, none where it is 0."""
-    strip = np.floor((place[:, 0] - window[0]) / (window[1] - window[0]) * MOST_ARROWS)
+    strip = np.floor((position[:, 0] - window[0]) / (window[1] - window[0]) * MOST_ARROWS)
     order = np.lexsort([-size, strip])
     order = order[size[order] > 0.0]
     _, first = np.unique(strip[order], return_index=True)

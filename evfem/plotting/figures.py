@@ -113,10 +113,10 @@ def shaded(ax: Axes, points: Floats, triangles: Ints, values: Floats) -> Any:
 
     n = int(np.clip(np.sqrt(PARTS / len(triangles)), 1, FINEST))
     i, j = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)]).T
-    number = {place: k for k, place in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
+    number = {bar_axes: k for k, bar_axes in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
     up = [[(a, b), (a + 1, b), (a, b + 1)] for a, b in number if a + b < n]
     down = [[(a + 1, b), (a + 1, b + 1), (a, b + 1)] for a, b in number if a + b < n - 1]
-    parts = np.array([[number[place] for place in part] for part in up + down])
+    parts = np.array([[number[bar_axes] for bar_axes in part] for part in up + down])
     corners = np.column_stack([points, values])[triangles]
     x, y, value = np.einsum("mk,tkc->ctm", np.column_stack([n - i - j, j, i]) / n, corners).reshape(3, -1)
     own = parts + i.size * np.arange(len(triangles))[:, None, None]
@@ -158,8 +158,8 @@ def add_colorbar(mapped: Any, ax: Axes, label: str, extend: str = "neither") -> 
     """A colour bar at the right of the axes, as high as they are."""
     from matplotlib.colorbar import make_axes
 
-    place, options = make_axes(ax, pad=0.02, fraction=0.05, aspect=SLENDER, anchor=(0.0, 0.5))
-    place.set_axes_locator(Beside(ax))
-    bar = ax.figure.colorbar(mapped, cax=place, label=label, extend=extend, **options)
+    bar_axes, options = make_axes(ax, pad=0.02, fraction=0.05, aspect=SLENDER, anchor=(0.0, 0.5))
+    bar_axes.set_axes_locator(Beside(ax))
+    bar = ax.figure.colorbar(mapped, cax=bar_axes, label=label, extend=extend, **options)
     bar.ax.ticklabel_format(axis="y", scilimits=(-3, 4))
     return bar

@@ -107,14 +107,14 @@ class SkinView:
 
     def window(self, near: Near) -> Window:
         """What is shown: left, right, lower and upper end in mm."""
-        place = self.position[:, ::2]
+        plane = self.position[:, ::2]
         if near is None:
-            return _around(place, MARGIN)
+            return _around(plane, MARGIN)
         if near != "contact":
             return checked_window(near)
         touching, gap = self.frame.contact_status[self.skin.nodes] > 0, self.frame.gap[self.skin.nodes]
         nearest = gap <= np.nanmin(gap) + 0.05 * np.nanmax(gap)
-        return _around(place[touching if touching.any() else nearest], AROUND)
+        return _around(plane[touching if touching.any() else nearest], AROUND)
 
     def shown(self, window: Window) -> Floats:
         """The values inside a window."""
@@ -146,8 +146,8 @@ class SkinView:
         from matplotlib.collections import PolyCollection
 
         m, shares, values = faces.shape[1], [], []
-        for node, place in enumerate(PLACES[:m]):
-            (a, b), (c, d) = (ENDS[m][float(t)] for t in place)
+        for node, corner in enumerate(PLACES[:m]):
+            (a, b), (c, d) = (ENDS[m][float(t)] for t in corner)
             value, _ = shape_functions(m, np.array([(a, c), (b, c), (b, d), (a, d)]))
             shares.append(np.einsum("qm,kmc->kqc", value, self.position[faces][..., ::2]))
             values.append(self.values[faces[:, node]])
@@ -156,8 +156,8 @@ class SkinView:
         return ax.add_collection(mapped)
 
 
-def _around(place: Floats, margin: float) -> Window:
+def _around(plane: Floats, margin: float) -> Window:
     """A window around points (n, 2), with so much of their width beyond them."""
-    (left, low), (right, high) = place.min(axis=0).tolist(), place.max(axis=0).tolist()
+    (left, low), (right, high) = plane.min(axis=0).tolist(), plane.max(axis=0).tolist()
     wide = margin * max(right - left, high - low, 1e-3)
     return left - wide, right + wide, low - wide, high + wide

@@ -50,7 +50,7 @@ def sweep(
     ax = figures.curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
     ax.set(**{f"{axis}scale": "log" for axis in log})
     if "x" in log and (places := np.unique(np.concatenate([line[0] for line in lines]))).size <= FEW:
-        ax.set_xticks(places, [f"{place:g}" for place in places])
+        ax.set_xticks(places, [f"{tick:g}" for tick in places])
         ax.set_xticks([], minor=True)
     if names:
         ax.set_xticks(range(len(names)), [str(name) for name in names])
@@ -182,7 +182,7 @@ def _sides(places: Any, axis: Any) -> Any:
     steps = np.diff(places)
     if steps.size == 0 or steps.max() <= UNEVEN * steps.min():
         return _edges(places)
-    axis.set_ticks(range(places.size), [f"{place:g}" for place in places])
+    axis.set_ticks(range(places.size), [f"{tick:g}" for tick in places])
     return _edges(np.arange(places.size))
 
 

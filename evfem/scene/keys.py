@@ -31,72 +31,72 @@ def names(*classes: Any) -> list[str]:
 def read(
     cls: Any,
     table: Any,
-    place: str,
+    prefix: str,
     folder: Path = Path(),
     *,
     tag: str = "",
     beside: Sequence[str] = (),
     homes: Mapping[str, Collection[Any]] | None = None,
-    **given: Any,
+    **extra: Any,
 ) -> Any:
     """What a table describes, or all mistakes in it: first unknown keys, then others but the lack of what an
     unknown one may stand for. Paths start at `folder`; the key `tag` and those of somebody else's may stand
-    `beside`; `homes` are other tables, whose keys may have been meant; what is `given` no file has.
+    `beside`; `homes` are other tables, whose keys may have been meant; `extra` are fields that no file has.
     """
     if not isinstance(table, Mapping):
-        raise InputError(place, shown(table), f"a table [{place}]")
+        raise InputError(prefix, shown(table), f"a table [{prefix}]")
     keys = keys_of(cls)
     known = list(dict.fromkeys([*([tag] if tag else []), *(key.name for key in keys), *beside]))
     mistakes, meant = Mistakes(), set[str]()
     for name, value in table.items():
-        path = _join(place, name)
+        path = _join(prefix, name)
         if path in GONE:
             mistakes.found.append(InputError(path, shown(value), GONE[path]))
         elif name not in known:
             mistakes.found.append(_unknown_key(path, name, known, homes or {}))
             meant |= {*near(name, known)}
     for key in keys:
-        with mistakes.of_a_part(), at(place):
+        with mistakes.of_a_part(), at(prefix):
             if key.name in table:
-                given[key.field] = _value(key, table[key.name], _join(place, key.name), folder)
+                extra[key.field] = _value(key, table[key.name], _join(prefix, key.name), folder)
             elif key.required and key.name not in meant:
                 raise InputError(key.name, ABSENT, key.allowed)
     mistakes.report()
-    with at(place):
-        made = cls(**given)
+    with at(prefix):
+        made = cls(**extra)
         return made.made() if hasattr(made, "made") else made
 
 
 def read_kind(
-    table: Any, place: str, kinds: Mapping[str, Any], folder: Path = Path(), tag: str = "kind", **more: Any
+    table: Any, prefix: str, kinds: Mapping[str, Any], folder: Path = Path(), tag: str = "kind", **more: Any
 ) -> Any:
     """What a table describes that says by its key `tag` which of `kinds` it is."""
-    return read(kinds[kind_of(table, place, kinds, tag)], table, place, folder, tag=tag, **more)
+    return read(kinds[kind_of(table, prefix, kinds, tag)], table, prefix, folder, tag=tag, **more)
 
 
-def _value(key: Key, given: Any, place: str, folder: Path) -> Any:
+def _value(key: Key, entry: Any, prefix: str, folder: Path) -> Any:
     """The value of a key: of a table the object that it describes, of a path that of the file."""
     rule, types = key.rule, key.types
     several = any(get_origin(one) is Mapping for one in types)
-    if several and not isinstance(given, Mapping):
-        raise InputError(key.name, shown(given), key.allowed)
+    if several and not isinstance(entry, Mapping):
+        raise InputError(key.name, shown(entry), key.allowed)
     if several and "kinds" in rule:
         mistakes, found = Mistakes(), {}
-        for name, table in given.items():
+        for name, table in entry.items():
             with mistakes.of_a_part():
-                found[name] = read_kind(table, f"{place}.{name}", rule["kinds"](), folder, rule["tag"])
+                found[name] = read_kind(table, f"{prefix}.{name}", rule["kinds"](), folder, rule["tag"])
         mistakes.report()
         return found
-    if "kinds" in rule and isinstance(given, Mapping):
-        return read_kind(given, place, rule["kinds"](), folder, rule.get("tag", "kind"))
+    if "kinds" in rule and isinstance(entry, Mapping):
+        return read_kind(entry, prefix, rule["kinds"](), folder, rule.get("tag", "kind"))
     inner: Any = next((one for one in types if is_dataclass(one)), None)
     if inner is not None and keys_of(inner):
-        return read(inner, given, place, folder)
+        return read(inner, entry, prefix, folder)
     file = rule.get("file", False)
-    if isinstance(given, str) and (file(given) if callable(file) else file):
-        given = folder / given
-        check_size(key.name, given, LARGEST_TABLE if callable(file) or file is True else file)
-    return rule["check"](key.name, given) if "check" in rule else given
+    if isinstance(entry, str) and (file(entry) if callable(file) else file):
+        entry = folder / entry
+        check_size(key.name, entry, LARGEST_TABLE if callable(file) or file is True else file)
+    return rule["check"](key.name, entry) if "check" in rule else entry
 
 
 def _unknown_key(
@@ -117,10 +117,10 @@ def check_size(key: str, path: Path, most: int) -> None:
         size = path.stat().st_size
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
         reason = getattr(error, "strerror", None) or "no path"
-        given, allowed = f"{shown(str(path))} ({reason})", "a file that exists and can be read"
+        problem, allowed = f"{shown(str(path))} ({reason})", "a file that exists and can be read"
         beside = _beside(path)
         close = [one for one in beside if one == f"{path.name}.toml"] or near(path.name, beside)
-        raise InputError(key, given, f"{close[0]}? ({allowed})" if close else allowed) from error
+        raise InputError(key, problem, f"{close[0]}? ({allowed})" if close else allowed) from error
     if not path.is_file():
         raise InputError(key, f"{path}, which is no file", "a file")
     if size > most:
@@ -143,19 +143,19 @@ def columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]
     return [row[0] for row in rows], [row[1] for row in rows]
 
 
-def kind_of(table: Any, place: str, kinds: Mapping[str, Any], key: str = "kind") -> str:
+def kind_of(table: Any, prefix: str, kinds: Mapping[str, Any], key: str = "kind") -> str:
     """The kind that a table says it is by its `key`, one of `kinds`."""
     if not isinstance(table, Mapping):
-        raise InputError(place, shown(table), f"a table with a {key} and its keys")
+        raise InputError(prefix, shown(table), f"a table with a {key} and its keys")
     kind = table.get(key, ABSENT)
     if not isinstance(kind, str) or kind not in kinds:
-        given = ABSENT if kind is ABSENT else shown(kind)
-        raise InputError(f"{place}.{key}", given, " | ".join(kinds))
+        problem = ABSENT if kind is ABSENT else shown(kind)
+        raise InputError(f"{prefix}.{key}", problem, " | ".join(kinds))
     return kind
 
 
-def _join(place: str, name: str) -> str:
-    return f"{place}.{name}" if place else name
+def _join(prefix: str, name: str) -> str:
+    return f"{prefix}.{name}" if prefix else name
 
 
 def shown(value: object) -> str:
@@ -165,20 +165,20 @@ def shown(value: object) -> str:
 
 
 @contextmanager
-def at(place: str, renamed: Mapping[str, str] = MappingProxyType({})) -> Iterator[None]:
-    """Errors raised inside name the key as it stands in the file, in the table at `place`."""
+def at(prefix: str, renamed: Mapping[str, str] = MappingProxyType({})) -> Iterator[None]:
+    """Errors raised inside name the key as it stands in the file, in the table `prefix`."""
     try:
         yield
     except InputError as error:
-        raise together([_moved(one, place, renamed) for one in error.mistakes]) from error
+        raise together([_moved(one, prefix, renamed) for one in error.mistakes]) from error
 
 
-def _moved(mistake: InputError, place: str, renamed: Mapping[str, str]) -> InputError:
-    key, given = renamed.get(mistake.key, mistake.key), mistake.given
-    if key == mistake.key and _table_of(key) != _table_of(place):
-        key = _join(place, key)
+def _moved(mistake: InputError, prefix: str, renamed: Mapping[str, str]) -> InputError:
+    key, problem = renamed.get(mistake.key, mistake.key), mistake.given
+    if key == mistake.key and _table_of(key) != _table_of(prefix):
+        key = _join(prefix, key)
     return InputError(
-        key, given if given is ABSENT or isinstance(given, str) else shown(given), mistake.allowed
+        key, problem if problem is ABSENT or isinstance(problem, str) else shown(problem), mistake.allowed
     )
 
 

@@ -90,12 +90,12 @@ class Probe(Checked):
 Wanted = Mapping[str, Any]  # name -> Probe, or points
 
 
-def checked(key: str, given: Any) -> Wanted:
+def checked(key: str, entry: Any) -> Wanted:
     """Probes by name, their points as tuples of tuples; tables of a scene file become a `Probe`."""
-    if not isinstance(given, Mapping):
-        raise InputError(key, quoted(given), f"a table of names, each with {_POINTS}")
+    if not isinstance(entry, Mapping):
+        raise InputError(key, quoted(entry), f"a table of names, each with {_POINTS}")
     mistakes, found = Mistakes(), dict[str, Any]()
-    for name, one in given.items():
+    for name, one in entry.items():
         with mistakes.of_a_part():
             if not isinstance(name, str) or not re.fullmatch(r"\w[\w -]{0,59}", name):
                 raise InputError(key, quoted(name), "names of up to 60 letters, digits, _, - and blanks")
@@ -106,14 +106,14 @@ def checked(key: str, given: Any) -> Wanted:
     return found
 
 
-def _checked_one(key: str, given: Any) -> Any:
-    if isinstance(given, Probe):
-        return given
-    if isinstance(given, Mapping):
-        return read(Probe, given, key)
-    points = np.asarray(finite(key, given, _POINTS))
+def _checked_one(key: str, entry: Any) -> Any:
+    if isinstance(entry, Probe):
+        return entry
+    if isinstance(entry, Mapping):
+        return read(Probe, entry, key)
+    points = np.asarray(finite(key, entry, _POINTS))
     if points.ndim != 2 or not len(points) or points.shape[1] not in (2, 3) or points.dtype.kind == "c":
-        raise InputError(key, quoted(given), _POINTS)
+        raise InputError(key, quoted(entry), _POINTS)
     return tuple(map(tuple, points.tolist()))
 
 
@@ -188,11 +188,13 @@ def histories(wanted: Wanted, dim: int, values: Floats) -> dict[str, ProbeHistor
         first += count(one)
         parts = np.split(own, np.cumsum([*sizes.values()])[:-1], axis=2)
         shaped = {
-            quantity: part[..., _SHAPED.get(size, slice(None))]
-            for (quantity, size), part in zip(sizes.items(), parts, strict=True)
+            quantity: values_of_one[..., _SHAPED.get(size, slice(None))]
+            for (quantity, size), values_of_one in zip(sizes.items(), parts, strict=True)
         }
-        place = shaped.pop("position")
-        found[name] = ProbeHistory(place[0] if len(place) else np.full(place.shape[1:], np.nan), **shaped)
+        location = shaped.pop("position")
+        found[name] = ProbeHistory(
+            location[0] if len(location) else np.full(location.shape[1:], np.nan), **shaped
+        )
     return found
 
 
@@ -239,8 +241,8 @@ class Probes:
         cells, inner = np.array([cell for cell, _ in at]), np.array([xi for _, xi in at])
         self.nodes: Ints = self.space.nodes[cells]
         self.value, local = found.shape(inner)
-        way = np.einsum("pnc,pnk->pck", mesh.points[self.nodes], local)
-        self.gradient: Floats = np.einsum("pnk,pkc->pnc", local, np.linalg.inv(way))
+        jacobian = np.einsum("pnc,pnk->pck", mesh.points[self.nodes], local)
+        self.gradient: Floats = np.einsum("pnk,pkc->pnc", local, np.linalg.inv(jacobian))
         x = np.moveaxis(self.space.points[:, cells], 0, 2) - self.place[:, None]
         # linear in each cell, or constant: a polynomial through its quadrature points
         self.from_points = np.linalg.pinv(np.concatenate([np.ones_like(x[..., :1]), x], axis=2))[:, 0]
@@ -324,11 +326,11 @@ class Probes:
 class Relaxing:
     """What branches add at P points in `cells` (P,), `share` (P, Q) of what is at their quadrature points."""
 
-    def __init__(self, branches: Any, cells: Ints, share: Floats) -> None:
+    def __init__(self, branches: Any, cells: Ints, weight: Floats) -> None:
         self.branches, self.place = branches.among(cells)
         own = self.branches.integral.points.cells
         self.rows = np.flatnonzero(np.isin(cells, own))
-        self.column, self.share = np.searchsorted(own, cells[self.rows]), share[self.rows]
+        self.column, self.share = np.searchsorted(own, cells[self.rows]), weight[self.rows]
 
     def at(self, u: Floats, inner: Floats, F: Floats) -> tuple[Floats, Floats]:
         """Cauchy stress (P, 6) in MPa and energy (P,) in N/mm2 at displacements u (N, d) and F (P, 3, 3)."""
@@ -366,8 +368,8 @@ class Cells:
             beyond = np.maximum(beyond, xi.sum(axis=1) - 1.0)
         holding = np.flatnonzero(beyond <= ON)
         if not holding.size:
-            place = ", ".join(f"{x:.6g}" for x in point)
-            raise InputError(f"output.probes.{name}", f"({place}), outside the tissue", _INSIDE)
+            location = ", ".join(f"{x:.6g}" for x in point)
+            raise InputError(f"output.probes.{name}", f"({location}), outside the tissue", _INSIDE)
         region = self.mesh.region[near[holding]]
         wanted = region != self.mesh.region_names.get(layer, -1) if layer else np.zeros(holding.size)
         best = holding[np.lexsort((region, wanted))[0]]
@@ -390,9 +392,9 @@ def points_of(key: str, one: Any, mesh: Mesh) -> tuple[Floats, str | None]:
         raise InputError(f"{key}.at", quoted(one.at), " | ".join(mesh.region_names))
     level = np.column_stack([one.x] if one.z is None else [one.x, one.z])
     heights = crossings(mesh, one.at, level)
-    for place, found in zip(level, heights, strict=True):
+    for location, found in zip(level, heights, strict=True):
         if len(found) < 2:
-            told = ", ".join(f"{x:.6g}" for x in place)
+            told = ", ".join(f"{x:.6g}" for x in location)
             what = "no tissue" if one.at is None else f"no {one.at}"
             raise InputError(key, f"{'x' if one.z is None else 'x, z'} = {told}, with {what}", _INSIDE)
     y = np.array([found[0] + one.depth if one.at is None else found[1] for found in heights])

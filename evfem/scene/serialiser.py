@@ -71,21 +71,21 @@ def dump(scene: Scene) -> str:
     return tomli_w.dumps({name: table for name, table in tables.items() if table != {}})
 
 
-def _keys(value: Any, place: str) -> dict[str, Any]:
+def _keys(value: Any, prefix: str) -> dict[str, Any]:
     """The keys of an object that differ from their defaults."""
     found = {}
     for key in keys_of(type(value)):
         one = getattr(value, key.field)
         if one is not None and (key.required or bool(np.any(one != key.default))):
             kinds = key.rule["kinds"]() if "kinds" in key.rule else {}
-            found[key.name] = _plain(one, f"{place}.{key.name}", kinds, key.rule.get("tag", "kind"))
+            found[key.name] = _plain(one, f"{prefix}.{key.name}", kinds, key.rule.get("tag", "kind"))
     return found
 
 
-def _plain(value: Any, place: str, kinds: Mapping[str, Any], tag: str = "kind") -> Any:
+def _plain(value: Any, prefix: str, kinds: Mapping[str, Any], tag: str = "kind") -> Any:
     """A value as TOML has it."""
     if isinstance(value, Mapping):
-        return {name: _plain(one, f"{place}.{name}", kinds, tag) for name, one in value.items()}
+        return {name: _plain(one, f"{prefix}.{name}", kinds, tag) for name, one in value.items()}
     if isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, (tuple, list, np.ndarray)):
@@ -94,16 +94,16 @@ def _plain(value: Any, place: str, kinds: Mapping[str, Any], tag: str = "kind") 
         return str(value.resolve())
     if hasattr(value, "columns"):  # measured ridges
         return value.columns
-    return _of_kind(value, kinds, place, tag) if kinds else _keys(value, place)
+    return _of_kind(value, kinds, prefix, tag) if kinds else _keys(value, prefix)
 
 
-def _of_kind(value: Any, kinds: Mapping[str, Any], place: str, tag: str = "kind") -> dict[str, Any]:
+def _of_kind(value: Any, kinds: Mapping[str, Any], prefix: str, tag: str = "kind") -> dict[str, Any]:
     """The table of an object that is one of `kinds`."""
     for name, cls in kinds.items():
         if type(value) is cls:
-            return {tag: name, **_keys(value, place)}
+            return {tag: name, **_keys(value, prefix)}
     allowed = ", ".join(cls.__name__ for cls in kinds.values())
-    raise InputError(place, type(value).__name__, f"{allowed}, for a file")
+    raise InputError(prefix, type(value).__name__, f"{allowed}, for a file")
 
 
 def _finger(finger: Any) -> dict[str, Any]:

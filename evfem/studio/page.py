@@ -42,12 +42,12 @@ def with_choices(content: bytes) -> bytes:
     laws = {name: name for name, law in FORCE_LAWS.items() if not any(key.required for key in keys_of(law))}
     insulators = {name: f"{name}, {1e3 * one.thickness:g} um" for name, one in INSULATORS.items()}
     options = {key.name: key for one in IMPORTERS.values() for key in keys_of(one) if key.name != "name"}
-    for place, parts in (
+    for marker, parts in (
         (b"<!-- laws -->", [_option(*one, Device().law) for one in laws.items()]),
         (b"<!-- insulators -->", [_option(*one, Device().insulator) for one in insulators.items()]),
         (b"<!-- importers -->", map(_control, options.values())),
     ):
-        content = content.replace(place, "".join(parts).encode())
+        content = content.replace(marker, "".join(parts).encode())
     return content
 
 
@@ -76,13 +76,13 @@ def answer(state: State) -> dict[str, Any]:
     heights = np.interp(x, *state.texture.over(0.0, float(x[-1])))
     wish, felt = (np.interp(x, found.curve.x, one) for one in (found.curve.friction, found.felt))
     frequency, wished = spectrum_of(x, wish, state.touch.speed)
-    given = spectrum_of(x, felt, state.touch.speed)[1]
+    rendered = spectrum_of(x, felt, state.touch.speed)[1]
     layers, signal = state.device.encoding.layers, found.signal
     lost = {
         "is slipperier than the display: it cannot be rendered": signal.share_not_renderable,
         "is too fast for the amplifier": signal.share_limited,
     }
-    warned = [f"{share:.0%} of the slide {text}" for text, share in lost.items() if share > LOST]
+    warned = [f"{fraction:.0%} of the slide {text}" for text, fraction in lost.items() if fraction > LOST]
     numbers = {
         "rms": signal.rms,
         "peak": signal.largest,
@@ -108,7 +108,7 @@ def answer(state: State) -> dict[str, Any]:
         "voltage": _short(voltage),
         "frequency": _short(frequency),
         "wish": _short(wished),
-        "given": _short(given),
+        "given": _short(rendered),
         "numbers": {name: None if value != value else value for name, value in numbers.items()},
         "bands": [[None if value != value else round(value, 6) for value in band] for band in found.bands],
         "notes": [*notes, *warned],

@@ -63,22 +63,22 @@ def parse(text: str | bytes) -> State:
     )
 
 
-def _table(key: str, given: Any, keys: tuple[str, ...]) -> Mapping[str, Any]:
-    if not isinstance(given, dict):
-        raise InputError(key, quoted(given), "an object")
-    odd = sorted(set(given) - set(keys))
+def _table(key: str, entry: Any, keys: tuple[str, ...]) -> Mapping[str, Any]:
+    if not isinstance(entry, dict):
+        raise InputError(key, quoted(entry), "an object")
+    odd = sorted(set(entry) - set(keys))
     if odd:
         raise InputError(key, quoted(odd[0]), ", ".join(keys))
-    return given
+    return entry
 
 
-def _texture(given: Any) -> Texture:
+def _texture(entry: Any) -> Texture:
     """A reference texture, one by three knobs, or one by its rows."""
-    if isinstance(given, dict) and "reference" in given:
-        return reference(_table("texture", given, ("reference",))["reference"])
-    if isinstance(given, dict) and "generator" in given:
-        return make(given["generator"], read(Knobs, given, "texture", tag="generator"), "dialled")
-    table = _table("texture", given, ROWS)
+    if isinstance(entry, dict) and "reference" in entry:
+        return reference(_table("texture", entry, ("reference",))["reference"])
+    if isinstance(entry, dict) and "generator" in entry:
+        return make(entry["generator"], read(Knobs, entry, "texture", tag="generator"), "dialled")
+    table = _table("texture", entry, ROWS)
     missing = [key for key in ("x", "values", "licence") if key not in table]
     if missing:
         raise InputError("texture", f"no {missing[0]}", f"reference, generator, or {', '.join(ROWS)}")

@@ -61,24 +61,24 @@ class NamedAdhesion(Named):
     def _share(self, gap: Values) -> Any:
         """1 below the edge, 0 above, linear across it."""
         width, gap = EDGE * self.reach, np.asarray(gap)
-        share = (self.reach + 0.5 * width - gap) / width
-        return np.where(share.real > 1.0, 1.0, np.where(share.real < 0.0, 0.0, share))
+        depth = (self.reach + 0.5 * width - gap) / width
+        return np.where(depth.real > 1.0, 1.0, np.where(depth.real < 0.0, 0.0, depth))
 
     def traction(self, gap: Values) -> Values:
         """Attraction in MPa at gaps in mm."""
-        share = self._share(gap)
-        return plain(self.stress * share**2 * (3.0 - 2.0 * share))
+        depth = self._share(gap)
+        return plain(self.stress * depth**2 * (3.0 - 2.0 * depth))
 
     def traction_derivative(self, gap: Values) -> Values:
         """dp/dg in MPa/mm."""
-        share = self._share(gap)
-        return plain(-6.0 * self.stress * share * (1.0 - share) / (EDGE * self.reach))
+        depth = self._share(gap)
+        return plain(-6.0 * self.stress * depth * (1.0 - depth) / (EDGE * self.reach))
 
     def potential(self, gap: Values) -> Values:
         """Potential in N/mm, 0 beyond the reach."""
-        share, width = self._share(gap), EDGE * self.reach
+        depth, width = self._share(gap), EDGE * self.reach
         below = np.minimum(np.asarray(gap) - (self.reach - 0.5 * width), 0.0)
-        return plain(self.stress * (below - width * share**3 * (1.0 - 0.5 * share)))
+        return plain(self.stress * (below - width * depth**3 * (1.0 - 0.5 * depth)))
 
 
 @dataclass(frozen=True)
@@ -126,11 +126,11 @@ class Capillary(NamedAdhesion, kind="capillary"):
 ADHESIONS = NamedAdhesion.kinds
 
 
-def adhesion_of(key: str, given: Any) -> Any:
+def adhesion_of(key: str, value: Any) -> Any:
     """A law of adhesion, or None; InputError for anything else."""
-    if given is not None and (isinstance(given, type) or not isinstance(given, AdhesionLaw)):
-        raise InputError(key, quoted(given), ADHESION)
-    return given
+    if value is not None and (isinstance(value, type) or not isinstance(value, AdhesionLaw)):
+        raise InputError(key, quoted(value), ADHESION)
+    return value
 
 
 class Softened:
@@ -176,8 +176,8 @@ class Softened:
     def potential(self, gap: Values, voltage: Values = ON, layers: Any = None) -> Values:
         """Potential in N/mm, 0 far away."""
         gap, law = np.asarray(gap), self.law
-        found, way = np.asarray(law.potential(gap)), self.end - np.maximum(gap, self.begin)
-        line = law.potential(self.end) - way * (self._at_end + 0.5 * self.slope * way)
+        found, distance = np.asarray(law.potential(gap)), self.end - np.maximum(gap, self.begin)
+        line = law.potential(self.end) - distance * (self._at_end + 0.5 * self.slope * distance)
         deeper = line + found - law.potential(self.begin) - self.short * (gap - self.begin)
         found = np.where(gap.real >= self.end, found, np.where(gap.real >= self.begin, line, deeper))
         return plain(np.asarray(voltage) ** 2 * found)
@@ -202,8 +202,8 @@ def _line(law: Any, closed: float, steepest: float) -> tuple[float, float]:
     for _ in range(HALVINGS):
         middle = closed + (np.sqrt(max(low, NEAREST) * high) if high > 2.0 * low else 0.5 * (low + high))
         begin, end = _begin(law, middle, steepest, gaps, traction), float(law.traction(middle))
-        work, way = float(law.potential(middle)) - float(law.potential(begin)), middle - begin
-        if work > way * (end + 0.5 * steepest * way):
+        work, distance = float(law.potential(middle)) - float(law.potential(begin)), middle - begin
+        if work > distance * (end + 0.5 * steepest * distance):
             low = middle - closed
         else:
             high = middle - closed

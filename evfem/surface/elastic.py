@@ -131,13 +131,13 @@ class ElasticStack(Layered):
         set_frozen(self, layers=found)
 
 
-def elastic_of(given: Any, key: str = "surface.elastic") -> Any:
+def elastic_of(elastic: Any, key: str = "surface.elastic") -> Any:
     """How a surface gives way: an object that says so, or None; InputError for anything else."""
-    if isinstance(given, (list, tuple)):
-        return ElasticStack(tuple(given))
-    if given is not None and (isinstance(given, type) or not isinstance(given, Elastic)):
-        raise InputError(key, quoted(given), ELASTIC)
-    return given
+    if isinstance(elastic, (list, tuple)):
+        return ElasticStack(tuple(elastic))
+    if elastic is not None and (isinstance(elastic, type) or not isinstance(elastic, Elastic)):
+        raise InputError(key, quoted(elastic), ELASTIC)
+    return elastic
 
 
 def strips(x: Any, lengths: Any) -> tuple[Floats, Floats]:
@@ -272,12 +272,12 @@ class Kernels:
         found[:, :, ~far] = sum(sign * self._integrals(at) for at, sign in ends) / (a * b)
         return found
 
-    def _quadratic(self, x: Floats, share: Floats) -> Floats:
+    def _quadratic(self, x: Floats, factor: Floats) -> Floats:
         """Slopes and kernels (3, 2, k) at x, and `share` times their second derivatives."""
-        size, share = np.minimum(np.abs(x), self.places[-1]), share[:, None]
+        size, factor = np.minimum(np.abs(x), self.places[-1]), factor[:, None]
         value, slope, *more = (self.rests(size, order) for order in range(4))
-        found = np.stack([slope + share * more[1], value + share * more[0]])
-        log = np.array([-1.0 / size - 2.0 * share[:, 0] / size**3, share[:, 0] / size**2 - np.log(size)])
+        found = np.stack([slope + factor * more[1], value + factor * more[0]])
+        log = np.array([-1.0 / size - 2.0 * factor[:, 0] / size**3, factor[:, 0] / size**2 - np.log(size)])
         found[:, :, :2] += log[:, :, None]
         found[1, :, 2] += self.kernels[2].jump
         found[[0, 0, 1], :, [0, 1, 2]] *= np.sign(x)
@@ -291,10 +291,10 @@ class Kernels:
             int
         )
         piece = np.minimum(piece, self.places.size - 2)
-        way, log = (at - self.places[piece])[:, None], np.log(np.where(at > 0.0, at, 1.0))
+        offset, log = (at - self.places[piece])[:, None], np.log(np.where(at > 0.0, at, 1.0))
         found = self._powers[0][piece]
         for power in self._powers[1:]:
-            found = found * way + power[piece]
+            found = found * offset + power[piece]
         rests = found.T.reshape(len(self.kernels), 2, -1)
         for kernel, (once, twice) in zip(self.kernels, rests, strict=True):
             once += kernel.singular(at, log, 1)
@@ -317,10 +317,10 @@ def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
     turned = 2.0 * cross - free * (1.0 - 1.0 / np.cosh(s))
     x = end * np.sinh(np.linspace(0.0, SPREAD, TABULATED)) / np.sinh(SPREAD)
     even, odd = np.zeros((2, x.size)), np.zeros(x.size)
-    for part in np.array_split(np.arange(s.size), s.size // 1000 + 1):
-        angle = np.outer(s[part], x)
-        even += (rests[:, part] * (step / s[part])) @ np.cos(angle)
-        odd += (turned[part] * (step / s[part])) @ np.sin(angle)
+    for chunk in np.array_split(np.arange(s.size), s.size // 1000 + 1):
+        angle = np.outer(s[chunk], x)
+        even += (rests[:, chunk] * (step / s[chunk])) @ np.cos(angle)
+        odd += (turned[chunk] * (step / s[chunk])) @ np.sin(angle)
     ramp = np.tanh(0.25 * np.pi * x)
     even -= np.log(np.where(x > 0.0, ramp, 0.25 * np.pi) / np.where(x > 0.0, x, 1.0))
     odd -= 2.0 * free * np.arctan(ramp)

@@ -135,12 +135,12 @@ class Pad:
         length, touches = x[b] - x[a], reach > 0.0
         mixed = touches[a] != touches[b]
         inner, outer = np.where(touches[a], a, b), np.where(touches[a], b, a)
-        share = np.where(touches[a] & touches[b], 1.0, 0.0)
-        share[mixed] = reach[inner[mixed]] / (reach[inner[mixed]] - reach[outer[mixed]])
-        covered = np.bincount(np.concatenate([a, b]), np.tile(share * length, 2), x.size)
+        fraction = np.where(touches[a] & touches[b], 1.0, 0.0)
+        fraction[mixed] = reach[inner[mixed]] / (reach[inner[mixed]] - reach[outer[mixed]])
+        covered = np.bincount(np.concatenate([a, b]), np.tile(fraction * length, 2), x.size)
         space = self.spacing_at(position) * ((before >= 0) & (after >= 0))  # nothing to cut at the pad's end
-        space = space[inner] + share * (space[outer] - space[inner])
-        edge = share * length - OVERSHOT * mixed * np.minimum(space, 1.5 * covered[inner])
+        space = space[inner] + fraction * (space[outer] - space[inner])
+        edge = fraction * length - OVERSHOT * mixed * np.minimum(space, 1.5 * covered[inner])
         rights = np.append((x[a] + edge)[mixed & touches[a]], x[touches & (after < 0) & (before >= 0)])
         lefts = np.append((x[b] - edge)[mixed & touches[b]], x[touches & (before < 0) & (after >= 0)])
         if not rights.size:
@@ -161,8 +161,8 @@ def widened(reach: Floats, rows: Ints) -> Floats:
     goes_on = (own / np.where(beside > 0.0, own, own - beside)).max(axis=0)
     gap = np.maximum(-beside, 1e-300).mean(axis=0)
     half = 0.75 * np.sqrt(own / (own + 9.0 * np.pi / 16.0 * gap))
-    share = np.minimum(np.minimum(half + OVERSHOT, half / OVERSHOT), 1.0 - 1e-9)
-    alone = np.where(goes_on < 1.0, gap * share / (1.0 - share), own)
+    fraction = np.minimum(np.minimum(half + OVERSHOT, half / OVERSHOT), 1.0 - 1e-9)
+    alone = np.where(goes_on < 1.0, gap * fraction / (1.0 - fraction), own)
     found = reach.copy()
     np.maximum.at(found, node, goes_on * own + (1.0 - goes_on) * alone)
     return found
@@ -208,8 +208,8 @@ def fold(position: Floats, segments: Ints, touching: Any, down: Any) -> float | 
     if not crossed.size:
         return None
     first = crossed[0]
-    way = before[first] / (before[first] - after[first])
-    return float(begin[b[first], 0] + way * (end[b[first], 0] - begin[b[first], 0]))
+    fraction = before[first] / (before[first] - after[first])
+    return float(begin[b[first], 0] + fraction * (end[b[first], 0] - begin[b[first], 0]))
 
 
 def _near(begin: Floats, end: Floats) -> tuple[Ints, Ints]:
@@ -223,8 +223,8 @@ def _near(begin: Floats, end: Floats) -> tuple[Ints, Ints]:
 
 def _side(begin: Floats, end: Floats, point: Floats) -> Floats:
     """On which side of segments (K, 2), from begin to end, the points (K, 2) are: (K,)."""
-    way, to = end - begin, point - begin
-    return way[:, 0] * to[:, 1] - way[:, 1] * to[:, 0]
+    fraction, to = end - begin, point - begin
+    return fraction[:, 0] * to[:, 1] - fraction[:, 1] * to[:, 0]
 
 
 def make_pad(mesh: Mesh) -> Pad:
@@ -238,8 +238,8 @@ def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
     """Pad nodes (P,), edges or faces among them, and who follow no bone (P,); InputError without a pad."""
     sides = mesh.sides_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
     if not len(sides):
-        given = f"no outer {'edge' if mesh.dim == 2 else 'face'} whose nodes are all on `pad`"
-        raise InputError("finger.mesh", given, "point data or a physical group `pad`")
+        missing = f"no outer {'edge' if mesh.dim == 2 else 'face'} whose nodes are all on `pad`"
+        raise InputError("finger.mesh", missing, "point data or a physical group `pad`")
     nodes, local = np.unique(sides, return_inverse=True)
     free = ~np.isin(nodes, mesh.node_sets.get("bone", np.zeros(0, dtype=np.int64)))
     return nodes, local.reshape(sides.shape), free

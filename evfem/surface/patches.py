@@ -57,10 +57,10 @@ class Patches:
         rest = (whole - self.sizes[:, None]) * (half * weight).ravel()
         self.places = end * np.sinh(np.linspace(0.0, SPREAD, TABULATED)) / np.sinh(SPREAD)
         found = np.zeros((TABULATED, 2, 4))
-        for part in np.array_split(np.arange(k.size), k.size // 2000 + 1):
+        for chunk in np.array_split(np.arange(k.size), k.size // 2000 + 1):
             angle, both = (
-                np.outer(self.places, k[part]),
-                np.stack([rest[:, part], -rest[:, part] * k[part] ** 2]),
+                np.outer(self.places, k[chunk]),
+                np.stack([rest[:, chunk], -rest[:, chunk] * k[chunk] ** 2]),
             )
             zeroth, first = j0(angle), j1(angle)
             second = 2.0 * first / np.where(angle > 0.0, angle, 1.0) - zeroth * (angle > 0.0)
@@ -78,10 +78,10 @@ class Patches:
         """Derivatives (2, 3 n, 3 n) of `compliance` by the place of the displaced square along both axes."""
         step = STEP * float(np.sqrt(areas.min()))
 
-        def rate(way: Floats, at: Floats, a: Floats, b: Floats) -> Floats:
-            return (self._means(at + way, a, b) - self._means(at - way, a, b)) / (2.0 * step)
+        def rate(shift: Floats, at: Floats, a: Floats, b: Floats) -> Floats:
+            return (self._means(at + shift, a, b) - self._means(at - shift, a, b)) / (2.0 * step)
 
-        return np.stack([self._matrix(x, areas, partial(rate, way), -1.0) for way in step * np.eye(2)])
+        return np.stack([self._matrix(x, areas, partial(rate, shift), -1.0) for shift in step * np.eye(2)])
 
     def _matrix(self, x: Floats, areas: Floats, of: Callable[..., Floats], parity: float) -> Floats:
         (i, j), side = np.triu_indices(len(x)), np.sqrt(areas)
@@ -94,15 +94,15 @@ class Patches:
         """N, A, D cos 2 theta, D sin 2 theta, K cos theta and K sin theta (6, m), as means over squares of
         sides a and b (m,) that are x (m, 2) apart.
         """
-        r, share = np.hypot(*x.T), (a**2 + b**2) / 24.0
+        r, spread = np.hypot(*x.T), (a**2 + b**2) / 24.0
         near, angle = r < 0.5 * FAR * (a + b), np.arctan2(x[:, 1], x[:, 0])
         one, away = np.ones(r.size), np.where(near, 1.0, r)
         turned = np.stack([one, np.cos(2.0 * angle), np.sin(2.0 * angle), np.cos(angle), np.sin(angle)])
-        singular = turned * (1.0 / away + np.outer([1.0, -3.0, -3.0, 0.0, 0.0], share / away**3))
+        singular = turned * (1.0 / away + np.outer([1.0, -3.0, -3.0, 0.0, 0.0], spread / away**3))
         singular[:, near] = love(x[near], a[near], b[near])
         value, curved = self.rest(np.minimum(r, self.places[-1])).transpose(1, 2, 0)
-        of, way = [0, 1, 2, 2, 3, 3], [0, 0, 1, 2, 3, 4]
-        found = self.sizes[of, None] * singular[way] + (value + share * curved)[of] * turned[way]
+        of, kind = [0, 1, 2, 2, 3, 3], [0, 0, 1, 2, 3, 4]
+        found = self.sizes[of, None] * singular[kind] + (value + spread * curved)[of] * turned[kind]
         return np.where(r > self.places[-1], 0.0, found)
 
 

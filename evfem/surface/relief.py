@@ -114,10 +114,10 @@ class Relief(RigidSurface):
 
         return RectBivariateSpline(self.x, self.z, self.samples.T)
 
-    def relief(self, place: Array) -> tuple[Array, Array, Array]:
+    def relief(self, position: Array) -> tuple[Array, Array, Array]:
         """Heights (...), slopes (..., d) and curvatures (..., d, d) at places (..., d)."""
-        d = place.shape[-1]
-        x, z = place[..., 0], place[..., 1] if d > 1 else np.zeros(place.shape[:-1])
+        d = position.shape[-1]
+        x, z = position[..., 0], position[..., 1] if d > 1 else np.zeros(position.shape[:-1])
         near_x, near_z = (np.clip(at, grid[0], grid[-1]) for at, grid in ((x, self.x), (z, self.z)))
         within = near_x == x, near_z == z
         found = []

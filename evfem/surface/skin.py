@@ -135,14 +135,14 @@ class Skin:
         middle = np.broadcast_to(values.mean(axis=1, keepdims=True), values.shape)
         triangles = np.stack([values, np.roll(values, -1, axis=1), middle], axis=2).reshape(-1, 3, 3)
         inside, line = _clipped(triangles)
-        way = np.diff(line[..., :2], axis=1)
+        edges = np.diff(line[..., :2], axis=1)
         sides = np.stack([values[:, 1] - values[:, 0], values[:, 2] - values[:, 1]], axis=1)[..., :2]
         sides += np.stack([values[:, 2] - values[:, 3], values[:, 3] - values[:, 0]], axis=1)[..., :2]
-        strip = 0.5 * np.linalg.norm(_cross(np.repeat(sides, 4, axis=0), way), axis=1)
+        strip = 0.5 * np.linalg.norm(_cross(np.repeat(sides, 4, axis=0), edges), axis=1)
         faces, covered = self._quarters[down], inside.reshape(-1, 4).sum(axis=1)
         near = np.bincount(faces.ravel(), np.repeat(covered, 4), self.nodes.size)[faces].mean(axis=1)
         cut = OVERSHOT * float(np.minimum(strip.reshape(-1, 4).sum(axis=1), near).sum())
-        border, real = np.linalg.norm(way[:, 0], axis=1), float(inside.sum()) - cut
+        border, real = np.linalg.norm(edges[:, 0], axis=1), float(inside.sum()) - cut
         if not real > 0.0:
             return 0.0, 0.0
         touches = triangles[triangles[..., 2] > 0.0]
@@ -186,9 +186,9 @@ def _clipped(triangles: Floats) -> tuple[Floats, Floats]:
     whole = np.abs(0.5 * _cross(second - first, third - first))
     sides = np.stack([second, third], axis=1)
     fall = np.where(mixed[:, None], first[:, None, 2] - sides[..., 2], 1.0)
-    way = np.where(mixed[:, None], first[:, None, 2] / fall, 0.0)
-    corner = way.prod(axis=1) * whole
-    line = first[:, None] + way[..., None] * (sides - first[:, None])
+    edges = np.where(mixed[:, None], first[:, None, 2] / fall, 0.0)
+    corner = edges.prod(axis=1) * whole
+    line = first[:, None] + edges[..., None] * (sides - first[:, None])
     return np.where(count == 1, corner, np.where(count > 1, whole - corner, 0.0)), line
 
 

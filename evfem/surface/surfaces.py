@@ -31,7 +31,7 @@ from evfem.electrostatics.laws import FILM, Layer
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
 from evfem.surface.elastic import ELASTIC, elastic_of
-from evfem.surface.ways import ANGLE, FrictionMap, OneWay, direction
+from evfem.surface.ways import ANGLE, FrictionMap, Unidirectional, direction
 from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
@@ -59,7 +59,7 @@ Friction = Annotated[
     float | Rows | FrictionMap,
     {
         "allowed": FRICTION,
-        "check": lambda key, given: _friction(key, given),
+        "check": lambda key, value: _friction(key, value),
         "type": float | list[list[float]] | dict,
     },
     "Coulomb's coefficient, its table over x (mm), or a table {x, z, friction}; linear in between",
@@ -71,10 +71,10 @@ Shift = Annotated[
     "shift of the profile; without it the finger just touches at the start",
 ]
 Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None", Layer, type(None))]
-GivesWay = Annotated[Elastic | None, {"check": lambda key, given: elastic_of(given, key), "allowed": ELASTIC}]
+GivesWay = Annotated[Elastic | None, {"check": lambda key, value: elastic_of(value, key), "allowed": ELASTIC}]
 
 
-class RigidSurface(OneWay, Checked):
+class RigidSurface(Unidirectional, Checked):
     """Base of surfaces; subclasses are frozen dataclasses with these fields."""
 
     friction: float | Rows | FrictionMap
@@ -108,8 +108,8 @@ class RigidSurface(OneWay, Checked):
         """
         if isinstance(self.friction, float):
             return np.full(np.shape(x), self.friction)
-        place, mu = self._rows.T
-        return piecewise_linear(place, mu, x)
+        position, mu = self._rows.T
+        return piecewise_linear(position, mu, x)
 
     def friction_slope(self, x: Array) -> Array:
         """Derivative (1/mm) of the friction coefficient at x (mm), jumps left out.
@@ -119,8 +119,8 @@ class RigidSurface(OneWay, Checked):
         """
         if isinstance(self.friction, float):
             return np.zeros(np.shape(x))
-        place, mu = self._rows.T
-        return piecewise_slope(place, mu, x)
+        position, mu = self._rows.T
+        return piecewise_slope(position, mu, x)
 
     @property
     def friction_jumps(self) -> Array:
@@ -131,10 +131,10 @@ class RigidSurface(OneWay, Checked):
         """
         if isinstance(self.friction, float):
             return np.zeros((0, 3))
-        place, mu = self._rows.T
-        first = np.concatenate([[True], np.diff(place) > 0])
-        last = np.concatenate([np.diff(place) > 0, [True]])
-        jumps = np.stack([place[last], mu[first], mu[last]], axis=1)
+        position, mu = self._rows.T
+        first = np.concatenate([[True], np.diff(position) > 0])
+        last = np.concatenate([np.diff(position) > 0, [True]])
+        jumps = np.stack([position[last], mu[first], mu[last]], axis=1)
         return jumps[jumps[:, 1] != jumps[:, 2]]
 
     @property
@@ -146,8 +146,8 @@ class RigidSurface(OneWay, Checked):
         """
         if isinstance(self.friction, float):
             return np.zeros((0, 4))
-        place, mu = self._rows.T
-        ramps = np.stack([place[:-1], place[1:], mu[:-1], mu[1:]], axis=1)
+        position, mu = self._rows.T
+        ramps = np.stack([position[:-1], position[1:], mu[:-1], mu[1:]], axis=1)
         return ramps[(ramps[:, 0] < ramps[:, 1]) & (ramps[:, 2] != ramps[:, 3])]
 
     def shifted(self, y: float) -> Self:
@@ -180,9 +180,13 @@ class _Level(RigidSurface):
 
     slope = curvature = height
 
-    def relief(self, place: Array) -> tuple[Array, Array, Array]:
+    def relief(self, position: Array) -> tuple[Array, Array, Array]:
         """Zeros."""
-        return np.zeros(place.shape[:-1]), np.zeros(place.shape), np.zeros((*place.shape, place.shape[-1]))
+        return (
+            np.zeros(position.shape[:-1]),
+            np.zeros(position.shape),
+            np.zeros((*position.shape, position.shape[-1])),
+        )
 
 
 @dataclass(frozen=True)
@@ -269,13 +273,13 @@ class Sinusoid(RigidSurface):
         assert self.terms is not None
         return self.terms
 
-    def relief(self, place: Array) -> tuple[Array, Array, Array]:
+    def relief(self, position: Array) -> tuple[Array, Array, Array]:
         """Heights, slopes and curvatures of all terms, each along its own direction."""
-        d = place.shape[-1]
+        d = position.shape[-1]
         amplitude, wave, phase = self._waves
-        wave, rows = wave[:, :d], place.reshape(-1, d)
+        wave, rows = wave[:, :d], position.reshape(-1, d)
         square = (wave[:, :, None] * wave[:, None, :]).reshape(-1, d * d)
-        kind = np.result_type(place, float)  # complex in a complex step
+        kind = np.result_type(position, float)  # complex in a complex step
         height, slope, curvature = (np.zeros((len(rows), size), kind) for size in (1, d, d * d))
         block = max(MOST_VALUES // max(len(rows), 1), 1)
         for first in range(0, len(wave), block):
@@ -286,9 +290,9 @@ class Sinusoid(RigidSurface):
             slope += cosine @ wave[some]
             curvature -= sine @ square[some]
         return (
-            height.reshape(place.shape[:-1]),
-            slope.reshape(place.shape),
-            curvature.reshape(*place.shape, d),
+            height.reshape(position.shape[:-1]),
+            slope.reshape(position.shape),
+            curvature.reshape(*position.shape, d),
         )
 
     @cached_property
@@ -387,56 +391,56 @@ class Profile(RigidSurface):
         return 2.0 * c[1] + d * 6.0 * c[0]
 
 
-def _friction(key: str, given: Any) -> float | Rows | FrictionMap:
+def _friction(key: str, value: Any) -> float | Rows | FrictionMap:
     """A number as float, a table as a tuple of rows, a map as it is or from its table."""
-    if isinstance(given, FrictionMap):
-        return given
-    if isinstance(given, Mapping):
-        if set(given) != {"x", "z", "friction"}:
-            found = ", ".join(map(str, given)) or "nothing"
+    if isinstance(value, FrictionMap):
+        return value
+    if isinstance(value, Mapping):
+        if set(value) != {"x", "z", "friction"}:
+            found = ", ".join(map(str, value)) or "nothing"
             raise InputError(key, f"a table of {found}", "x, z and friction")
-        return FrictionMap(**given)
-    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
-        return real(key, given, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)
-    rows = _rows(key, given, 2, FRICTION, MOST_ROWS)
+        return FrictionMap(**value)
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        return real(key, value, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)
+    rows = _rows(key, value, 2, FRICTION, MOST_ROWS)
     x, mu = np.array(rows).T
     if not ((mu >= 0.0) & (mu <= ROUGHEST) & (np.abs(x) <= FARTHEST)).all() or (np.diff(x) < 0.0).any():
-        raise InputError(key, given, FRICTION)
+        raise InputError(key, value, FRICTION)
     return rows
 
 
-def _terms(key: str, given: Any) -> tuple[tuple[float, ...], ...]:
+def _terms(key: str, value: Any) -> tuple[tuple[float, ...], ...]:
     """Rows of a sum of sines, with angles or without."""
-    rows = list(given) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else given
+    rows = list(value) if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else value
     long = isinstance(rows, list) and any(np.size(row) == 4 for row in rows)
     if long:  # some rows with an angle, some without
         rows = [[*row, 0.0] if np.size(row) == 3 else row for row in rows]
     found = _rows(key, rows, 4 if long else 3, TERMS, MOST_TERMS)
     if (np.abs(found) > [HIGHEST, FASTEST, FASTEST, 360.0][: len(found[0])]).any():
-        raise InputError(key, quoted(given), TERMS)
+        raise InputError(key, quoted(value), TERMS)
     return found
 
 
-def _rows(key: str, given: Any, columns: int, allowed: str, most: int) -> tuple[tuple[float, ...], ...]:
+def _rows(key: str, value: Any, columns: int, allowed: str, most: int) -> tuple[tuple[float, ...], ...]:
     """A table of numbers as a tuple of rows."""
-    table = numbers(key, given, allowed, axes=2)
+    table = numbers(key, value, allowed, axes=2)
     if table.shape[1] != columns or not 0 < len(table) <= most:
-        raise InputError(key, given, allowed)
+        raise InputError(key, value, allowed)
     return tuple(map(tuple, table.tolist()))
 
 
 def _check_samples(x: Array, height: Array) -> None:
     if len(x) < 2 or len(x) != len(height):
-        given = f"{len(x)} values of x, {len(height)} heights"
-        raise InputError("surface.x", given, "at least two points, and as many heights as x")
+        value = f"{len(x)} values of x, {len(height)} heights"
+        raise InputError("surface.x", value, "at least two points, and as many heights as x")
     if len(x) > MOST_SAMPLES:
         raise InputError("surface.x", f"{len(x)} points", f"at most {MOST_SAMPLES} points")
     for key, values, most in (("surface.x", x, FARTHEST), ("surface.height", height, HIGHEST)):
         if np.abs(values).max() > most:
-            given = f"{values[np.argmax(np.abs(values))]:g}"
-            raise InputError(key, given, f"lengths in mm within {most:g} mm")
+            value = f"{values[np.argmax(np.abs(values))]:g}"
+            raise InputError(key, value, f"lengths in mm within {most:g} mm")
     wrong = np.flatnonzero(np.diff(x) < NEAREST)
     if len(wrong):
         n = int(wrong[0])
-        given = f"{x[n]:g}, then {x[n + 1]:g} (points {n + 1}, {n + 2})"
-        raise InputError("surface.x", given, f"increasing values, at least {NEAREST:g} mm apart")
+        value = f"{x[n]:g}, then {x[n + 1]:g} (points {n + 1}, {n + 2})"
+        raise InputError("surface.x", value, f"increasing values, at least {NEAREST:g} mm apart")

@@ -171,8 +171,8 @@ class SelfAffine(RigidSurface):
         shortest = real("surface.shortest", self.shortest, allowed, _within(longest))
         set_frozen(self, longest=longest, shortest=shortest)
         if not 1 <= len(self._waves) <= MOST_TERMS:
-            given = f"{len(self._waves)} waves between {longest:g} and {shortest:g} mm"
-            raise InputError("surface.shortest", given, f"1 to {MOST_TERMS} waves that fit into the period")
+            problem = f"{len(self._waves)} waves between {longest:g} and {shortest:g} mm"
+            raise InputError("surface.shortest", problem, f"1 to {MOST_TERMS} waves that fit into the period")
 
     @property
     def _waves(self) -> range:

@@ -97,20 +97,23 @@ def check(scene: Scene | str | Path) -> Checked:
     given = scene if isinstance(scene, Scene) else load(scene)
     with notices.status("the scene"):
         own = simulate(given)
-    rows = [_row("the scene", own, own), *(_ended(way, other, own) for way, other in _others(given, own))]
+    rows = [
+        _row("the scene", own, own),
+        *(_ended(variant, other, own) for variant, other in _others(given, own)),
+    ]
     with other_solver() as name:
         rows += [_ended(f"sparse solver {name}", given, own)] if name else []
     return Checked(rows)
 
 
-def _ended(way: str, scene: Scene, own: Result) -> dict[str, Any]:
+def _ended(variant: str, scene: Scene, own: Result) -> dict[str, Any]:
     """How a way ends; its warnings are the scene's own, said once."""
-    with notices.status(way), catch_warnings():
+    with notices.status(variant), catch_warnings():
         simplefilter("ignore", UserWarning)
         try:
-            return _row(way, simulate(scene), own)
+            return _row(variant, simulate(scene), own)
         except NotConverged as error:
-            return {"way": way, "why": f"ends early: {error}", "difference": np.inf}
+            return {"way": variant, "why": f"ends early: {error}", "difference": np.inf}
 
 
 def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
@@ -118,9 +121,9 @@ def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
     motions: tuple[Any, ...] = scene.motion
     yield "twice the steps", replace(scene, motion=[replace(one, steps=2 * one.steps) for one in motions])
     strategy = scene.solver.strategy
-    for share in HOLDS if own.provenance["solver"]["barriers"] else ():
-        hold = replace(strategy, hold=share * strategy.hold)
-        yield f"held by {share:g} of the drag", replace(scene, solver=replace(scene.solver, strategy=hold))
+    for ratio in HOLDS if own.provenance["solver"]["barriers"] else ():
+        hold = replace(strategy, hold=ratio * strategy.hold)
+        yield f"held by {ratio:g} of the drag", replace(scene, solver=replace(scene.solver, strategy=hold))
     for i, name in product(range(len(motions)), ("indentation", "force", "gap", "distance", "voltage")):
         if isinstance(value := getattr(motions[i], name, None), float | int) and value:
             other = replace(motions[i], **{name: value * (1.0 + PERTURBATION)})
@@ -129,11 +132,11 @@ def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
             return
 
 
-def _row(way: str, found: Result, own: Result) -> dict[str, Any]:
+def _row(variant: str, found: Result, own: Result) -> dict[str, Any]:
     """How a way ends beside the scene's own end."""
     end = {name: float(getattr(found, name)[-1]) for name in (*FORCES, "indentation")}
     known = {name: float(getattr(own, name)[-1]) for name in end}
     largest = max(abs(known[name]) for name in FORCES)
     off = [abs(end[name] - known[name]) / max(largest, 1e-12) for name in FORCES]
     deeper = abs(end["indentation"] - known["indentation"]) / max(abs(known["indentation"]), SMALL)
-    return {"way": way, **end, "why": "", "difference": max(*off, deeper)}
+    return {"way": variant, **end, "why": "", "difference": max(*off, deeper)}

@@ -191,8 +191,8 @@ def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
     """One entry of the grid: (label, keys and values) of each of its rows."""
     entry = entry.tolist() if hasattr(entry, "tolist") else entry  # numpy
     if not isinstance(entry, (Mapping, Sequence)) or isinstance(entry, str) or not entry:
-        given = "no values" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
-        raise InputError(f"grid.{name}", given, "a list of values, or a table of named rows {key = value}")
+        problem = "no values" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
+        raise InputError(f"grid.{name}", problem, "a list of values, or a table of named rows {key = value}")
     if not isinstance(entry, Mapping):
         check_key(f"grid.{name}", name)
         return [({}, {name: plain_value(f"grid.{name}", value)}) for value in entry]
@@ -209,19 +209,19 @@ def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
     return rows
 
 
-def check_key(place: str, key: str) -> None:
+def check_key(where: str, key: str) -> None:
     """InputError unless `key` may be a dotted key of a scene file."""
     if key.split(".")[0] not in TABLES or "." not in key:
-        raise InputError(place, shown(key), f"TABLE.KEY of a scene file, TABLE one of {', '.join(TABLES)}")
+        raise InputError(where, shown(key), f"TABLE.KEY of a scene file, TABLE one of {', '.join(TABLES)}")
 
 
-def plain_value(place: str, value: Any) -> Any:
+def plain_value(where: str, value: Any) -> Any:
     """The value in Python's own types, as a scene file can hold it."""
     value = value.tolist() if hasattr(value, "tolist") else value  # numpy
     if isinstance(value, (tuple, list)):
-        return [plain_value(place, one) for one in value]
+        return [plain_value(where, one) for one in value]
     if not isinstance(value, (bool, int, float, str)):
-        raise InputError(place, quoted(value), "numbers, text, true or false, and lists of them")
+        raise InputError(where, quoted(value), "numbers, text, true or false, and lists of them")
     return value
 
 
@@ -229,19 +229,19 @@ def put_in(tables: Any, key: str, value: Any) -> None:
     """Replace one dotted key of the tables of a scene; tables that are not there are made."""
     here, names = tables, key.split(".")
     for depth, name in enumerate(names, 1):
-        place: Any = name
+        where: Any = name
         so_far = ".".join(names[:depth])
         if isinstance(here, list):
             if not (name.isdecimal() and int(name) < len(here)):
                 allowed = f"numbers from 0 to {len(here) - 1} for the entries of this list"
                 raise InputError(so_far, "no such entry", allowed)
-            place = int(name)
+            where = int(name)
         elif not isinstance(here, dict):
             raise InputError(so_far, "a key inside a value that is no table", "a key of a table")
         if depth == len(names):
-            here[place] = value
+            here[where] = value
         else:
-            here = here.setdefault(place, {}) if isinstance(here, dict) else here[place]
+            here = here.setdefault(where, {}) if isinstance(here, dict) else here[where]
 
 
 def check_output(output: Any, motions: int) -> None:
@@ -354,12 +354,12 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 
 def _samples(table: Mapping[str, Any]) -> Samples:
-    if isinstance(given := table.get("parameters"), Mapping):
+    if isinstance(problem := table.get("parameters"), Mapping):
         found = {}
-        for key, value in _flat(given):
-            place = f"samples.parameters.{key}"
+        for key, value in _flat(problem):
+            where = f"samples.parameters.{key}"
             if not isinstance(value, Mapping):
-                raise InputError(place, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
-            found[key] = read(DistributionTable, value, place)
+                raise InputError(where, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
+            found[key] = read(DistributionTable, value, where)
         table = {**table, "parameters": found}
     return read(Samples, table, "samples")

@@ -38,9 +38,9 @@ class Uniform:
         if not self.low < self.high:
             raise InputError("uniform", f"{self.low:g} to {self.high:g}", "two numbers, the lower one first")
 
-    def quantile(self, share: Floats) -> Floats:
+    def quantile(self, probability: Floats) -> Floats:
         """The value below which lies that share (0 to 1) of the probability."""
-        return self.low + share * (self.high - self.low)
+        return self.low + probability * (self.high - self.low)
 
 
 @dataclass(frozen=True)
@@ -67,27 +67,29 @@ class Normal:
             allowed = "two numbers, the lower one first, within six standard deviations of the mean"
             raise InputError("between", f"{low:g} to {high:g}", allowed)
 
-    def quantile(self, share: Floats) -> Floats:
+    def quantile(self, probability: Floats) -> Floats:
         """The value below which lies that share (0 to 1) of the probability."""
         normal = NormalDist(self.mean, self.sd)
         low, high = self.between or (-math.inf, math.inf)
         below, inside = normal.cdf(low), normal.cdf(high) - normal.cdf(low)
         tiny = 2.0**-53  # the tails of what cannot be told from 0 and 1
-        values = [normal.inv_cdf(min(max(below + u * inside, tiny), 1.0 - tiny)) for u in share.tolist()]
+        values = [
+            normal.inv_cdf(min(max(below + u * inside, tiny), 1.0 - tiny)) for u in probability.tolist()
+        ]
         return np.clip(values, low, high)
 
 
 Distribution = Uniform | Normal
 
 
-def _parameters(key: str, given: Any) -> dict[str, Distribution]:
-    if not isinstance(given, Mapping) or not given:
-        said = quoted(given) if given else ABSENT
+def _parameters(key: str, entry: Any) -> dict[str, Distribution]:
+    if not isinstance(entry, Mapping) or not entry:
+        said = quoted(entry) if entry else ABSENT
         raise InputError(key, said, "at least one parameter with a distribution")
-    for name, distribution in given.items():
+    for name, distribution in entry.items():
         if not isinstance(distribution, Distribution):
             raise InputError(f"{key}.{name}", quoted(distribution), "Uniform or Normal")
-    return dict(given)
+    return dict(entry)
 
 
 _PARAMETERS = {"allowed": "a table [samples.parameters] of distributions", "check": _parameters}

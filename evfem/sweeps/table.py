@@ -67,8 +67,8 @@ areas where every finger has a depth or is one in three dimensions
             allowed = "areas where every finger has a depth or is one in three dimensions"
             raise InputError("outputs", f"{quoted(output)} of a finger without it", allowed)
         if len(kinds) > 1:
-            given = f"{output} in {' and '.join(sorted(map(str, kinds)))}"
-            raise InputError("finger.depth", given, "a depth for every finger in the plane, or for none")
+            problem = f"{output} in {' and '.join(sorted(map(str, kinds)))}"
+            raise InputError("finger.depth", problem, "a depth for every finger in the plane, or for none")
         units[output] = str(kinds.pop())
     return units
 
@@ -174,8 +174,8 @@ def read(path: Path) -> SweepResult:
     parts = [cell.removesuffix(")").partition(" (") for cell in head]
     names, units = [name for name, _, _ in parts], {name: unit for name, _, unit in parts if unit}
     if names[:1] != [*FIRST] or not set(LAST) <= set(names):
-        given = f"{path.name}, which starts with {','.join(head)[:60]!r}"
-        raise InputError("path", given, f"{TABLE} of a sweep, a point in each line")
+        problem = f"{path.name}, which starts with {','.join(head)[:60]!r}"
+        raise InputError("path", problem, f"{TABLE} of a sweep, a point in each line")
     known = {name: _kept(provenance, name) for name in names}
     cells = (zip(names, row, strict=True) for row in body)
     rows = [{name: _value(name, cell, known[name]) for name, cell in row} for row in cells]

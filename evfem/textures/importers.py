@@ -116,8 +116,8 @@ class Table(Heights, kind="csv"):
         quantity = _quantity_of(table.names)
         if quantity is None:
             headers = " | ".join(",".join(header) for header, _ in QUANTITIES.values())
-            given = f"{path.name}, which {table.start}"
-            refusal = InputError("file", given, f"{headers}, so called in the file")
+            value = f"{path.name}, which {table.start}"
+            refusal = InputError("file", value, f"{headers}, so called in the file")
             return self._scanned(path, refusal, table.names[0] == "1")
         used = [[_usual(name) for name in table.names].index(name) for name in QUANTITIES[quantity][0]]
         first, second = (table.columns[i] * _scale(table.names[i], table.units[i], self.unit) for i in used)
@@ -179,8 +179,8 @@ class Scan(Heights, kind="scan"):
         topography = _topography(path)
         named = topography.unit or self.unit
         if named not in LENGTHS:
-            given = f"{path.name}, {'without a unit' if named is None else f'in {named}'}"
-            raise InputError("unit", given, f"one of {', '.join(LENGTHS)}")
+            value = f"{path.name}, {'without a unit' if named is None else f'in {named}'}"
+            raise InputError("unit", value, f"one of {', '.join(LENGTHS)}")
         scale, note = LENGTHS[named], f"In {named}."
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * scale
         if topography.dim == 1:
@@ -293,24 +293,24 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
     return rate, columns[which], names[which] if names else ""
 
 
-def _channel(given: int | str | None, names: list[str], count: int) -> int:
+def _channel(value: int | str | None, names: list[str], count: int) -> int:
     called = [*names, *map(str, range(1, count + 1))]
-    if given is None and count == 1:
+    if value is None and count == 1:
         return 0
-    if given is None or str(given).lower() not in called:
-        said = f"nothing, of {count}" if given is None else quoted(str(given))
+    if value is None or str(value).lower() not in called:
+        said = f"nothing, of {count}" if value is None else quoted(str(value))
         raise InputError("channel", said, " | ".join(called))
-    return called.index(str(given).lower()) % count
+    return called.index(str(value).lower()) % count
 
 
-def _recorded(path: Path, given: str | None, column: str) -> str:
+def _recorded(path: Path, value: str | None, column: str) -> str:
     """What a recording holds: what was said, unless its column says another."""
-    said = column if column in RECORDED else given
+    said = column if column in RECORDED else value
     if said is None:
         wrong = f"nothing, and {path.name} does not say what it holds"
         raise InputError("quantity", wrong, " | ".join(RECORDED))
-    if given not in (None, said):
-        raise InputError("quantity", f"{given}, of {said}", " | ".join(RECORDED))
+    if value not in (None, said):
+        raise InputError("quantity", f"{value}, of {said}", " | ".join(RECORDED))
     return said
 
 
@@ -337,8 +337,8 @@ def _lines(frequency: Floats, amplitude: Floats, longest: float) -> tuple[Floats
     lowest = (1.0 - 1e-9) / longest
     kept = (frequency >= lowest) & (frequency <= HIGHEST_FREQUENCY)
     if kept.sum() < 2:
-        given = f"hardly a line between {lowest:.3g} and {HIGHEST_FREQUENCY:g} per mm"
-        raise InputError("speed", given, "the speed of the recording, and a longest wave that it has")
+        problem = f"hardly a line between {lowest:.3g} and {HIGHEST_FREQUENCY:g} per mm"
+        raise InputError("speed", problem, "the speed of the recording, and a longest wave that it has")
     frequency, power = frequency[kept], amplitude[kept] ** 2
     width = -(-frequency.size // MOST_LINES)
     starts = np.arange(0, frequency.size, width)

@@ -82,9 +82,9 @@ class Texture:
         if self.period is not None:
             period = float(above("period", self.period, 0.0, "a length in mm above zero"))
             if self.quantity == "friction_spectrum" or not x[-1] - x[0] < period <= LONGEST:
-                given = f"{period:g} mm, with rows over {x[-1] - x[0]:g}"
+                problem = f"{period:g} mm, with rows over {x[-1] - x[0]:g}"
                 allowed = f"more than the rows' length, up to {LONGEST:g} mm, and none for a spectrum"
-                raise InputError("period", given, allowed)
+                raise InputError("period", problem, allowed)
             set_frozen(self, period=period)
 
     def __repr__(self) -> str:
@@ -146,8 +146,8 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
         path = path / NAME
     data = path.with_suffix(".csv")
     if data.exists() and not is_data(data):
-        given = f"{path}, and {data} is there and no texture's"
-        raise InputError("path", given, "a name whose .csv is free, or a texture to replace")
+        problem = f"{path}, and {data} is there and no texture's"
+        raise InputError("path", problem, "a name whose .csv is free, or a texture to replace")
     header, units = QUANTITIES[texture.quantity]
     rows = zip(texture.x.tolist(), texture.values.tolist(), strict=True)
     write_text(data, csv_text([header, *rows]))
@@ -217,8 +217,8 @@ def _check(texture: Texture) -> None:
     """InputError for rows that do not fit, or beyond what a texture may have."""
     x, values, quantity = texture.x, texture.values, texture.quantity
     if x.size != values.size or not 2 <= x.size <= MOST_ROWS:
-        given = f"{x.size} and {values.size} numbers"
-        raise InputError("x", given, f"2 to {MOST_ROWS} rows of two numbers")
+        problem = f"{x.size} and {values.size} numbers"
+        raise InputError("x", problem, f"2 to {MOST_ROWS} rows of two numbers")
     falls = np.flatnonzero(np.diff(x) < 1e-9)
     if falls.size:
         n = int(falls[0])

@@ -22,15 +22,15 @@ _SHARES = "rows [share of the equilibrium shear modulus, relaxation time in s], 
 Pairs = tuple[tuple[float, float], ...]
 
 
-def shares_of(key: str, given: Any) -> Pairs:
+def shares_of(key: str, entered: Any) -> Pairs:
     """Rows (share, seconds) of Maxwell branches, checked."""
     positive = Within(0.0, above=True)
     try:
-        rows = [tuple(row) for row in given]
+        rows = [tuple(row) for row in entered]
     except TypeError:
         rows = [()]
     if any(len(row) != 2 for row in rows):
-        raise InputError(key, quoted(given), _SHARES)
+        raise InputError(key, quoted(entered), _SHARES)
     return tuple((real(key, r, _SHARES, positive), real(key, t, _SHARES, positive)) for r, t in rows)
 
 
@@ -42,10 +42,10 @@ def relaxation_of(g: Sequence[Sequence[float]]) -> Pairs:
     ((0.5, 1.0), (0.5, 0.1))
     """
     rows = shares_of("g", g)
-    rest = 1.0 - sum(share for share, _ in rows)
+    rest = 1.0 - sum(ratio for ratio, _ in rows)
     if not rest > 0.0:
         raise InputError("g", quoted(g), "shares of the instantaneous shear modulus, in all below 1")
-    return tuple((share / rest, time) for share, time in rows)
+    return tuple((ratio / rest, time) for ratio, time in rows)
 
 
 # keys that laws share
@@ -117,8 +117,8 @@ MOST = 1000.0
 def _numbers(allowed: str, inside: Callable[[float], bool], unit: str = "") -> dict[str, Any]:
     """Rule of a number or a list of them, kept as a tuple."""
 
-    def check(key: str, given: Any) -> tuple[float, ...]:
-        values = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
+    def check(key: str, entered: Any) -> tuple[float, ...]:
+        values = tuple(entered) if isinstance(entered, Sequence | np.ndarray) else (entered,)
         return tuple(real(key, value, allowed, inside) for value in values)
 
     return {"allowed": allowed, "check": check, "unit": unit, "type": float | list[float]}

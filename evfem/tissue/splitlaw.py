@@ -159,7 +159,7 @@ class FormLaw:
         """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u itself."""
         rest = identity(self.parts.dim, 2), np.zeros((1, 1))
         A, c, k = self.split_tangent(*rest)
-        if not all(np.isfinite(part).all() for part in (A, c, k, *self.split_stress(*rest))):
+        if not all(np.isfinite(array).all() for array in (A, c, k, *self.split_stress(*rest))):
             allowed = "as a material a form of grad(u), u.theta, grad(v) and v.theta that is finite at rest"
             raise InputError("material", self.form.name, allowed)
         return float(np.mean(A[0, 1, 0, 1]))
@@ -268,7 +268,7 @@ def _work(stress: Stress, F: Array, theta: Array) -> Array:
     work = np.zeros(F.shape[2:])
     for node, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True):
         t = 0.5 * (node + 1.0)
-        R, turned = (part[: len(F), : len(F)] for part in turn(t))
+        R, turned = (array[: len(F), : len(F)] for array in turn(t))
         V = eye + t * (U - eye)
         rate = mul(turned, V) + mul(R, U - eye)
         S, q = stress(mul(R, V), t * theta)

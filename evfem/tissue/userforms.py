@@ -89,22 +89,22 @@ def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None)
     except InputError:
         raise
     except Exception as error:  # whatever a user's code raises
-        given = f"an integrand that raises {type(error).__name__}: {error}"
-        raise _refused(form, given, "functions of numpy and evfem.tensor of u, v and w") from error
+        problem = f"an integrand that raises {type(error).__name__}: {error}"
+        raise _refused(form, problem, "functions of numpy and evfem.tensor of u, v and w") from error
     skew = np.abs(D - np.swapaxes(D, 0, 1)).max()
     return Trial(parts, bool(skew <= 1e-12 * np.abs(D).max()))
 
 
-def _refused(form: Integrand, given: str, allowed: str) -> InputError:
-    return InputError(f"form {getattr(form, 'name', '')}".strip(), given, allowed)
+def _refused(form: Integrand, problem: str, allowed: str) -> InputError:
+    return InputError(f"form {getattr(form, 'name', '')}".strip(), problem, allowed)
 
 
 def _value(form: Integrand, value: Any, shape: tuple[int, ...]) -> Array:
     """The integrand at every point, finite; one that is the same everywhere may be a number."""
     found = np.asarray(value, dtype=object if value is None else None)
     if value is None or found.shape not in ((), shape):
-        given = "no integrand" if value is None else f"an integrand of shape {found.shape}"
-        raise _refused(form, given, f"a number for every point, here of shape {shape}")
+        problem = "no integrand" if value is None else f"an integrand of shape {found.shape}"
+        raise _refused(form, problem, f"a number for every point, here of shape {shape}")
     if not np.isfinite(found).all():
         raise _refused(form, "an integrand that is infinite or no number", "finite values, at rest too")
     return np.broadcast_to(found, shape)
@@ -112,9 +112,9 @@ def _value(form: Integrand, value: Any, shape: tuple[int, ...]) -> Array:
 
 def _check_linear(form: Integrand, first: Array, second: Array, both: Array) -> None:
     """Whether the integrand at the sum of two test functions is the sum of those at each."""
-    if np.abs(both - first - second).max() > LINEAR * max(np.abs(part).max() for part in (first, second)):
-        given = "an integrand that is not linear in v"
-        raise _refused(form, given, "one that is 0 for v = 0 and twice as large for 2 v")
+    if np.abs(both - first - second).max() > LINEAR * max(np.abs(array).max() for array in (first, second)):
+        problem = "an integrand that is not linear in v"
+        raise _refused(form, problem, "one that is 0 for v = 0 and twice as large for 2 v")
 
 
 def _derivative(form: Integrand, parts: Parts, state: Array, w: Any) -> Array:
@@ -186,7 +186,7 @@ def facet_points(space: Space, name: str, rule: tuple[Floats, Floats] | None = N
     on_side, by_side = faces.shape_functions(2 * dim - 2, 2.0 * places - 1.0)
     corners = 0.5 * (faces.node_places(mesh.cells.shape[1], dim)[mesh.local_sides[:, : 2 * dim - 2]] + 1.0)
     both = [shape_functions(mesh.kind, on_side @ corner) for corner in corners]
-    value, slope = (np.stack(part)[sides] for part in zip(*both, strict=True))
+    value, slope = (np.stack(array)[sides] for array in zip(*both, strict=True))
     jacobian = jacobians(mesh, cells, slope)
     ways = 2.0 * np.einsum("qma,kmj->kqja", by_side, corners)[sides]
     tangents = np.einsum("ijkq,kqja->aikq", jacobian, ways)
