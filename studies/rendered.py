@@ -134,7 +134,7 @@ def felt_on(
 ) -> tuple[rendering.Recording, rendering.ApparentFriction, float, tuple[float, float], rendering.Signal]:
     """A case's reference, what is felt, its full slip (mm), `display_friction` and the voltage of (20a)."""
     with warnings.catch_warnings():  # that the load drifts where its indentation is held is known
-        warnings.filterwarnings("ignore", "motion 1 slides with the indentation held")
+        warnings.filterwarnings("ignore", "motion 1 slides at constant indentation")
         reference = rendering.record(reference_scene(case, every))
     felt = rendering.apparent_friction(reference.result)
     full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])

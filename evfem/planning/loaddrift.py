@@ -1,6 +1,6 @@
 r"""Load drift of a slide at held indentation, from friction and geometry.
 
-A bone that keeps its height does not keep its load. Friction turns the pad about the bone, by
+At constant height of the bone the load is not constant. Friction rotates the pad about the bone, by
 
     phi = T b / (K + F e),    K = 4 pi G r^2 R^2 / (R^2 - r^2),    e = (a^2 - b^2) / b
 
@@ -13,8 +13,8 @@ resists with F e phi. The outline is wider than high, so that it stands deeper b
 
 with the indentation d, which for a finger like Table 2's is near 0.08 w (F / (G w))^0.62, w = 2 a.
 For fingers 16.7 to 20 mm wide and 12.8 to 14 mm high under 0.02 to 0.2 N/mm at friction 0.5 to 1
-runs drift by 0.4 to 1.8 times the estimate; a test looks at some. Attraction, slopes and viscosity
-are left out. Lengths in mm, forces in N/mm, moduli in MPa.
+the load drifts by 0.4 to 1.8 times the estimate (some cases are tested). Attraction, slopes and viscosity
+are neglected. Lengths in mm, forces in N/mm, moduli in MPa.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import path_line
 from evfem.scene.scene import Scene
 
-#: a drift of the load that is worth a word
+#: relative drift of the load that is worth a warning
 WORTH = 0.05
-#: exponent of the load over the indentation, and the indentation over the width at F = G w
-GROWTH, DEEP = 1.6, 0.08
-#: distance of the places at which the friction is looked at (mm)
+#: F ~ d^n: the exponent n, and the indentation d over the width w at F = G w
+LOAD_EXPONENT, DEPTH_COEFFICIENT = 1.6, 0.08
+#: spacing (mm) of the positions at which the friction is sampled
 STEP = 0.02
 
 
 def load_drift(finger: FingerPad, friction: float, load: float, modulus: float) -> float:
-    """Relative change of the `load` (N/mm) of a finger that slides with a held indentation, about;
+    """Estimated relative change of the `load` (N/mm) of a finger that slides at constant indentation;
     `modulus` is the shear modulus (MPa) of its softest tissue.
 
     >>> f"{load_drift(FingerPad(), friction=1.0, load=0.05, modulus=0.0115):.0%}"
@@ -51,12 +51,12 @@ def load_drift(finger: FingerPad, friction: float, load: float, modulus: float) 
     moment = 4.0 * np.pi * modulus * bone * outer / (outer - bone)
     eccentricity = (a**2 - b**2) / b
     angle = friction * load * b / (moment + load * abs(eccentricity))
-    indentation = DEEP * width * (load / (modulus * width)) ** (1.0 / GROWTH)
-    return float(GROWTH * eccentricity * angle**2 / (2.0 * indentation))
+    indentation = DEPTH_COEFFICIENT * width * (load / (modulus * width)) ** (1.0 / LOAD_EXPONENT)
+    return float(LOAD_EXPONENT * eccentricity * angle**2 / (2.0 * indentation))
 
 
 def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[str]:
-    """A sentence for the first slide after a press to a force whose held indentation lets the load drift."""
+    """A warning for the first slide at constant indentation, after a press to a force, whose load drifts."""
     if not isinstance(scene.finger, FingerPad) or not scene.ground.is_flat:
         return
     friction = float(np.max(scene.ground.friction_at(path_line(scene, mesh, STEP))))
@@ -68,7 +68,7 @@ def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[
             drift = load_drift(scene.finger, friction, load, min(moduli.values()))
             if abs(drift) > WORTH:
                 yield (
-                    f"motion {i} slides with the indentation held: at friction {friction:.2g} the pad rolls "
+                    f"motion {i} slides at constant indentation: at friction {friction:.2g} the pad rolls "
                     f"about the bone, and the load of {load:g} N/mm drifts by about {drift:.0%}; "
                     'hold = "force" keeps it'
                 )

@@ -1,8 +1,8 @@
-"""Mistakes in a user's parts of a scene, found before it is solved.
+"""Checks of user-defined components of a scene before it is solved.
 
-`check_parts` evaluates a user's laws once, near rest and at three gaps, tries a surface at a dozen places
-of the way and laws of contact at three pressures, and raises InputError for what no run could use.
-Built-in parts are not evaluated. `evaluated` and its like say in a sentence what is wrong with a function.
+`check_parts` evaluates user-defined laws once, near rest and at three gaps, a surface at a dozen positions
+of the path and laws of contact at three pressures, and raises InputError for unusable ones. Components of
+the package are not evaluated. `evaluated` and its like describe in a sentence what is wrong with a function.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from evfem.tensor import STEP, Array, complex_step, det, difference, inv, trace,
 from evfem.tissue.forms import Form
 from evfem.tissue.splitlaw import SplitLaw, split
 
-#: what a user's function must be
+#: requirement on a user's function
 FUNCTION = "a function that takes arrays with a value for every point"
-#: contact pressures (MPa) at which laws are tried, and a bound of friction over the last one, at most: no
-#: coefficient of a surface is larger
+#: contact pressures (MPa) at which laws are evaluated, and the largest shear limit over the last one (no
+#: surface has a larger coefficient)
 PRESSURES, GREATEST = np.array([0.0, 1e-4, 0.01]), 100.0
-#: coefficient of friction at which laws are tried, and one that is negative by rounding
+#: friction coefficient at which laws are evaluated, and a negative one that counts as rounding
 COEFFICIENT, ROUNDING = 0.3, 1e-9
-#: places of a surface as shares of the way, where no kink of a profile is likely
+#: positions on a surface as fractions of the path, where kinks of a profile are unlikely
 PLACES = np.linspace(0.0371, 0.9643, 12)
 #: steps (mm) of differences of a height, the largest slope that counts as none, and the median relative
 #: error of a slope, at most: heights have kinks and noise
@@ -46,7 +46,7 @@ DIRECTION = np.array([[1.0, 0.4, 0.0], [-0.2, 0.6, 0.0], [0.0, 0.0, 0.0]])
 REST, DERIVATIVE = 1e-6, 1e-4
 #: stiffness at rest over the largest one that counts as none: rounding
 NO_STIFFNESS = 1e-11
-#: shear and widening in the plane, (3, 3, 2, 2): which of them, and either way
+#: shear and widening in the plane, (3, 3, 2, 2): which of them, and with either sign
 WAYS = np.zeros((3, 3, 2, 2))
 WAYS[0, 1, 0] = WAYS[0, 0, 1] = WAYS[1, 1, 1] = 1.0, -1.0
 #: gaps (mm) at which a user's force law is evaluated, and attraction over that of rigid plates, at most
@@ -56,20 +56,22 @@ GAPS, STRONGEST = np.array([0.0, 0.1, 1.0]), 1e4
 GAP_STEP, BY_GAP = 1e-5, 1e-3
 #: change per mm over the value that counts as none
 NO_RATE = 1e-6
-#: moments of a voltage over time, and places of one over the way, at which its sign is looked at
+#: number of times, or of positions, at which the sign of a voltage is checked
 MOMENTS = 100
 #: a voltage (V) that is a mistake whatever the field
 HIGHEST_VOLTAGE = 5e5
 
 
 def check_parts(scene: Scene, dim: int) -> None:
-    """InputError for a user's part that no run in `dim` dimensions can use, or a voltage out of reason."""
+    """Raise InputError for a user-defined component that no run in `dim` dimensions can use, or an absurd
+    voltage.
+    """
     with_terms = {term.on.name for term in scene.forms}
     for name, law in scene.finger.materials.items():
         key = f"finger.materials.{name}"
         if isinstance(law, Form) or _is_own(law):
             _check_material(key, law, dim)
-        # a form may depend on the place, and a term may be what makes a region stiff
+        # a form may depend on the position, and another term may make a region stiff
         if _is_own(law) and name not in with_terms:
             _check_stiffness(key, law, dim)
     if _is_own(scene.surface):
@@ -206,7 +208,7 @@ def _check_traction(key: str, traction: Array, rigid: Any) -> None:
 
 
 def _lowest(scene: Scene) -> float:
-    """Lowest voltage (V) of a scene, as far as some moments and places tell."""
+    """Lowest voltage (V) of a scene at sampled times or positions."""
     own: Any = scene.electrics.voltage
     if isinstance(own, FollowForce):
         own = 0.0
@@ -287,7 +289,7 @@ def shaped(key: str, what: str, function: Callable[[Array], Any], at: Array, *, 
 
 
 def check_surface(scene: Scene) -> None:
-    """Whether a user's surface is finite everywhere on the way, with the slopes of its height."""
+    """Check that a user's surface is finite on the path, and that its slopes are those of its height."""
     key, own, x = "surface", scene.surface, _places(scene)
     for name in ("height", "slope", "curvature", "friction_coefficient"):
         method = getattr(own, name, None)
@@ -301,7 +303,7 @@ def check_surface(scene: Scene) -> None:
 
 
 def _check_slope(key: str, scene: Scene, x: Floats) -> None:
-    """Whether the slope that a run takes, given or derived, is near that of differences."""
+    """Check the slope, user-supplied or derived, against finite differences of the height."""
     problem = getattr(scene.surface, "slope", None) is not None
     slope = evaluated(key, "slope(x)" if problem else "height(x)", scene.ground.slope, x)
     errors = []

@@ -1,7 +1,7 @@
 """Warnings about valid but implausible input.
 
-`implausible` gives one sentence each: other units, fields beyond the breakdown of insulators, slides
-that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
+`implausible` gives one sentence each: wrong units, fields beyond the breakdown of insulators, slides
+that never touch. Unusable user-defined components are found by `evfem.planning.parts`.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.95, 0.2, 5.0
 LOCKED = 1e5
 #: length (mm) of a sampled profile, at least, where it has more points than a step or a bump needs
 SHORTEST, FEW = 0.15, 20
-#: length (mm) beside the end of a profile that a finger at the end touches, and share of the profile's height
-#: that it varies there where the profile does not end level
+#: length (mm) of a profile's end that a finger there touches, and the variation of height in it, as a
+#: fraction of the profile's height, above which the profile does not end level
 BESIDE, ROUGH_END = 1.0, 0.1
 #: field (V/um) that breaks any solid down
 BREAKDOWN = 300.0
@@ -50,7 +50,7 @@ PRESSED = 0.02
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
 HEAVIEST = 100.0
-#: distance (mm) of the places at which a profile's height is looked at
+#: spacing (mm) of the positions at which a profile's height is sampled
 WAY_STEP = 0.02
 
 
@@ -79,7 +79,7 @@ def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[st
     if locked:
         cells = "p2 triangles lock" if element == "p2" else f"{element} cells lock"
         other = "quadrilaterals with q2p1" if element == "p2" else "q2p1 or q1_fbar"
-        yield f"{' and '.join(locked)} hardly changes volume at all, and {cells}: use {other}"
+        yield f"{' and '.join(locked)} is almost incompressible, and {cells}: use {other}"
 
 
 def _hard(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[str]:
@@ -107,7 +107,7 @@ def _small(scene: Scene) -> Iterator[str]:
 
 
 def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
-    """Lengths and speeds as they are in cm, um, m/s."""
+    """Lengths and speeds that look like cm, um or m/s."""
     size = float(np.ptp(mesh.points[:, :2], axis=0).max())
     if size < SMALLEST:
         yield f"the mesh is {size:.3g} mm across, less than any finger: lengths are in mm, not in cm"
@@ -133,18 +133,18 @@ def _profile(scene: Scene, mesh: Mesh) -> Iterator[str]:
     if (rms := float(np.sqrt(np.sum(np.diff(height) ** 2 / np.diff(x)) / length))) > STEEPEST:
         yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
     middle = np.cumsum([0.0, *(course.distance or 0.0 for course in scene.courses)])
-    for end, way in ((x[0], middle.min()), (x[-1], middle.max())):
+    for end, reach in ((x[0], middle.min()), (x[-1], middle.max())):
         beside = height[np.abs(x - end) < BESIDE]
-        over = (end - way) * np.sign(end - np.mean(x)) < BESIDE
+        over = (end - reach) * np.sign(end - np.mean(x)) < BESIDE
         if mesh.dim == 2 and over and np.ptp(beside) > ROUGH_END * np.ptp(height):
             yield (
                 f"the profile ends at x = {end:.4g} mm below the finger, whose middle begins at x = 0 and "
-                f"goes to {way:.4g} mm: beyond its ends it is level"
+                f"goes to {reach:.4g} mm: beyond its ends it is level"
             )
 
 
 def _at_rest(scene: Scene) -> Iterator[str]:
-    """Branches that nothing loads in time."""
+    """Maxwell branches in a scene without viscous or inertial dynamics."""
     givers = (scene.finger, *scene.finger.materials.values())
     timed = any(motion.timed for motion in scene.motion)
     if timed and not scene.solver.timed and any(getattr(one, "relaxation", None) for one in givers):
@@ -223,7 +223,7 @@ def weakens(scene: Scene) -> bool:
 
 
 def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
-    """Slides after the last press that do not touch: before it, the bone may be on its way."""
+    """Slides after the last press that do not touch; earlier ones may be approaches."""
     presses = [i for i, course in enumerate(scene.courses) if (course.depth or 0.0) > 0.0]
     first, indentation = (presses[-1] + 1, math.inf) if presses else (0, 0.0)
     for i, course in enumerate(scene.courses[first:], first):

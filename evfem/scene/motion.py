@@ -1,4 +1,4 @@
-"""What the finger does (mm, N/mm, V, s); a run knows no kind, each motion gives its `Course`."""
+"""Motions of the finger (mm, N/mm, V, s); each one defines its displacement programme, a `Course`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from evfem.surface.ways import ANGLE, direction
 
 Hold = Literal["indentation", "force"]
 
-#: decades that the times of a wait with logarithmic steps span
+#: decades spanned by the times of a wait with logarithmic steps
 DECADES = 3.0
-#: a voltage (V) that is not known before the run
+#: estimate (V) of a voltage that is an unknown of the run
 UNKNOWN_VOLTAGE = 10_000.0
 
-# What a field may be, in words and as a check; scene files take their keys from the fields too.
+# Admissible values of fields, in words and as a check; they are also the keys of scene files.
 FORCE = number("a force in N/mm (of a fingertip in N), not negative", Within(0.0), "N/mm")
 INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0), "mm")
 _DISTANCE = number(
@@ -28,18 +28,18 @@ _GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0), "mm")
 _NARROWED = number("a gap in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True), "mm")
 VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V")
 _DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "s")
-Steps = Annotated[int, whole(), "in how many equal parts"]
-Held = Annotated[Hold, one_of(*get_args(Hold)), "what stays as it was: the indentation, or the applied force"]
+Steps = Annotated[int, whole(), "number of equal steps"]
+Held = Annotated[Hold, one_of(*get_args(Hold)), "kept constant: the indentation, or the applied force"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
-    """What a motion of any kind does; what is None stays as it is.
+    """Targets of a motion at its end; `None` leaves a quantity unchanged.
 
-    It goes `distance` (mm) towards `angle` (degrees from +x), to an `indentation` (mm) or an applied
-    `force` (N/mm); one that `hovers` leaves no load to hold. `hold` says what stays where neither is given.
-    It takes the voltage to `voltage` (V), or to what makes the smallest gap of the deformed pad `gap` (mm).
-    It goes with a `speed` (mm/s) or lasts a `duration` (s), else no time passes.
+    `distance` (mm) towards `angle` (degrees from +x); `indentation` (mm) or applied `force` (N/mm); without
+    either, `hold` is kept constant. `voltage` (V), or the smallest `gap` (mm) of the deformed pad that the
+    voltage must produce. Time passes by a `speed` (mm/s) or a `duration` (s). A motion that `hovers` leaves
+    no load to hold.
 
     >>> Course(distance=2.0, angle=90.0).travel
     (0.0, 2.0)
@@ -58,7 +58,7 @@ class Course:
 
     @property
     def direction(self) -> tuple[float, float]:
-        """Direction of its angle, x and z of a unit vector; quarter turns are exact."""
+        """Unit vector (x, z) at `angle`; quarter turns are exact."""
         return direction(self.angle)
 
     @property
@@ -69,17 +69,17 @@ class Course:
 
     @property
     def depth(self) -> float | None:
-        """Indentation (mm) at its end, as far as it is known: a force always touches."""
+        """Indentation (mm) at the end; None if unchanged, infinite if set by a force, which always touches."""
         return self.indentation if self.force is None else math.inf
 
     @property
     def presses(self) -> bool:
-        """Whether there is a load to hold after it."""
+        """Whether the motion ends with a load that a later one can hold."""
         return self.depth is not None and not self.hovers
 
     @property
     def largest_voltage(self) -> float | None:
-        """Voltage (V) of a ramp that counts in estimates: how much a gap takes is found."""
+        """Largest voltage (V) of a ramp for estimates; `UNKNOWN_VOLTAGE` if a gap is the target."""
         return self.voltage if self.gap is None else UNKNOWN_VOLTAGE
 
     @property
@@ -88,7 +88,7 @@ class Course:
         return self.speed is not None or self.duration > 0.0
 
     def seconds(self, steps: float = 1, start: float = 0.0) -> float:
-        """Seconds of each of so many equal steps, from the indentation `start` (mm).
+        """Duration (s) of each of `steps` equal steps, from the indentation `start` (mm).
 
         >>> Course(indentation=1.5, speed=2.0).seconds(steps=10, start=0.5)
         0.05
@@ -100,13 +100,13 @@ class Course:
 
 
 class Motion(Named):
-    """A motion: a dataclass with `steps` and the `course` that its fields mean."""
+    """Base of motions: a dataclass with `steps` and the `course` (targets) that its fields define."""
 
     steps: int
 
     @property
     def course(self) -> Course:
-        """What it does."""
+        """The targets at the end of the motion."""
         raise NotImplementedError
 
     @property
@@ -115,21 +115,21 @@ class Motion(Named):
         return self.course.takes_time
 
     def part(self, step: int) -> tuple[float, float, float]:
-        """Shares of it, 0 to 1, that are done before and after a step (from 1 on), and how many of such
-        steps it would have.
+        """Fractions (0 to 1) of the motion before and after a step (from 1 on), and the number of steps if
+        all were of this length.
         """
         return (step - 1) / self.steps, step / self.steps, self.steps
 
     def _check_one_of(self, *names: str) -> None:
-        given = [name for name in names if getattr(self, name) is not None]
-        if len(given) != 1:
-            found = " and ".join(given) or "neither " + " nor ".join(names)
+        prescribed = [name for name in names if getattr(self, name) is not None]
+        if len(prescribed) != 1:
+            found = " and ".join(prescribed) or "neither " + " nor ".join(names)
             raise InputError(names[0], found, "exactly one of the two")
 
 
 @dataclass(frozen=True)
 class Press(Motion, kind="press"):
-    """Press to a force on the bone or to an indentation, both absolute, in equal parts.
+    """Press to a force on the bone or to an indentation, both absolute, in equal steps.
 
     Without a `speed` the press takes no time and is quasi-static. Raises InputError unless exactly one target
     is given.
@@ -162,12 +162,12 @@ class Press(Motion, kind="press"):
 
 @dataclass(frozen=True)
 class Slide(Motion, kind="slide"):
-    """Slide over the surface in equal parts.
+    """Slide over the surface in equal steps.
 
-    `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
-    which the load drifts (`evfem.planning.loaddrift`). A finger that touches nothing and is not attracted has
-    no force at any height: in every motion with `hold` it stays where it is, and gives way to what
-    touches it. `speed` sets how much time passes.
+    `hold` keeps constant the last applied force, as in experiments, or the indentation, at which the
+    load drifts (`evfem.planning.loaddrift`). A finger that touches nothing and is not attracted has
+    no force at any height: in every motion with `hold` an unloaded finger keeps its height, and moves
+    freely when the surface touches it. `speed` sets the duration.
 
     >>> Slide(distance=5.0).steps
     100
@@ -186,7 +186,7 @@ class Slide(Motion, kind="slide"):
 
 @dataclass(frozen=True)
 class Hover(Motion, kind="hover"):
-    """Hold the bone so that the undeformed outline is off the surface: `indentation = -gap`.
+    """Hold the bone so that the undeformed outline is above the surface by a gap: `indentation = -gap`.
 
     The tissue is free to move under the attraction. Going there takes no time.
     """
@@ -201,11 +201,11 @@ class Hover(Motion, kind="hover"):
 
 @dataclass(frozen=True)
 class VoltageRamp(Motion, kind="voltage"):
-    """Take the voltage from its present value to another, or to where the smallest gap of the deformed pad
-    is a given one, in equal parts.
+    """Ramp the voltage from its present value to another, or to that at which the smallest gap of the
+    deformed pad has a prescribed value, in equal steps.
 
-    A gap is followed where a given voltage pulls the pad in, and back; the voltage is what it takes. Raises
-    InputError unless exactly one of the two is given.
+    With a prescribed gap the voltage is an unknown, so that unstable equilibria beyond pull-in can be
+    followed. Raises InputError unless exactly one of the two is given.
 
     >>> VoltageRamp(gap=0.05).course.largest_voltage
     10000.0
@@ -227,7 +227,7 @@ class VoltageRamp(Motion, kind="voltage"):
 
 @dataclass(frozen=True)
 class Wait(Motion, kind="wait"):
-    """Stay where it is for some time: for a voltage that changes with time, and for tissue that creeps.
+    """Rest for some time: for a voltage that changes with time, and for tissue that creeps.
 
     >>> Wait(duration=0.1).steps
     100

@@ -1,11 +1,11 @@
-r"""Points of the tissue that a scene asks about (`Output(probes=...)`), and what is found there.
+r"""Probes (`Output(probes=...)`): stress and strain at material points of the tissue after every step.
 
-A point is one of the material: it is given in the undeformed mesh and moves with the tissue. It lies
-in one cell, on a border in that of the region with the lowest number, or of the layer at whose
-boundary it was asked for. F is that of the point; ln J in the law is :math:`\theta`, the element's own
-measure of volume continued to the point (`evfem.tissue.space`), so that pressures do not oscillate
-where nu is close to 1/2. What Maxwell branches remember is known at the quadrature points: their second
-Piola-Kirchhoff stress and their energy are continued from there in the same way.
+A point is specified in the undeformed mesh and moves with the tissue. It belongs to one cell: on a border
+to that of the region with the lowest number, or of the layer at whose boundary it is requested. F is that of
+the point; ln J in the law is :math:`\theta`, the element's own measure of volume extrapolated to the point
+(`evfem.tissue.space`), so that pressures do not oscillate where nu is close to 1/2. The history variables of
+Maxwell branches are known at the quadrature points: their second Piola-Kirchhoff stress and their energy are
+extrapolated from there in the same way.
 """
 
 from __future__ import annotations
@@ -136,12 +136,12 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class ProbeHistory:
-    """What was found at P points after each of S steps; mm, MPa, and N/mm2 for the energy density.
+    """Histories at P points over S steps; mm, MPa, and N/mm2 for the energy density.
 
-    Tensors are those of space, in the plane those of plane strain. `cauchy_stress`, `pressure` (a third
+    Tensors are three-dimensional, in the plane those of plane strain. `cauchy_stress`, `pressure` (a third
     of its negative trace) and `von_mises` are of the material's law with its branches, without its
-    viscosity, and so is `strain_energy_density`, per undeformed volume; `branch_energy_density` is the share
-    of the branches. `principal_stretches` begin with the largest; `J` is det F of the point.
+    viscosity, and so is `strain_energy_density`, per undeformed volume; `branch_energy_density` is the
+    contribution of the branches. `principal_stretches` begin with the largest; `J` is det F of the point.
     """
 
     position: Floats
@@ -223,27 +223,27 @@ class Probes:
     """The points of all probes in the cells of a tissue (`evfem.tissue.weakform.Tissue`) with its branches
     (`evfem.tissue.branches.Branches`), if it has any.
 
-    `place` (P, d) are the points. Raises InputError for a point outside.
+    `points` (P, d) are their positions. Raises InputError for a point outside.
     """
 
     def __init__(self, wanted: Wanted, tissue: Any, branches: Any = None) -> None:
         self.wanted = wanted
         self.space, mesh = tissue.space, tissue.space.mesh
-        places, layers = [], []
+        positions, layers = [], []
         for name, one in wanted.items():
             points, layer = points_of(f"output.probes.{name}", one, mesh)
-            places.append(points)
+            positions.append(points)
             layers += [layer] * len(points)
-        self.place = np.concatenate(places)
+        self.points = np.concatenate(positions)
         names = [name for name, one in wanted.items() for _ in range(count(one))]
         found = Cells(self.space)
-        at = [found.at(*point) for point in zip(names, self.place, layers, strict=True)]
+        at = [found.at(*point) for point in zip(names, self.points, layers, strict=True)]
         cells, inner = np.array([cell for cell, _ in at]), np.array([xi for _, xi in at])
         self.nodes: Ints = self.space.nodes[cells]
         self.value, local = found.shape(inner)
         jacobian = np.einsum("pnc,pnk->pck", mesh.points[self.nodes], local)
         self.gradient: Floats = np.einsum("pnk,pkc->pnc", local, np.linalg.inv(jacobian))
-        x = np.moveaxis(self.space.points[:, cells], 0, 2) - self.place[:, None]
+        x = np.moveaxis(self.space.points[:, cells], 0, 2) - self.points[:, None]
         # linear in each cell, or constant: a polynomial through its quadrature points
         self.from_points = np.linalg.pinv(np.concatenate([np.ones_like(x[..., :1]), x], axis=2))[:, 0]
         self.sample, self.share = self._measure(cells)
@@ -255,7 +255,7 @@ class Probes:
         ]
 
     def _measure(self, cells: Ints) -> tuple[Floats, Floats]:
-        """Shape gradients (P, S, n, d) where ln J is sampled, and the share (P, S) of each in theta."""
+        """Shape gradients (P, S, n, d) where ln J is sampled, and the weights (P, S) of samples in theta."""
         space, sampled = self.space, self.space.sampled
         if space.projection is None:
             return self.gradient[:, None], np.ones((len(cells), 1))
@@ -271,11 +271,11 @@ class Probes:
 
         if not isinstance(law, FormLaw):
             return law
-        return FormLaw(law.form, SimpleNamespace(x=self.place[own].T[..., None], n=None, law=None))
+        return FormLaw(law.form, SimpleNamespace(x=self.points[own].T[..., None], n=None, law=None))
 
     def stacked(self, several: Sequence[Floats]) -> Floats:
         """The numbers of several steps (S, P, K)."""
-        return np.array(several).reshape(-1, len(self.place), len(columns(self.space.dim)))
+        return np.array(several).reshape(-1, len(self.points), len(columns(self.space.dim)))
 
     def histories(self, several: Sequence[Floats]) -> dict[str, ProbeHistory]:
         """The history of each probe from the numbers of several steps."""
@@ -308,7 +308,7 @@ class Probes:
         deviator = stress + pressure[:, None] * [1, 1, 1, 0, 0, 0]
         strain = 0.5 * (np.swapaxes(whole, 1, 2) @ whole - np.eye(3))
         parts = [
-            self.place,
+            self.points,
             np.einsum("pn,pnc->pc", self.value, moved),
             whole.reshape(-1, 9),
             stress,
@@ -324,10 +324,10 @@ class Probes:
 
 
 class Relaxing:
-    """What branches add at P points in `cells` (P,), `share` (P, Q) of what is at their quadrature points."""
+    """Branch stresses and energies at P points in `cells` (P,); `weight` (P, Q) of the quadrature points."""
 
     def __init__(self, branches: Any, cells: Ints, weight: Floats) -> None:
-        self.branches, self.place = branches.among(cells)
+        self.branches, self.index = branches.among(cells)
         own = self.branches.integral.points.cells
         self.rows = np.flatnonzero(np.isin(cells, own))
         self.column, self.share = np.searchsorted(own, cells[self.rows]), weight[self.rows]
@@ -337,7 +337,7 @@ class Relaxing:
         stress, energy = np.zeros((len(F), 6)), np.zeros(len(F))
         if not self.rows.size:
             return stress, energy
-        S, q, stored = self.branches.overstress(u, inner[:, :, self.place])
+        S, q, stored = self.branches.overstress(u, inner[:, :, self.index])
         S, q, stored = (np.sum(x[..., self.column, :] * self.share, axis=-1) for x in (S, q, stored))
         F = F[self.rows]
         tau = F @ np.moveaxis(S, 2, 0) @ np.swapaxes(F, 1, 2)
@@ -359,7 +359,7 @@ class Cells:
         self.shape = partial(shape_functions, space.mesh.kind)
 
     def at(self, name: str, point: Floats, layer: str | None) -> tuple[int, Floats]:
-        """The cell of a point, and the place (d,) in it."""
+        """The cell of a point, and its reference coordinates (d,)."""
         near = np.flatnonzero(((self.low <= point) & (point <= self.high)).all(axis=1))
         middle = np.full(point.shape, 1.0 / 3.0 if self.mesh.corners == 3 else 0.5)
         xi = inverted(self.shape, self.nodes[near], point, middle)

@@ -1,4 +1,4 @@
-r"""Adhesion: a traction of the gap between skin and surface that acts without a voltage.
+r"""Adhesion: an attractive traction between skin and surface that depends on the gap, without a voltage.
 
 A law gives the traction p (MPa, positive where it attracts) at a gap g, and its potential :math:`\Pi` per
 area (N/mm), with :math:`p = d\Pi/dg` and :math:`\Pi = 0` far away, so that the work of adhesion is
@@ -11,11 +11,12 @@ law           p                                                     work
 `Capillary`   2 gamma cos(theta) / film for g < film                2 gamma cos(theta)
 ============  ====================================================  ===========================
 
-The edge falls as a cubic over a tenth of the reach, around it, which leaves the work as it is. The second is
-a meniscus of a liquid as high as the film, whose pressure is Laplace's: neither evaporation nor viscosity.
+At the reach the traction drops as a cubic over a tenth of it, centred so that the work is unchanged. The
+second is the Laplace pressure of a meniscus as high as the film, without evaporation or viscosity.
 
-What falls faster with the gap than the mesh resolves has a line of the same work around its steepest place
-(`Softened`), as the voltage's law has at closed faces (`evfem.electrostatics.roughness.Cored`).
+A law that falls faster with the gap than the mesh resolves is replaced around its steepest point by a linear
+one of the same work (`Softened`), as the electrostatic law is near contact
+(`evfem.electrostatics.roughness.Cored`).
 
 Sources: D. Maugis, J. Colloid Interface Sci. 150 (1992) 243, doi:10.1016/0021-9797(92)90285-T (Dugdale's zone
 in adhesion); B. N. J. Persson, A. Kovalev, S. N. Gorb, Tribol. Lett. 50 (2013) 17,
@@ -36,13 +37,14 @@ from evfem.errors import InputError, quoted
 from evfem.protocols import AdhesionLaw
 from evfem.tensor import derivative
 
-#: the share of its reach over which a law's edge falls
+#: width of the drop at the reach, as a fraction of the reach
 EDGE = 0.1
-#: gaps at which the steepest place is looked for, halvings for the line's ends, a gap (mm) beyond all reach
+#: sampled gaps in the search for the steepest point, bisections for the ends of the linear law, a gap (mm)
+#: beyond the reach of any law
 LOOKED, HALVINGS, BEYOND = 4000, 80, 1e3
-#: the shortest gap (mm) that is looked at
+#: the smallest sampled gap (mm)
 NEAREST = 1e-7
-#: the strength that a law takes in the place of a voltage
+#: the strength that laws of adhesion take instead of a voltage
 ON = 1.0
 ADHESION = "Dugdale, Capillary, or an object with traction(gap) and potential(gap); None for none"
 
@@ -134,16 +136,16 @@ def adhesion_of(key: str, value: Any) -> Any:
 
 
 class Softened:
-    """`law` for faces shut at `closed` (mm), with a line of the same work where it falls faster than
-    `steepest` (MPa/mm, a number or one for each node). Its methods take the strength in the place of a
-    voltage, as force laws do.
+    """`law` for contact at the gap `closed` (mm), replaced by a linear law of the same work where it falls
+    faster than `steepest` (MPa/mm, a number or one for each node). Its methods take a strength (`ON`) instead
+    of a voltage.
     """
 
     def __init__(self, law: Any, closed: float, steepest: Values) -> None:
         self.law, self.closed = law, closed
         of = {float(each): _line(law, closed, float(each)) for each in np.unique(steepest)}
         each = np.vectorize(lambda one: of[one], otypes=[float, float])
-        #: gaps (mm) from and to which the line is in the law's place; the same two where the law does
+        #: gaps (mm) between which the linear law is used; equal where the law itself is resolved
         self.begin, self.end = each(np.asarray(steepest, dtype=float))
         self.slope = np.where(self.end > self.begin, steepest, 0.0)
 
@@ -193,7 +195,7 @@ def _derivative(law: Any, gap: Any) -> Any:
 
 
 def _line(law: Any, closed: float, steepest: float) -> tuple[float, float]:
-    """Gaps (mm) from and to which a line of slope `steepest` (MPa/mm) and the law's work takes its place."""
+    """Gaps (mm) between which a linear law of slope `steepest` (MPa/mm) and equal work replaces the law."""
     gaps = closed + np.append(0.0, np.geomspace(NEAREST, BEYOND, LOOKED))
     slope, traction = -_derivative(law, gaps), np.asarray(law.traction(gaps))
     if slope.max() <= steepest:

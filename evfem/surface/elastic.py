@@ -1,24 +1,24 @@
-r"""Elastic layers on a rigid base: how far a surface gives way under forces on strips of it, in plane strain.
+r"""Elastic layers on a rigid base: compliance of their surface for forces on strips of it, in plane strain.
 
-Under a pressure p into the surface and a shear traction q along x, both going with :math:`e^{ikx}`, layers
-give way by
+Under a pressure p into the surface and a shear traction q along x, both proportional to :math:`e^{ikx}`, the
+surface is displaced by
 
 .. math:: u_z = a_n p - i\,c\,q, \qquad u_x = a_t q + i\,c\,p .
 
-The compliances :math:`a_n, a_t, c` of a stack follow from those of what lies below each layer, as the
-state :math:`(u_x, u_z, \sigma_{xz}, \sigma_{zz})` at its top is an exponential of the one at its bottom. Of
-one layer of thickness H, with s = kH, :math:`\kappa = 3 - 4\nu` and
+The compliances :math:`a_n, a_t, c` of a stack follow layer by layer from the bottom, because the
+state :math:`(u_x, u_z, \sigma_{xz}, \sigma_{zz})` at the top of a layer is a matrix exponential times that at
+its bottom. For one layer of thickness H, with s = kH, :math:`\kappa = 3 - 4\nu` and
 :math:`D = 2\kappa\cosh 2s + 1 + \kappa^2 + 4 s^2`, they are
 
 .. math:: a_{n,t} = \frac{1-\nu}{\mu k}\,\frac{2\kappa\sinh 2s \mp 4 s}{D}, \qquad
           c = \frac{1}{2\mu k}\,\frac{2 (1-2\nu)\,\kappa\,(\cosh 2s - 1) - 4 s^2}{D} .
 
-In space that are kernels of the distance x, which fall off exponentially. Their singular parts,
-:math:`-2\ln|x|/(\pi E^*)` and :math:`\mathrm{sgn}(x)(1-2\nu)/(4\mu)` with those of the top layer, are known;
-what is left is smooth and tabulated once (`Kernels`). Forces act on strips of given lengths, and
-displacements are means over the strips: second differences of the kernel's second integral. That makes
-the compliance symmetric and positive, as Galerkin's method does. Strips far apart take
-the mean of the kernel's quadratic instead.
+Their inverse Fourier transforms are kernels (Green's functions) of the distance x, which decay
+exponentially. The singular terms, :math:`-2\ln|x|/(\pi E^*)` and :math:`\mathrm{sgn}(x)(1-2\nu)/(4\mu)` with
+the moduli of the top layer, are known; the smooth remainder is tabulated once (`Kernels`). Forces act on
+strips of prescribed lengths, and displacements are means over strips: second differences of the kernel's
+second integral. As a Galerkin method this makes the compliance symmetric and positive definite. For
+strips far apart the mean of the kernel's second-order Taylor polynomial is used instead.
 
 Sources: K. L. Johnson, Contact Mechanics (1985), doi:10.1017/CBO9781139171731, ch. 2 and 5.8 (half-plane and
 layer). Units: mm, N, MPa; compliances are mm per N/mm.
@@ -38,14 +38,14 @@ from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
 from evfem.surface.patches import Patches, assembled
 
-#: the table of a kernel: so many distances, up to so many lengths over which it falls off
+#: table of a kernel: number of distances, and the largest one in decay lengths
 TABULATED, FARTHEST = 1500, 36.0
-#: the table's places are end sinh(t) / sinh(SPREAD), with even t
+#: the table's distances are end sinh(t) / sinh(SPREAD), with evenly spaced t
 SPREAD = 8.0
 #: largest wavenumber (over the top thickness) and layers of it that one exponential resolves
 HIGHEST, RESOLVED = 45.0, 2.0
-#: strips take the kernel's quadratic that are shorter than these shares of the top thickness and of their
-#: distance: errors of 1e-5 of a strip's own kernel
+#: strips shorter than these fractions of the top thickness and of their distance use the kernel's Taylor
+#: polynomial: errors of 1e-5 of a strip's own kernel
 SHORT, FAR = 0.25, 0.1
 #: the same two limits of kernels in space
 IN_SPACE, SHORTEST = 24.0, 18.0
@@ -61,7 +61,7 @@ ELASTIC = "ElasticLayer, ElasticStack, or an object with compliance(x, lengths)"
 
 
 class Layered:
-    """What layers share: their compliance in plane strain and in space."""
+    """Base of layers and stacks: their compliance in plane strain and in space."""
 
     layers: tuple[ElasticLayer, ...]
 
@@ -83,8 +83,8 @@ class Layered:
         return self._kernels(x).compliance(*strips(x, lengths))
 
     def compliance_slope(self, x: Any, lengths: Any) -> Floats:
-        """Derivatives of `compliance` by the place of what is displaced: (1, 2n, 2n) by x, in space (2, 3n,
-        3n) by x and z.
+        """Derivatives of `compliance` by the position of the displaced strip: (1, 2n, 2n) by x, in space
+        (2, 3n, 3n) by x and z.
         """
         return self._kernels(x).slope(*strips(x, lengths))
 
@@ -132,7 +132,7 @@ class ElasticStack(Layered):
 
 
 def elastic_of(elastic: Any, key: str = "surface.elastic") -> Any:
-    """How a surface gives way: an object that says so, or None; InputError for anything else."""
+    """The compliance of a surface: an `Elastic` object or None; InputError for anything else."""
     if isinstance(elastic, (list, tuple)):
         return ElasticStack(tuple(elastic))
     if elastic is not None and (isinstance(elastic, type) or not isinstance(elastic, Elastic)):
@@ -146,7 +146,7 @@ def strips(x: Any, lengths: Any) -> tuple[Floats, Floats]:
     long = np.broadcast_to(np.asarray(lengths, dtype=float), found.shape[:1])
     flat = found.ndim == 1 or found.shape[1:] == (2,)
     if not flat or not np.isfinite(found).all() or not (np.isfinite(long) & (long > 0.0)).all():
-        raise InputError("lengths", quoted(lengths), "places in mm, and a length in mm above 0 for each")
+        raise InputError("lengths", quoted(lengths), "positions in mm, and a length in mm above 0 for each")
     return found, long
 
 
@@ -201,8 +201,9 @@ def _on_top(layer: ElasticLayer, k: Floats, below: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel over the distance in thicknesses of the top layer: a singular part, and a spline of the rest,
-    up to where it is nothing. `jump` None: even, -ln|x| and the rest; else odd, half of the jump at 0.
+    """A kernel over the distance in thicknesses of the top layer: singular term plus a spline of the smooth
+    remainder, which vanishes beyond its end. `jump` None: even, with -ln|x|; else odd, with half of the jump
+    at 0.
     """
 
     rest: Any
@@ -213,7 +214,7 @@ class Kernel:
         return (order % 2 == 1) != (self.jump is not None)
 
     def singular(self, x: Floats, log: Floats, order: int) -> Floats:
-        """First or second integral of the singular part at x above 0, with its logarithm."""
+        """First or second integral of the singular term at x above 0; `log` is ln x."""
         if self.jump is not None:
             return np.asarray(self.jump * (x if order == 1 else 0.5 * x**2))
         return np.asarray(x - x * log if order == 1 else 0.75 * x**2 - 0.5 * x**2 * log)
@@ -221,7 +222,7 @@ class Kernel:
 
 class Kernels:
     """Normal, tangential and coupling kernels of a stack over the distance in thicknesses of its top layer,
-    the `unit` (mm), with their `sizes` in mm per N/mm; places of the table go as sinh(t), t up to `spread`.
+    the `unit` (mm), with their `sizes` in mm per N/mm; the table's distances grow as sinh(t), t <= `spread`.
     """
 
     def __init__(self, unit: float, kernels: tuple[Kernel, ...], sizes: Floats, spread: float) -> None:
@@ -305,8 +306,8 @@ class Kernels:
 
 @lru_cache(maxsize=32)
 def _kernels(layers: tuple[ElasticLayer, ...]) -> Kernels:
-    """The kernels of a stack: sums over evenly spaced wavenumbers, whose images lie beyond the table, of what
-    differs from a part of known transform that falls off as fast.
+    """The kernels of a stack: sums over evenly spaced wavenumbers (periodic images lie beyond the table) of
+    the difference to a function of known transform with the same decay.
     """
     top, unit = layers[0], layers[0].thickness
     end, mu, free = _end(layers) / unit, 0.5 * top.E / (1.0 + top.nu), 1.0 - 2.0 * top.nu
@@ -348,7 +349,7 @@ def _end(layers: tuple[ElasticLayer, ...]) -> float:
 
 
 def _kernel(x: Floats, rest: Floats, jump: float | None = None) -> Kernel:
-    """The kernel whose smooth part `rest` at x ends where the whole vanishes."""
+    """The kernel with the smooth remainder `rest` at x, which ends where the whole kernel vanishes."""
     from scipy.interpolate import CubicSpline
 
     ends = ((1, 0.0), (1, 1.0 / x[-1])) if jump is None else ((2, 0.0), (1, 0.0))

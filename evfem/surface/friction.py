@@ -112,8 +112,8 @@ class AdhesiveFriction(NamedFriction, kind="adhesive"):
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
-        fraction = np.asarray(pressure) / (self.strength if self.full is None else self.full)
-        return plain(self.strength * np.where(fraction.real < 1.0, fraction, 1.0) + mu * pressure)
+        share = np.asarray(pressure) / (self.strength if self.full is None else self.full)
+        return plain(self.strength * np.where(share.real < 1.0, share, 1.0) + mu * pressure)
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ class Pad:
 
     @property
     def shares(self) -> Floats:
-        """Part of an edge's projected length that each of its nodes carries."""
+        """Tributary fractions of an edge's projected length, one for each of its nodes."""
         return SHARES[self.edges.shape[1]]
 
     def spacing(self, points: Floats) -> float:
@@ -200,7 +200,7 @@ def fold(position: Floats, segments: Ints, touching: Any, down: Any) -> float | 
     pressed = np.flatnonzero(turned & touching[segments].all(axis=1) & (end[:, 0] < begin[:, 0]))
     if pressed.size:
         return float(begin[pressed[0], 0])
-    # begin and end of b are on both sides of the line through a, and the other way round
+    # the end points of b are on both sides of the line through a, and vice versa
     a, b = _near(begin, end)
     before, after = (_side(begin[a], end[a], point[b]) for point in (begin, end))
     back, forth = (_side(begin[b], end[b], point[a]) for point in (begin, end))
@@ -277,7 +277,7 @@ class SurfaceState:
 
     @cached_property
     def normal_gap(self) -> Floats:
-        """Gap along the surface's normal at the node's place (first order)."""
+        """Gap along the surface's normal at the node's position (first order)."""
         return self.gap / self.stretch
 
     @cached_property
@@ -294,7 +294,7 @@ class SurfaceState:
 
     @cached_property
     def travel(self) -> Floats:
-        """Ways along t1[, t2] per way along x[, z] on the surface, (P, d, d)."""
+        """Displacement along t1[, t2] per displacement along x[, z] on the surface, (P, d, d)."""
         (p, q, first, r), d = self._sizes, self.slope.shape[1]
         found = np.zeros((p.size, d, d))
         found[:, 0, 0] = first
@@ -303,8 +303,8 @@ class SurfaceState:
         return found
 
     def turned(self, force: Floats) -> Floats:
-        """By how much forces (P, 1 + d) along n, t1[, t2] turn with their nodes: change along (y, x[, z])
-        per displacement along x[, z], (P, 1 + d, d).
+        """Rotation of forces (P, 1 + d) along n, t1[, t2] with the surface: their change along (y, x[, z])
+        per displacement of the node along x[, z], (P, 1 + d, d).
         """
         (p, q, first, r), d = self._sizes, self.slope.shape[1]
         if not self.curvature.any():
@@ -323,6 +323,6 @@ class SurfaceState:
 
 
 def surface_state(surface: Any, position: Floats) -> SurfaceState:
-    """Surface frame at node positions (P, dim); h(x[, z]) = surface.y + surface.relief(place)."""
+    """Surface frame at node positions (P, dim); h(x[, z]) = surface.y + surface.relief(x[, z])."""
     height, slope, curvature = surface.relief(position[:, ::2])
     return SurfaceState(position[:, 1] - surface.y - height, slope, curvature)

@@ -1,4 +1,4 @@
-r"""Elastic layers in space: means of what a surface gives way by over square patches, by forces on them.
+r"""Elastic layers in space: mean displacements of square patches of the surface by forces on patches.
 
 With the compliances :math:`a_n, a_t, c` of `evfem.surface.elastic` along a wave, and :math:`a_s` of the shear
 across it, Hankel's transforms give at the distance r, in the direction :math:`n = (\cos\theta, \sin\theta)`,
@@ -6,10 +6,10 @@ across it, Hankel's transforms give at the distance r, in the direction :math:`n
 .. math:: u_z = N p + K\,n_i q_i, \qquad u_i = -K\,n_i\,p + A\,q_i + D\,(2 n_i n_j - \delta_{ij})\,q_j ,
 
 N from :math:`a_n J_0`, A from :math:`(a_t + a_s) J_0 / 2`, D from :math:`(a_s - a_t) J_2 / 2` and K from
-:math:`c J_1`. Those of the half-space of the top layer go with 1/r: their means over two squares are
-fourfold differences of closed forms, as over Love's patches. What is left is smooth and tabulated over r
-with its Laplacian: a mean over squares of sides a and b adds :math:`(a^2 + b^2)/24` times that, as it does to
-the singular part of patches far apart.
+:math:`c J_1`. The kernels of a half-space of the top layer are proportional to 1/r: their means over two
+squares are fourfold differences of closed forms (Love's patches). The remainder is smooth and tabulated over
+r with its Laplacian: a mean over squares of sides a and b adds :math:`(a^2 + b^2)/24` times the Laplacian,
+also for the singular term of patches far apart.
 
 Sources: A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377, doi:10.1098/rsta.1929.0009; K. L. Johnson,
 Contact Mechanics (1985), doi:10.1017/CBO9781139171731, ch. 3. Units: mm, N, MPa; compliances are mm per N.
@@ -25,11 +25,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 
-#: patches farther apart than so many of their mean sides take the singular part's quadratic
+#: beyond this distance, in mean sides of the patches, the singular term's Taylor polynomial is used
 FAR = 6.0
-#: integration over the wavenumber: points of a panel, radians of the farthest place in the widest one
+#: integration over the wavenumber: points of a panel, and k r (rad) at the largest r in the widest panel
 POINTS, WIDEST = 16, 20.0
-#: places of a table, end sinh(t) / sinh(SPREAD) with even t
+#: number of tabulated distances, end sinh(t) / sinh(SPREAD) with evenly spaced t
 TABULATED, SPREAD = 600, 6.0
 #: step of a slope (mm) per side of the smallest patch
 STEP = 1e-5
@@ -75,7 +75,7 @@ class Patches:
         return self._matrix(x, areas, self._means, 1.0)
 
     def slope(self, x: Floats, areas: Floats) -> Floats:
-        """Derivatives (2, 3 n, 3 n) of `compliance` by the place of the displaced square along both axes."""
+        """Derivatives (2, 3 n, 3 n) of `compliance` by the position of the displaced square, both axes."""
         step = STEP * float(np.sqrt(areas.min()))
 
         def rate(shift: Floats, at: Floats, a: Floats, b: Floats) -> Floats:
@@ -110,8 +110,8 @@ def assembled(
     pairs: tuple[Ints, Ints], blocks: dict[tuple[int, int], Floats], n: int, parity: float
 ) -> Floats:
     """Matrix of the kernels' means (m,) from component q of force to p of displacement, `blocks` (p, q),
-    between places `pairs` (m,), (m,) of n: exchanged, those of one kind, normal or tangential, are the same
-    times `parity`, those of two their opposite.
+    between patches `pairs` (m,), (m,) of n: when the two are exchanged, normal-normal and
+    tangential-tangential ones are multiplied by `parity`, the others by its opposite.
     """
     (i, j), size = pairs, 1 + max(p for p, _ in blocks)
     found = np.zeros((size, n, size, n))

@@ -71,18 +71,18 @@ class Relief(RigidSurface):
     ) -> None:
         set_frozen(self, friction=friction, y=y, insulator=insulator, elastic=elastic)
         super().__post_init__()
-        for name, given in (("x", x), ("z", z)):
-            grid = numbers(f"surface.{name}", given, HEIGHTS)
+        for name, entry in (("x", x), ("z", z)):
+            grid = numbers(f"surface.{name}", entry, HEIGHTS)
             if grid.size < LEAST or (np.diff(grid) < NEAREST).any() or np.abs(grid).max() > FARTHEST:
                 raise InputError(f"surface.{name}", f"{grid.size} positions", HEIGHTS)
             set_frozen(self, **{name: grid})
         samples = numbers("surface.height", height, HEIGHTS, axes=2)
         if samples.shape != (self.z.size, self.x.size) or samples.size > MOST:
-            given = f"heights in {' x '.join(map(str, samples.shape))}"
-            raise InputError("surface.height", given, HEIGHTS)
+            problem = f"heights in {' x '.join(map(str, samples.shape))}"
+            raise InputError("surface.height", problem, HEIGHTS)
         if np.abs(samples).max() > HIGHEST:
-            given = f"{samples.ravel()[np.argmax(np.abs(samples))]:g}"
-            raise InputError("surface.height", given, f"heights in mm within {HIGHEST:g} mm")
+            problem = f"{samples.ravel()[np.argmax(np.abs(samples))]:g}"
+            raise InputError("surface.height", problem, f"heights in mm within {HIGHEST:g} mm")
         set_frozen(self, samples=samples)
 
     @classmethod
@@ -115,7 +115,7 @@ class Relief(RigidSurface):
         return RectBivariateSpline(self.x, self.z, self.samples.T)
 
     def relief(self, position: Array) -> tuple[Array, Array, Array]:
-        """Heights (...), slopes (..., d) and curvatures (..., d, d) at places (..., d)."""
+        """Heights (...), slopes (..., d) and curvatures (..., d, d) at positions (..., d)."""
         d = position.shape[-1]
         x, z = position[..., 0], position[..., 1] if d > 1 else np.zeros(position.shape[:-1])
         near_x, near_z = (np.clip(at, grid[0], grid[-1]) for at, grid in ((x, self.x), (z, self.z)))

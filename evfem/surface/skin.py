@@ -116,7 +116,7 @@ class Skin:
         return np.stack([first, about, opposite])[:, found]
 
     def spacing_at(self, position: Floats) -> Floats:
-        """Distance of nodes from their neighbours (P,) in mm on the display: the shorter of the two ways."""
+        """Distance of nodes from their neighbours (P,) in mm on the display: the smaller one of both axes."""
         before, node, after = self._rows
         flat, found = position[:, [0, 2]], np.full(self.nodes.size, self.spacing(position))
         np.minimum.at(found, node, 0.5 * np.linalg.norm(flat[after] - flat[before], axis=1))

@@ -5,10 +5,10 @@ profile: the scene adds `y` (mm), and where `y` is None chooses it so that the s
 gap of the undeformed finger is 0. `friction` is a number, or a table [[x, mu], ...]: linear
 between its rows, constant beyond them; at a repeated x the later row holds from that x on.
 `insulator` is the layer between the surface and the electrode under it (None: no electrode).
-`elastic` says how the surface gives way (`evfem.surface.elastic`; None: it is rigid). x may
-be any array, real or complex (for `tensor.complex_step`); the results have its shape.
+`elastic` is the compliance of the surface (`evfem.surface.elastic`; None: rigid). x may be any
+array, real or complex (for `tensor.complex_step`); the results have its shape.
 
-On a finger in three dimensions a surface is the same across the direction of its `angle`, and x above is
+Below a finger in three dimensions a surface varies along the direction of its `angle` only, and x above is
 the distance along that direction; tables of friction stay tables over x, and an `ev.FrictionMap` has
 coefficients over x and z. `ev.Relief` (`evfem.surface.relief`) has heights over x and z.
 """
@@ -40,16 +40,17 @@ FRICTION = (
     "a number from 0 to 100, or a table [[x, mu], ...] with mu from 0 to 100 and x not decreasing, "
     "within 1e6 mm, in at most 10000 rows, or a FrictionMap"
 )
-ELECTRODES = "rows [from, to, share] in mm from left to right, gaps in between, shares from -1 to 1"
+ELECTRODES = "rows [from, to, fraction] in mm from left to right, gaps in between, fractions from -1 to 1"
 TERMS = (
     "a list of at most 1000 rows [amplitude, wavenumber, phase] or [amplitude, wavenumber, phase, angle], "
     "amplitudes within 1e3 mm, wavenumbers and phases within 1e6, angles within 360 degrees"
 )
-#: what a surface may be at most: rows of a table, sines of a sum, samples of a profile; positions (mm),
-#: heights and amplitudes (mm), wavenumbers (rad/mm), coefficients of friction; how near samples may be (mm)
+#: largest number of rows of a table, of sines, of samples of a profile
 MOST_ROWS, MOST_TERMS, MOST_SAMPLES = 10_000, 1_000, 1_000_000
-#: values that a sum of sines has at once
+#: values of a sum of sines that are evaluated at once
 MOST_VALUES = 1_000_000
+#: largest positions, heights and amplitudes (mm), wavenumbers (rad/mm), friction coefficients; smallest
+#: distance of samples (mm)
 FARTHEST, HIGHEST, FASTEST, ROUGHEST, NEAREST = 1e6, 1e3, 1e6, 100.0, 1e-9
 #: Equation (25) of the paper, 0.025 (sin 6x + cos 12x - 1) in mm, as rows amplitude, wavenumber, phase.
 EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
@@ -207,8 +208,8 @@ class Flat(_Level):
 class Display(_Level):
     """A level display: an insulator over an electrode, by default the film of Table 2 (0.09 mm, eps_r 3.35).
 
-    `electrodes` are rows [from, to, share] of electrodes that end, in mm, from left to right with gaps
-    between them, each at its share (-1 to 1) of the scene's voltage; None is one without end.
+    `electrodes` are rows [from, to, fraction] of finite electrodes, in mm, from left to right with gaps
+    between them, each at its fraction (-1 to 1) of the scene's voltage; None is one infinite electrode.
 
     >>> from evfem.electrostatics.laws import TOUCHSCREEN
     >>> Display().insulator, Display(TOUCHSCREEN).insulator
@@ -266,7 +267,7 @@ class Sinusoid(RigidSurface):
     @property
     def crosses(self) -> bool:
         """Whether a finger in the plane cannot have it."""
-        return super().crosses or any(way != 0.0 for _, _, _, *own in self._all for way in own)
+        return super().crosses or any(angle != 0.0 for _, _, _, *own in self._all for angle in own)
 
     @property
     def _all(self) -> Rows:
@@ -299,8 +300,8 @@ class Sinusoid(RigidSurface):
     def _waves(self) -> tuple[Array, Array, Array]:
         """Amplitudes (T,) in mm, wave vectors (T, 2) in rad/mm and phases (T,) of the terms."""
         terms = np.array([[a, k, phase, sum(own)] for a, k, phase, *own in self._all])
-        ways = np.array([direction(self.angle + own) for own in terms[:, 3].tolist()])
-        return terms[:, 0], terms[:, 1:2] * ways, terms[:, 2]
+        directions = np.array([direction(self.angle + own) for own in terms[:, 3].tolist()])
+        return terms[:, 0], terms[:, 1:2] * directions, terms[:, 2]
 
 
 @dataclass(frozen=True, eq=False, init=False)

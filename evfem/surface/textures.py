@@ -46,7 +46,7 @@ from evfem.tensor import Array
 
 #: shortest length of a texture (mm)
 FINEST = 1e-6
-#: a wall's share of the narrower one of ridge and groove where nothing is said
+#: default width of a wall, as a fraction of the narrower one of ridge and groove
 WALL = 0.5
 
 
@@ -59,7 +59,7 @@ _GROOVE = {"allowed": "a width in mm at half depth, below the period", "unit": "
 _WALL = {"allowed": "a width in mm up to that of ridge and groove", "unit": "mm"}
 _SHORTEST = {"allowed": "a wavelength in mm up to the longest", "unit": "mm"}
 _LONGEST = {"allowed": "a wavelength in mm up to the period", "unit": "mm"}
-_PHASE = number("a part of the period, -1 to 1", Within(-1.0, 1.0), "periods")
+_PHASE = number("a fraction of the period, -1 to 1", Within(-1.0, 1.0), "periods")
 _HURST = number("a Hurst exponent from 0 to 1", Within(0.0, 1.0))
 
 
@@ -82,9 +82,9 @@ class Grating(RigidSurface):
     groove_depth: Annotated[float, _length(HIGHEST), "of the grooves below the ridges"]
     groove_width: Annotated[float | None, _GROOVE, "at half depth; without it half the period"] = None
     wall_width: Annotated[
-        float | None, _WALL, "part of x that a wall takes; without it half of ridge or groove"
+        float | None, _WALL, "width of a wall along x; without it half of ridge or groove"
     ] = None
-    phase: Annotated[float, _PHASE, "place of a ridge's middle"] = 0.0
+    phase: Annotated[float, _PHASE, "position of a ridge's middle"] = 0.0
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None

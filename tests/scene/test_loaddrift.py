@@ -17,7 +17,7 @@ def sliding(finger=COARSE, friction=0.7, load=0.05, hold="indentation"):
     return ev.Scene(finger, ev.Flat(friction=friction), motion=motion)
 
 
-@pytest.mark.filterwarnings("ignore:motion 1 slides with the indentation held")
+@pytest.mark.filterwarnings("ignore:motion 1 slides at constant indentation")
 @pytest.mark.parametrize(
     ("sizes", "friction", "load"),
     [
@@ -44,7 +44,7 @@ def test_the_estimate_is_near_what_runs_show(sizes, friction, load):
 def test_the_plan_warns_of_a_held_indentation_after_a_press_to_a_force():
     text = plan(sliding()).warning
     assert text == (
-        "motion 1 slides with the indentation held: at friction 0.7 the pad rolls about the bone, and the "
+        "motion 1 slides at constant indentation: at friction 0.7 the pad rolls about the bone, and the "
         'load of 0.05 N/mm drifts by about 7%; hold = "force" keeps it'
     )
     assert "at friction 0.7" in plan(sliding(friction=[[0.0, 0.1], [2.0, 0.7], [3.0, 0.2]])).warning

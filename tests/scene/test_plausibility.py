@@ -234,7 +234,7 @@ def test_the_built_in_scene_and_those_of_the_pages_stay_silent():
 )
 def test_an_element_that_locks_in_incompressible_tissue_is_doubted(element, nu, said):
     found = [*locking(element, {"tissue": ev.NeoHookean(E=0.1, nu=nu)}, 2)]
-    assert found == (["tissue hardly changes volume at all, and q2 cells lock: use q2p1 or q1_fbar"] * said)
+    assert found == (["tissue is almost incompressible, and q2 cells lock: use q2p1 or q1_fbar"] * said)
 
 
 @pytest.mark.parametrize(("insulator", "ratio"), [(ev.FILM, 17.345), (ev.TOUCHSCREEN, 782.9)])
