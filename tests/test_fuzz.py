@@ -191,7 +191,7 @@ def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
     points[2] = 0.0, 10.0
     cells = np.column_stack([np.zeros(n - 2, int), np.ones(n - 2, int), np.arange(2, n)])
     mesh = Mesh(points, cells, "triangle", np.zeros(n - 2, int), {"a": 0}, {})
-    with little_memory(60), pytest.raises(ev.InputError, match="nodes in the same place"):
+    with little_memory(60), pytest.raises(ev.InputError, match="nodes at the same position"):
         check(mesh)
 
 

@@ -47,9 +47,9 @@ from evfem.sweeps.folder import Answer, SweepFolder
 #: the fit; most steps of it
 STEP, UNKNOWNS, SQUARES, MOST_STEPS = 1e-3, 1e-5, 1e-6, 60
 #: steps over which slopes must agree with that of one, and by how much of the larger one they may differ;
-#: the change of the residuals, as a share of them, that is the solver's noise
+#: the change of the residuals, as a fraction of them, that is the solver's noise
 FAR, ROUGH, NOISE = 10.0, 0.3, 1e-6
-#: share of the distance between the bounds from which a parameter counts as at one
+#: fraction of the distance between the bounds from which a parameter counts as at one
 AT_BOUND = 1e-3
 
 

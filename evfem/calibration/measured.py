@@ -1,11 +1,11 @@
-"""Measurements, and the values of a run at the same places.
+"""Measured values and curves, and the values of a run at the same abscissae.
 
 A `MeasuredCurve` belongs to one run: a column of its history over another one, as force over
 indentation or friction over position. `MeasuredValues` belong to a run each: one output of it, and
 the keys of the scene that differ from run to run, as hovering forces at some voltages and gaps.
 
 Between the steps of a run a curve is interpolated by monotone cubics (Fritsch and Carlson 1980,
-doi:10.1137/0717021), from the state before the motion on: best are steps at the measured places.
+doi:10.1137/0717021), from the state before the motion on; steps at the measured points need none.
 """
 
 from __future__ import annotations
@@ -115,16 +115,16 @@ class MeasuredCurve:
         for name, column in (("column", str(self.column)), ("over", str(self.over))):
             if column not in NUMBERS:
                 raise unknown(f"data.{name}", column, list(NUMBERS), f"{quoted(column)}, no column")
-        set_frozen(self, at=numbers("data.at", self.at, f"a list of places, of {self.over}"))
-        set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as places"))
+        set_frozen(self, at=numbers("data.at", self.at, f"a list of values of {self.over}"))
+        set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as points"))
         if len(np.unique(self.at)) < len(self.at):
-            raise InputError("data.at", "the same place twice", "each place once; the mean of its values")
+            raise InputError("data.at", "the same point twice", "each point once; the mean of its values")
         turn = np.flatnonzero(np.diff(np.sign(np.diff(self.at))))
         if turn.size:
             first, there, after = self.at[turn[0] : turn[0] + 3]
             problem = f"{self.over} {first:g}, {there:g}, then {after:g} (number {turn[0] + 3})"
-            allowed = "growing or falling places: loading and unloading are a curve each, with its `motion`"
-            raise InputError("data.at", problem, f"{allowed}; places that scatter, sorted")
+            allowed = "growing or falling values: loading and unloading are a curve each, with its `motion`"
+            raise InputError("data.at", problem, f"{allowed}; values that scatter, sorted")
         if self.motion is not None and (type(self.motion) is not int or self.motion < 0):
             raise InputError("data.motion", quoted(self.motion), "the number of a motion, from 0, or None")
         set_frozen(self, where={key: _setting(key, value) for key, value in self.where.items()})
@@ -147,7 +147,7 @@ class MeasuredCurve:
 
         Units of the header are converted to mm, N, s, V and MPa. `zero` is the OVER (in these) at which OVER
         shall be 0. `branch` is "loading", up to the largest OVER, or "unloading", from there on. Rows with
-        gaps are left out, rows at one place count by their mean. With a `depth` (mm) the file is in N, mm2
+        gaps are left out, rows at the same point are averaged. With a `depth` (mm) the file is in N, mm2
         and mJ over it, as `Result.total` is, and what depends on it is divided by it, `sd` too.
         """
         table = read_headed(Path(path), "data")
@@ -271,7 +271,7 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
         raise InputError("data.over", f"{over}, which does not advance in {which}", "one that does")
     if at.min() < x[0] - slack or at.max() > x[-1] + slack:
         problem = f"{over} from {at.min():g} to {at.max():g}"
-        raise InputError("data.at", problem, f"places within those of the run, {x[0]:g} to {x[-1]:g}")
+        raise InputError("data.at", problem, f"values within those of the run, {x[0]:g} to {x[-1]:g}")
     return PchipInterpolator(x, y)(np.clip(at, x[0], x[-1]))
 
 
@@ -289,7 +289,7 @@ def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Float
 
 
 def _branch(rows: Floats, branch: str | None) -> Floats:
-    """Rows (n, 2 or 3) of place, value and perhaps sd: those of a branch, no gaps, one for each place."""
+    """Rows (n, 2 or 3) of abscissa, value and perhaps sd: one branch, no gaps, one row for each point."""
     rows = rows[np.isfinite(rows).all(axis=1)]
     if branch is not None and len(rows):
         choice("data.branch", branch, ("loading", "unloading"))

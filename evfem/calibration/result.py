@@ -1,4 +1,4 @@
-"""What a fit found: values with their intervals, what they explain and what they do not."""
+"""Result of a fit: parameter values with confidence intervals, goodness of fit, unidentified parameters."""
 
 from __future__ import annotations
 
@@ -30,10 +30,11 @@ PLAIN = ("values", "names", "warnings", "tables", "provenance")
 class FitResult:
     """P parameters fitted to N measured numbers.
 
-    `values` by key; `errors` (P,) standard errors of the `unknowns` (P,) as `evfem.calibration.parameters`
-    has them, `correlation` (P, P), `singular_values` (P,) of the Jacobian with columns of length 1. `names`,
-    `measured`, `predicted` and `scale` (N,): what was measured, what the fitted scene says there, and the sd
-    or size that residuals are divided by. `warnings` has a sentence for whatever the data do not determine.
+    `values` by key; `errors` (P,): standard errors of the `unknowns` (P,) of `evfem.calibration.parameters`;
+    `correlation` (P, P); `singular_values` (P,) of the Jacobian with columns of unit length. `names`,
+    `measured`, `predicted` and `scale` (N,): the outputs, their measured values, those of the fitted scene,
+    and the sd or size by which residuals are divided. `warnings` has a sentence for each parameter or
+    combination that the data do not determine.
     """
 
     parameters: dict[str, Parameter]
@@ -64,7 +65,7 @@ class FitResult:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals: in sd, or as a share of that of the measured values."""
+        """Root mean square of the residuals, in sd or relative to that of the measured values."""
         return math.sqrt(float(np.mean(self.residuals**2)))
 
     @property
@@ -97,7 +98,7 @@ class FitResult:
         )
 
     def __repr__(self) -> str:
-        """Values with intervals, how well they explain the data, and what is doubtful."""
+        """Values with intervals, rms residual, and warnings."""
         rows = [f"  {key} = {text}" for key, text in self._rows]
         rows += [f"  Warning: {warning}" for warning in self.warnings]
         return "\n".join([f"FitResult of {self._title}", *rows])

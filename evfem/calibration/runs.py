@@ -32,7 +32,7 @@ Asked = tuple[Question, ...]
 Outputs = dict[str, float | None]
 #: scene as text, folder of its paths, what is asked, keys by which it is differentiated
 Job = tuple[str, str, Asked, tuple[str, ...]]
-#: share of a parameter over which answers are differenced along the derivatives of the history
+#: fraction of a parameter over which answers are differenced along the derivatives of the history
 ALONG = 1e-5
 
 

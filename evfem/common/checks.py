@@ -1,4 +1,4 @@
-"""Checks of a user's input; each returns the clean value or raises InputError.
+"""Validation of user input: each check returns the clean value or raises InputError.
 
 First checks of single values (`real`, `count`, `choice`), then of numbers or arrays of numbers
 (`above`, `at_least`, `finite`), then rules that the fields of a dataclass carry: `check_fields` applies
@@ -20,7 +20,7 @@ import numpy as np
 from evfem.errors import InputError, Mistakes, quoted
 
 MOST_STEPS = 1_000_000
-#: keys that were, and what is allowed in their place, for one release
+#: removed keys and what replaces them, for one release
 GONE = {"solver.symmetry": "nothing: gone since 0.3, the whole finger is computed"}
 Values = Any  # a number, or an array of numbers: real, or complex in a complex step
 
@@ -68,7 +68,7 @@ def plain(value: Values) -> Values:
 
 
 def above(key: str, entered: Values, lowest: float, allowed: str) -> Values:
-    """`given` as float or array of floats, all finite and (by their real part) > `lowest`.
+    """`entered` as float or array of floats, all finite and (by their real part) > `lowest`.
 
     >>> above("area", -1.0, 0.0, "an area in mm2 above zero")
     Traceback (most recent call last):
@@ -81,7 +81,7 @@ def above(key: str, entered: Values, lowest: float, allowed: str) -> Values:
 
 
 def at_least(key: str, entered: Values, lowest: float, allowed: str) -> Values:
-    """As `above`, with `lowest` itself allowed."""
+    """As `above`, but `lowest` itself is admissible."""
     value = finite(key, entered, allowed)
     if not np.all(np.real(value) >= lowest):
         raise InputError(key, float(np.min(np.real(entered))), allowed)
@@ -89,7 +89,7 @@ def at_least(key: str, entered: Values, lowest: float, allowed: str) -> Values:
 
 
 def finite(key: str, entered: Values, allowed: str) -> Values:
-    """`given` as float or array of floats (complex if it was), all finite."""
+    """`entered` as float or array of floats (complex if it was), all finite."""
     try:
         value = np.asarray(entered)
     except ValueError as error:  # rows of different length
@@ -132,7 +132,7 @@ def number(allowed: str, test: Callable[[float], bool], unit: str = "") -> dict[
 
 
 def between(low: float, high: float, unit: str = "", *, of: str = "") -> dict[str, Any]:
-    """Rule of a field that is a number within a range; `of` says what its unit is a share of.
+    """Rule of a field that is a number within a range; `of` names what a fraction is relative to.
 
     >>> between(12.0, 24.0, "mm")["allowed"]
     '12 to 24 mm'

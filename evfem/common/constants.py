@@ -86,7 +86,7 @@ DISC_OWN = 0.1
 #: fraction of the critical negative stiffness that is used if the attraction weakens with the gap faster than
 #: the tissue stiffens [attraction]
 STABLE = 0.9
-#: least share of a contact force that the tangent leaves where the attraction between rough faces grows as
+#: least fraction of a contact force that the tangent leaves where the attraction between rough faces grows as
 #: fast as it [attraction]
 LEFT_OVER = 0.01
 #: violations below this fraction of the largest force are rounding

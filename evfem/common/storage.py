@@ -1,4 +1,4 @@
-"""Files that are either complete or untouched: written beside their place, then moved there in one step.
+"""Atomic writes: a file is written under a temporary name and then moved to its path in one step.
 
 This holds when the process is killed at any moment and when the disk is full; nothing is forced
 through the disk's own cache, so a power failure may cost the last steps. `alone_in` keeps other
@@ -30,7 +30,7 @@ FORMATS = (".csv", ".json", ".mat", ".msh", ".npy", ".npz", ".pdf", ".png", ".pv
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary path in the folder of `path`; what was written there takes the place of `path` at the end.
+    """A temporary path in the folder of `path`; the file written there replaces `path` at the end.
 
     On an error inside the block nothing changes. Raises StorageError when the disk or folder refuses.
 

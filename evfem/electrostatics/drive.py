@@ -127,7 +127,7 @@ class CycleMean:
 
 def powers(signal: Any) -> tuple[float, Floats, Floats] | None:
     """Effective voltage (V) of a signal that repeats, and the orders of its harmonics, 0 for its
-    bias, with their shares of the squared voltage; None for one that does not repeat.
+    bias, with their fractions of the squared voltage; None for one that does not repeat.
 
     >>> from evfem.electrostatics.timesignals import Sine
     >>> effective, order, share = powers(Sine(50.0, 100.0, bias=50.0))
@@ -139,7 +139,7 @@ def powers(signal: Any) -> tuple[float, Floats, Floats] | None:
 
 
 def spectrum(drive: Drive, signal: Any) -> tuple[Floats, Floats]:
-    """Harmonics of a drive, or of a periodic `signal`: orders and shares of the squared effective voltage."""
+    """Harmonics of a drive or a periodic `signal`: orders and fractions of the squared effective voltage."""
     found = powers(signal)
     if found is not None:
         return found[1:]

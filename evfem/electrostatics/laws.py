@@ -10,7 +10,7 @@ and the voltage ``U``::
 
 Under a sine of the effective voltage U, layers and gap that conduct make the reduced thickness
 complex, ``z/e = (1 + sigma_g / (i w eps_0 e)) * sum of d / eps*`` (`Layers.of` with a frequency). Its
-real part takes the place of s, its imaginary part is `Layers.loss`, below ``l``, and the mean over the
+real part replaces s, its imaginary part is `Layers.loss`, below ``l``, and the mean over the
 cycle is::
 
     StrongTroxel   p = e eps_0 U^2 / (2 ((g + e s)^2 + (e l)^2))

@@ -297,7 +297,7 @@ def _map(profile: VoltageProfile, playback: Playback) -> bytes:
 MOST_TICKS_PER_SECOND, LAST_TICK = 48_000, 65_535
 #: a tick is at most this share of the speed wrong, because ticks per second are whole
 ROUNDING = 0.01
-#: straight pieces stay this close to the parabola of friction over voltage, as a share of what is added
+#: straight pieces stay this close to the parabola of friction over voltage, as a fraction of what is added
 CHORD = 1e-4
 #: ids 1 and up name avatars; 0 is none
 NO_AVATAR, ANY_BODY_PART = 0, 0

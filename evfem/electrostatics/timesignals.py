@@ -50,11 +50,11 @@ HEADER = ["time", "voltage"]
 LARGEST, FASTEST = 1e6, 1e9
 #: largest charge (nC per mm of depth)
 MOST_CHARGE = 1e6
-#: share of the fluctuation's power that lies below the highest frequency of samples
+#: fraction of the fluctuation's power that lies below the highest frequency of samples
 POWER = 0.95
-#: share of half a period that counts as rounding of a time
+#: fraction of half a period that counts as rounding of a time
 FLIP = 1e-9
-#: largest difference of two spacings of evenly spaced times, as a share of the spacing
+#: largest difference of two spacings of evenly spaced times, as a fraction of the spacing
 EVEN = 1e-3
 
 FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True), "Hz")
@@ -71,7 +71,7 @@ Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 
 
 # A signal that repeats has `cycle`, its frequency (Hz), and `powers()`: its effective voltage (V), and the
-# orders of its harmonics with their shares of the squared voltage. One that a `Drive` can have by the name of
+# orders of its harmonics and their fractions of the squared voltage. One that a `Drive` has by the name of
 # its kind also has `crest`, its peak over its effective voltage, and `harmonics()`, those without a bias.
 
 
@@ -380,7 +380,7 @@ class Sampled:
             raise InputError("full_scale", ABSENT, needed)
         scale_V = scale["full_scale_V"] if full_scale is None else full_scale
         volts = above("full_scale", scale_V, 0.0, "a voltage in V above zero")
-        return cls(volts * wav.shares(samples), rate, start, repeat)
+        return cls(volts * wav.normalised_samples(samples), rate, start, repeat)
 
     @classmethod
     def from_ahap(

@@ -1,9 +1,9 @@
-"""WAV files, and the comment in which evfem says what a sample means; what AHAP files and
-MPEG haptics (.hjif) of others hold.
+"""WAV files with the scale of their samples in a comment; AHAP and MPEG haptics (.hjif) files of other
+programs are read.
 
-evfem writes 16 bit, one channel, and in LIST/INFO/ICMT a JSON text with the volts of the largest
-sample, the speed, the first position and the carrier. scipy reads WAVs of any width; it knows no
-comments, which are therefore written and found here.
+evfem writes 16 bit, one channel, and in the chunk LIST/INFO/ICMT a JSON text with the full scale in volts,
+the speed, the first position and the carrier. scipy reads WAVs of any sample width but ignores comments,
+which are therefore written and read here.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_SAMPLES = 50_000_000
 MOST_PATTERN = 1_000_000
 #: comment and headers of a file on top of its samples
 MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
-#: what the description of a .hjif says of the first position
+#: the first position in the description of a .hjif
 FROM = re.compile(r"from (\S+) mm")
 
 
@@ -39,11 +39,11 @@ def encoded(samples: Any, rate: int, scale: dict[str, Any]) -> bytes:
     """A WAV of 16-bit samples with the comment `scale`, which has the keys `KEYS`."""
     comment = json.dumps({"format": FORM, **scale}).encode("ascii") + b"\0"
     header = struct.pack("<HHIIHH", 1, 1, rate, 2 * rate, 2, 16)
-    body = _part(b"fmt ", header) + _part(b"LIST", b"INFO" + _part(b"ICMT", comment))
-    return _part(b"RIFF", b"WAVE" + body + _part(b"data", samples.astype("<i2").tobytes()))
+    body = _riff_chunk(b"fmt ", header) + _riff_chunk(b"LIST", b"INFO" + _riff_chunk(b"ICMT", comment))
+    return _riff_chunk(b"RIFF", b"WAVE" + body + _riff_chunk(b"data", samples.astype("<i2").tobytes()))
 
 
-def _part(name: bytes, content: bytes) -> bytes:
+def _riff_chunk(name: bytes, content: bytes) -> bytes:
     """A RIFF chunk, padded to an even length."""
     return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
 
@@ -81,8 +81,8 @@ def _comment(data: bytes) -> dict[str, Any]:
     return {}
 
 
-def shares(samples: Any) -> Floats:
-    """Samples of any width as shares of the largest one, -1 to 1."""
+def normalised_samples(samples: Any) -> Floats:
+    """Samples of any width as fractions of the largest one, -1 to 1."""
     if samples.dtype.kind == "f":
         return np.asarray(samples, dtype=float)
     if samples.dtype.kind == "u":  # 8 bit, around 128

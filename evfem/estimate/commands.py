@@ -1,4 +1,4 @@
-"""`evfem texture ...`: what its commands do; the arguments stand in `evfem.arguments`."""
+"""The commands `evfem texture ...`; their arguments are in `evfem.arguments`."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _estimate(args: argparse.Namespace) -> None:
     if args.name in REFERENCES:
         finger = "ridged" if touch.ridged else "smooth"
         error = known_error(args.name, touch.ridged)
-        print(f"at the usual touch of a {finger} finger it is off the model by {error:.1%} of the range")
+        print(f"error for a {finger} finger at the default load and speed: {error:.1%} of the curve's range")
     for note in found.notes:
         tell(f"note: {note}")
     _render(found.curve, touch, device, args.signal)
@@ -123,14 +123,15 @@ def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path | Non
     if path is None:
         return
     found = render(curve, touch, device)
+    lost = f"{found.lost.mean():.0%} of the slide cannot be rendered"
+    reached = lost if found.lost.any() else "all of the slide can be rendered"
     print(
-        f"up to {found.signal.largest:.4g} V, rms {found.signal.rms:.4g} V; {found.lost.mean():.0%} of the "
-        f"slide cannot be rendered; error in force {found.force_error:.2%}, in spectrum "
-        f"{found.spectrum_error:.2%}"
+        f"up to {found.signal.largest:.4g} V, rms {found.signal.rms:.4g} V; {reached}; error of the force "
+        f"{found.force_error:.2%}, of its spectrum {found.spectrum_error:.2%}"
     )
     for low, high, error, fraction in found.bands:
         if fraction > 1e-3:
-            print(f"  {low:g} to {high:g} Hz: error {error:.2%}, with {fraction:.1%} of the wish's power")
+            print(f"  {low:g} to {high:g} Hz: error {error:.2%}; holds {fraction:.1%} of the target's power")
     _signal(found.signal.profile, touch, device, path)
 
 

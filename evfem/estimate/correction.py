@@ -44,7 +44,7 @@ def corrections(friction: Floats, linear: Floats, wavelength: Floats, slope: Flo
 
 
 def importance(friction: Floats, linear: Floats, wavelength: Floats, slope: Floats) -> Floats:
-    """Rms change of a curve for a unit of each, (N, 3), as a share of the range of `friction`."""
+    """Rms change of a curve for a unit of each, (N, 3), as a fraction of the range of `friction`."""
     linearised = np.abs(np.fft.rfft(linear, axis=1)[:, 1:]) * np.sqrt(2.0) / linear.shape[1]
     q = 2.0 * np.pi * np.arange(1, linearised.shape[1] + 1) / wavelength[:, None]
     sizes = [slope, np.linalg.norm(linearised, axis=1), np.linalg.norm(q * linearised, axis=1)]

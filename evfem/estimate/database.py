@@ -77,7 +77,7 @@ class Database:
 
     @property
     def relative_errors(self) -> Floats:
-        """The errors (N,) as shares of the range of each curve."""
+        """The errors (N,) as fractions of the range of each curve."""
         slope = np.array([texture.slope for texture in self.textures])
         return np.asarray(self.errors * slope / np.ptp(self.friction, axis=1))
 

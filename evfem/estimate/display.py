@@ -1,15 +1,15 @@
-r"""From a friction curve to a display's voltage, and how good that rendering is.
+r"""The voltage of a display for a friction curve, and the errors of this rendering.
 
-The voltage is that of the closed forms (`rendering.voltage_for`), of whatever curve: estimated,
-measured or the model's; `exact_voltage` asks the coupled model instead. What the display then gives
-is ``mu = mu_d (1 + F_e / F_n)``, with the amplifier's limits in it. Compared are::
+The voltage is that of the closed forms (`rendering.voltage_for`), for an estimated, measured or
+simulated curve; `exact_voltage` solves the coupled model instead. The friction on the display is
+``mu = mu_d (1 + F_e / F_n)``, with the limits of the amplifier. Errors relative to the target are::
 
-    force      ||F - F_wish|| / ||F_wish||
-    changes    the same without both means: what texture is felt by
-    spectrum   ||a - a_wish|| / ||a_wish|| of the one-sided amplitudes, the mean left out
+    force      ||F - F_target|| / ||F_target||
+    changes    the same without both means: texture is felt by changes
+    spectrum   ||a - a_target|| / ||a_target|| of the one-sided amplitudes, without the mean
     bands      the same within each band of frequencies, spatial frequency times speed
 
-A place cannot be rendered where the wish is below the display's own friction, because attraction
+The target cannot be rendered where it is below the display's own friction, because attraction
 only adds to it, and where the amplifier cannot follow.
 """
 
@@ -70,9 +70,9 @@ class Device(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Rendering:
-    """The voltage for a friction curve, the friction `felt` (n,) on the display, `lost` (n,) where that is
-    not the wish, errors as at the head of this file (NaN if there is nothing to be compared with), and
-    `bands`: rows (low Hz, high Hz, error, share of the wish's power).
+    """The voltage for a friction curve; the friction `felt` (n,) on the display; `lost` (n,) where it misses
+    the target; errors as at the head of this file (NaN if there is nothing to compare with); and `bands`:
+    rows (low Hz, high Hz, error, fraction of the target's power).
     """
 
     curve: FrictionCurve

@@ -7,9 +7,9 @@ to the two harmonics of the database that explain most of its heights::
     h(x) ~ a (sin(q (x - x0)) + c sin(2 q (x - x0)) + d cos(2 q (x - x0)))
 
 For a texture that repeats, 2 pi / q is a whole fraction of its period; else the best one of `TRIED`
-wavelengths. That what they leave out is not corrected is said. A place outside the database is moved to its
-nearest edge, and said too, as is one outside the hull of its points; the model has no such limits. A friction
-profile is taken as it is.
+wavelengths. `notes` report heights that two harmonics do not explain, and parameters outside the range of the
+database (they are moved to its nearest edge) or outside the convex hull of its points; the finite element
+model has no such limits. A friction profile is used as it is.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from evfem.estimate.touch import FrictionCurve, Touch, steps_over, surface_of
 from evfem.textures.library import REFERENCES, reference
 from evfem.textures.texture import Texture
 
-#: wavelengths that are tried for a texture that ends, share of its waves' variance that is enough,
+#: wavelengths that are tried for a texture that ends, fraction of its waves' variance that is enough,
 #: mm before and behind the slide over a texture that does not repeat within it
 TRIED, ENOUGH, BESIDE = 300, 0.9, 0.125
-#: error of an estimate, as a share of the range that it shows, that is said
+#: error of an estimate, relative to the range of its curve, from which on a note reports it
 MUCH = 0.5
-#: relative distance from the speed of the database that is said
+#: relative distance from the speed of the database from which on a note reports it
 OTHER_SPEED = 0.05
 
 
 @dataclass(frozen=True)
 class Reduced:
     """Two harmonics of a texture: wavelength, amplitude, `in_phase` and `in_quadrature` as in
-    `Parametric`, the place `x0` (mm) where the first sine rises through zero, and the share of the
+    `Parametric`, the position `x0` (mm) where the first sine rises through zero, and the fraction of the
     heights' variance that both `explain`.
     """
 
@@ -101,8 +101,8 @@ def _harmonics(x: Floats, height: Floats, wavelength: float) -> Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """An estimated friction curve, and what is to be said of it (`notes`, none where all is well), of which
-    `curve.error` knows nothing: the rms error of the points of the database nearby, left out in turn.
+    """An estimated friction curve with `notes` on what makes it doubtful. `curve.error` is the leave-one-out
+    rms error of nearby points of the database, which does not include these.
     """
 
     curve: FrictionCurve
@@ -140,7 +140,7 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
 def _friction(
     texture: Texture, touch: Touch, near: Parametric, response: Floats
 ) -> tuple[Floats, Floats, float]:
-    """x (n,) in mm, the corrected friction (n,), and the share that was not found and is interpolated."""
+    """x (n,) in mm, the corrected friction (n,), and the fraction without equilibrium, interpolated."""
     x, linear, period = linear_friction(texture, replace(touch, friction=near.friction, load=near.load))
     found = np.isfinite(linear)
     if not found.all():
@@ -151,7 +151,7 @@ def _friction(
 
 
 def known_error(name: str, ridged: bool) -> float:
-    """Rms error of the estimate of a reference texture, as a share of the range of the model's curve."""
+    """Rms error of the estimate of a reference texture, as a fraction of the range of the model's curve."""
     x, friction = reference_curves(ridged)[choice("texture", name, tuple(REFERENCES))]
     curve = estimate(reference(name), Touch(ridged=ridged)).curve
     wrong = np.interp(x, curve.x, curve.friction) - friction

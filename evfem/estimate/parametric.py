@@ -4,7 +4,7 @@ The profile of the database, the paper's eq. (25) in general::
 
     h(x) = a (sin(q x) + c sin(2 q x) + d cos(2 q x)),   q = 2 pi / wavelength,   s = q a
 
-`slope` s is the slope of the first sine; `in_phase` c and `in_quadrature` d are the shares of the
+`slope` s is the slope of the first sine; `in_phase` c and `in_quadrature` d are the fractions of the
 second harmonic. Once the whole contact slips, the friction force of such a slide repeats with the
 wavelength, whatever ridges the finger has, because they move with it.
 
@@ -57,8 +57,8 @@ class Parametric(Checked):
 
     wavelength: Annotated[float, _up_to(100.0, "mm"), "of a wave"] = 2.0
     slope: Annotated[float, _up_to(10.0), "of the first sine"] = 0.1
-    in_phase: Annotated[float, between(-10.0, 10.0), "share of the second harmonic"] = 0.0
-    in_quadrature: Annotated[float, between(-10.0, 10.0), "share of the second harmonic"] = 0.0
+    in_phase: Annotated[float, between(-10.0, 10.0), "second harmonic over the first, in phase"] = 0.0
+    in_quadrature: Annotated[float, between(-10.0, 10.0), "the same, in quadrature"] = 0.0
     friction: Annotated[float, _up_to(10.0), "of the material"] = 0.3
     load: Annotated[float, _up_to(10.0, "N/mm"), "on the finger"] = 0.05
     ridged: Annotated[bool, yes_or_no(), "whether the finger has ridges"] = True
@@ -81,7 +81,7 @@ class Parametric(Checked):
         return {name: RANGES[name][:2] for name in wrong}
 
     def point(self) -> Floats:
-        """Its place (6,) in the database, 0 to 1 along each axis where it is inside."""
+        """Its normalised coordinates (6,) in the database, 0 to 1 along each axis if inside."""
         ends = np.array([(getattr(self, name), low, high) for name, (low, high, _) in RANGES.items()]).T
         logarithmic = [logarithmic for _, _, logarithmic in RANGES.values()]
         ends[:, logarithmic] = np.log(ends[:, logarithmic])
@@ -89,7 +89,7 @@ class Parametric(Checked):
 
 
 def at(point: Floats, ridged: bool) -> Parametric:
-    """The texture at a place (6,) of the database.
+    """The texture at normalised coordinates (6,) of the database.
 
     >>> at(Parametric(wavelength=3.0, load=0.03).point(), True).wavelength
     3.0

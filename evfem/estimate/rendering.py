@@ -1,9 +1,9 @@
-"""From sliding over a real surface to a display's voltage, and back to what the finger then feels.
+"""Rendering of a real surface: the voltage that gives a display its friction, and the simulated result.
 
-A reference is recorded, its apparent friction F_t / F_n becomes a voltage over the position by
-(17)-(20b), and the display replays it. The closed forms leave out the air layer, take the contact
-area from a power law and the load as constant; `exact` asks the coupled model itself for the
-voltage instead. Forces on the bone, N/mm; mm, V, s.
+A reference slide is recorded, its apparent friction F_t / F_n is converted to a voltage over the position by
+(17)-(20b), and the display is simulated under it. The closed forms neglect the air layer, take the contact
+area from a power law and the load as constant; `exact` solves the coupled model for the voltage instead.
+Forces on the bone, N/mm; mm, V, s.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from evfem.simulation.result import Frame, Result, Row
 from evfem.simulation.run import simulate
 from evfem.tensor import Array
 
-#: friction that is lower than the display's own by less than this share of it is solver noise
+#: friction below that of the display by less than this fraction counts as solver noise
 NOISE = 1e-6
 
 
@@ -122,13 +122,13 @@ def _slide_rows(result: Result) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """An effective voltage over the position, and what is known of it before anything is simulated.
+    """An effective voltage over the position, and its error by the closed forms.
 
-    `share_not_renderable`: share of the path on which the wish is below the display's own friction; while the
-    finger still sticks at the start, that is no loss. Voltages in V: `largest`, `rms` over the path,
+    `share_not_renderable`: fraction of the path on which the target is below the display's own friction (no
+    loss while the finger still sticks at the start). Voltages in V: `largest`, `rms` over the path,
     `carrier` (peak of the display's waveform at the largest). `error_of_display`: relative L2 error of the
-    friction force by (16a), (16b) without the amplifier, `error_of_amplifier` the change it makes, relative
-    to the wish; `share_limited` the share of the path on which it acts.
+    friction force by (16a), (16b) without the amplifier, `error_of_amplifier` the change by the amplifier,
+    relative to the target; `share_limited` the fraction of the path on which it limits.
     """
 
     profile: VoltageProfile
@@ -149,13 +149,13 @@ def voltage_for(
     amplifier: Amplifier | None = None,
     speed: float | None = None,
 ) -> Signal:
-    r"""The voltage that makes a display feel like `reference` by the closed forms.
+    r"""The voltage that gives a display the friction of `reference`, by the closed forms.
 
     .. math:: U = \sqrt{F_e / (p_1 k F_n^m)}, \quad F_e = (\mu_{rs} / \mu_{hd} - 1) F_n \ge 0
 
     with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear area law (m =
     1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops out. Otherwise the area
-    law needs the force of `depth` mm. The voltage is 0 where the wish is below the display's own friction.
+    law needs the force of `depth` mm. The voltage is 0 where the target is below the display's friction.
     `amplifier` limits the profile (its slew needs `speed` in mm/s).
 
     >>> from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
@@ -193,7 +193,7 @@ def voltage_for(
 
 
 def _share_apart(one: VoltageProfile, other: VoltageProfile) -> float:
-    """Share of the path on which two profiles differ; pieces between rows are judged in their middle."""
+    """Fraction of the path on which two profiles differ, sampled in the middle of intervals between rows."""
     x = np.unique(np.concatenate([one.position, other.position]))
     middle = 0.5 * (x[:-1] + x[1:])
     apart = np.abs(one(middle) - other(middle)) > 1e-9 * np.max(np.abs(one.voltage), initial=1.0)
@@ -211,7 +211,7 @@ def replay(
     the paper, pressed to the load that the reference had after its press, and slid in the same steps.
     """
     motion = list(reference.scene.motion)
-    first = next((i for i, part in enumerate(motion) if part.course.distance), 0)
+    first = next((i for i, one in enumerate(motion) if one.course.distance), 0)
     if first and motion[first - 1].course.presses:
         last_row = int(_slide_rows(reference.result)[0]) - 1
         load = float(reference.result.applied_force[last_row])
@@ -227,13 +227,13 @@ def exact(
     largest_voltage: float = 10_000.0,
     drive: Drive | None = None,
 ) -> Recording:
-    """The display's own voltage that makes the coupled model reproduce the reference: exact encoding.
+    """Exact encoding: the voltage at which the coupled model has the reference's friction force.
 
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as its
-    equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
-    attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
-    was. The voltage found, an effective one, is in `result.voltage`, the `drive`'s peak in `peak_voltage`;
-    `Comparison.unmet` says where the wish was out of reach.
+    equation; where that lies outside, the voltage stays at its limit. While some nodes stick, attraction
+    hardly changes the friction force; if no voltage meets the target then, the voltage is unchanged. The
+    resulting effective voltage is in `result.voltage`, the `drive`'s peak in `peak_voltage`;
+    `Comparison.unmet` marks the positions where the target was missed.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
@@ -269,7 +269,7 @@ class Comparison:
         return float(np.max(np.abs(self.error)))
 
     def unmet(self, tolerance: float) -> Array:
-        """Places that miss the target by more than `tolerance` (N/mm), (n,) bool."""
+        """Positions that miss the target by more than `tolerance` (N/mm), (n,) bool."""
         return np.abs(self.error) > tolerance
 
 

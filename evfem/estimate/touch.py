@@ -1,8 +1,8 @@
-"""From a texture to a scene and to what the model says of it: a finger, its load and its speed.
+"""Conditions of a slide over a texture (finger, load, speed), its scene, and the simulated friction.
 
 The pad is the coarse one, viscous; it is pressed to the load, slid until its whole contact slips,
-and then over the part of the texture that is asked for, the load held. Heights are those of the
-rigid surface; a friction profile lies on a level one.
+and then over the requested length of the texture, at constant load. Heights are those of the
+rigid surface; a friction profile lies on a flat one.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from evfem.simulation.result import Result
 from evfem.surface.surfaces import Flat, Profile
 from evfem.textures.texture import Texture
 
-#: steps of each mm and of a whole slide, rows of a friction table, mm of texture beside the finger
+#: steps per mm, largest number of steps of a slide and of rows of a friction table, mm beside the finger
 STEPS_PER_MM, MOST_STEPS, MOST_TABLE, BESIDE = 16, 400, 9_000, 10.0
 
 
 @dataclass(frozen=True)
 class Touch(Checked):
-    """How a finger slides over a texture.
+    """Conditions of a slide over a texture: finger, material's friction, load, speed and length.
 
     >>> Touch(load=-1.0)
     Traceback (most recent call last):
@@ -44,7 +44,7 @@ class Touch(Checked):
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Friction (n,) over x (n,) mm from the texture's begin, its `source`, and if known its +- `error`."""
+    """Friction (n,) over x (n,) in mm from the texture's start; its `source`, and `error` (+-) if known."""
 
     x: Floats
     friction: Floats
@@ -71,7 +71,7 @@ def steps_over(length: float) -> int:
 
 
 def surface_of(texture: Texture, touch: Touch, before: float) -> Flat | Profile:
-    """The texture under the whole slide, moved so that its x = 0 is passed after `before` mm."""
+    """The texture below the whole slide, shifted so that its x = 0 is reached after `before` mm."""
     x, values = texture.over(-before - BESIDE, touch.length + BESIDE)
     x = x + before
     if texture.quantity == "height":
@@ -87,7 +87,7 @@ def _file_name(name: str) -> str:
 
 
 def from_texture(result: Result) -> Result:
-    """A slide of `touch_scene` for pictures: its frames stand where the texture's x is that of the curve."""
+    """The result of `touch_scene` for pictures, shifted to the x of the texture and of the curve."""
     before = _run_in(result)
     frames = [
         replace(one, position=one.position - before, displacement=one.displacement - [before, 0.0])

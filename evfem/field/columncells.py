@@ -1,13 +1,13 @@
-r"""Quadrilaterals between lines and rows of the full field: their matrices, potential and forces.
+r"""Quadrilaterals between grid lines and rows of the full field: matrices, potential and forces.
 
 A cell of a layer between the curves y_l and y_{l+1}, from one line to the next one and from the
-share :math:`\sigma` of the layer's height to :math:`\sigma + d`, has with the reference coordinates
+fraction :math:`\sigma` of the layer's height to :math:`\sigma + d`, has with the reference coordinates
 :math:`\xi, \eta` the derivatives of its map
 
 .. math:: x_\xi = X, \qquad y_\xi = Y(\eta) = y_l' + (\sigma + d\,\eta)(y_{l+1}' - y_l'), \qquad
           y_\eta = d\,h(\xi), \qquad h = y_{l+1} - y_l ,
 
-so its energy is a sum of products of what the geometry says and of what the reference cell says,
+so its energy is a sum of products of geometric factors and integrals of the reference cell,
 
 .. math:: \int |\nabla\varphi|^2 = \int \frac{d h}{X} \varphi_\xi^2 - \frac{2 Y}{X} \varphi_\xi \varphi_\eta
           + \frac{X^2 + Y^2}{X d h} \varphi_\eta^2 \; d\xi\, d\eta ,
@@ -29,7 +29,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints, linalg
 
-#: places and weights of quadrature on (0, 1)
+#: nodes and weights of Gauss quadrature on (0, 1)
 AT, WEIGHTS = np.array([0.5 - np.sqrt(1.0 / 12.0), 0.5 + np.sqrt(1.0 / 12.0)]), np.array([0.5, 0.5])
 #: linear (2, q) and quadratic (3, q) shape functions there
 _N, _DN = np.stack([1 - AT, AT]), np.outer([-1.0, 1.0], np.ones_like(AT))
@@ -39,7 +39,7 @@ _DUP = np.stack([4 * AT - 3, 4 - 8 * AT, 4 * AT - 1])
 _BY_XI = np.einsum("ip,jq->ijpq", _DN, _UP).reshape(6, 2, 2)
 _BY_ETA = np.einsum("ip,jq->ijpq", _N, _DUP).reshape(6, 2, 2)
 _WEIGHT = np.outer(WEIGHTS, WEIGHTS)
-#: which shape function is where: along the row, across it
+#: index of each shape function along the row and across it
 _PLACES = [(i, j) for i in range(2) for j in range(3)]
 
 
@@ -97,7 +97,7 @@ class Cells:
         return (_PRODUCTS @ geometry.reshape(8, -1)).reshape(36, *across.shape[2:])
 
     def _part(self, values: Any, k: int) -> Any:
-        """Those of values (L, rows) that belong to the shape function `k` of all cells: a view (E, R)."""
+        """View (E, R) of values (L, rows) at the node of shape function `k` of all cells."""
         i, j = _PLACES[k]
         return values[i : i + self.lines - 1, j : j + 2 * self.rows - 1 : 2]
 
@@ -111,9 +111,8 @@ class Cells:
 
     def potential(self, strips: Any | None, floating: bool) -> Any:
         """Potential (L, rows): 1 on the lowest curve (or strips), 0 on the highest; `floating`: no charge."""
-        prescribed = np.zeros(
-            (2, self.lines, self.per_line)
-        )  # for the electrodes, and for 1 on the highest curve
+        # values prescribed for the electrodes, and for 1 on the highest curve
+        prescribed = np.zeros((2, self.lines, self.per_line))
         prescribed[1, :, -1] = 1.0
         prescribed[0, :, 0] = float(strips is None)
         held = [0, self.per_line - 1] if strips is None else [self.per_line - 1]
@@ -167,8 +166,8 @@ class Cells:
         return float(np.sum(parts))
 
     def by_x(self, found: Squares, fraction: Floats, rise: Floats) -> Floats:
-        """Derivative (L,) of the integral by the places of what moves along x with the lines: all of a
-        row, or between its lower and upper side growing `share` (2, R) of it, by `rise` (R,).
+        """Derivative (L,) of the integral by displacements along x of the grid lines: all of a
+        row, or between its lower and upper side growing `fraction` (2, R) of it, by `rise` (R,).
         """
         X, Y, h = self.X, self.Y, self.height[:, None]
         turned = found.across / h

@@ -1,21 +1,21 @@
-r"""Poisson's problem below a graph over x, in columns of layers: the capacitance and its derivative.
+r"""Poisson's problem below a graph over x, in columns of layers: capacitance and its derivatives.
 
 The layers (slab, air, skin) lie one above the other between curves y_l(x), l = 0 ... n, that are
-straight between L lines. Each layer has rows at fixed shares of its height; between two lines each
-row is a quadrilateral with straight sides, on which the potential is linear along the row (the
+straight between L vertical grid lines. Each layer has rows at fixed fractions of its height; between two
+lines each row is a quadrilateral with straight sides, on which the potential is linear along the row (the
 lines are as dense as the outline's own nodes) and quadratic across it,
 
 .. math:: x = \sum_k N_k(\xi)\, x_k, \qquad
           y = (1 - \sigma) \sum_k N_k(\xi)\, y_{l,k} + \sigma \sum_k N_k(\xi)\, y_{l+1,k},
 
-with the share :math:`\sigma` running over the row with :math:`\eta`. The potential is U on the
+with the fraction :math:`\sigma` running over the row with :math:`\eta`. The potential is U on the
 lowest curve and 0 on the highest one; on the two ends its normal derivative is zero. With unknowns
 numbered along the lines the matrix of `evfem.field.poisson.poisson` is a narrow band: it
-needs neither ordering nor symbolic analysis, whatever the outline does.
+needs neither ordering nor symbolic analysis for any outline.
 
 The derivatives of the discrete C = eps_0 times the minimal integral of ``eps |grad phi|^2`` by all
 x_k and y_lk are exact: C is stationary in the potential, so they are virtual works
-:math:`-2 \int T : \nabla V` of the velocities V with which a curve's point takes the cells along.
+:math:`-2 \int T : \nabla V` of the mesh velocities V induced by moving a point of a curve.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import eps_0
 from evfem.field.columncells import AT, WEIGHTS, Cells
 
-#: share of the lowest layer that is taken to the second order on electrodes that end
+#: fraction of the lowest layer that is replaced by a thin-layer expansion above finite electrodes
 THIN = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class Capacitance:
-    """C in F per m of depth (N/V^2) and its derivatives by the lines' `x` (L,) and by the `levels`
-    (n + 1, L), in N/V^2 per mm; `phi` (L, rows) is the potential at 1 V, `y` (L, rows) where.
+    """C in F per m of depth (N/V^2) and its derivatives by the grid lines' `x` (L,) and by the `levels`
+    (n + 1, L), in N/V^2 per mm; `phi` (L, rows) is the potential at 1 V at heights `y` (L, rows).
     """
 
     value: float
@@ -84,7 +84,7 @@ class Columns:
         return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, cells.heights())
 
     def cells(self, x: Floats, levels: Floats, electrodes: Floats | None) -> tuple[Cells, Strips | None]:
-        """The cells, and what stands for the lowest ones on electrodes that end."""
+        """The cells, and the thin-layer expansion below them for finite electrodes."""
         if electrodes is None:
             return Cells(self.eps_r, self.shares, x, levels), None
         depth = levels[1] - levels[0]
@@ -93,9 +93,9 @@ class Columns:
 
 
 class Strips:
-    """Electrodes that end somewhere: in a share `THIN` of the lowest layer, of thickness d, the energy is eps
-    times the integral of w (phi - V)^2 / d + (1 - 2 w / 3) d phi'^2, w being the share of electrode within d
-    to either side. Plates stay exact, edges are smoothed over d, and lines may move over them.
+    """Finite electrodes: in a fraction `THIN` of the lowest layer, of thickness d, the energy is eps times
+    the integral of w (phi - V)^2 / d + (1 - 2 w / 3) d phi'^2, where w is the fraction of electrode within d
+    to either side. Plates stay exact, edges are smoothed over d, and grid lines may move over them.
     """
 
     def __init__(self, x: Floats, electrodes: Floats, depth: float, eps_r: complex) -> None:
@@ -107,39 +107,39 @@ class Strips:
             np.clip((edge.ravel()[:, None] - x[:-1]) / self.width, 0.0, 1.0) for edge in (ends[:-1], ends[1:])
         )  # (3 K, E)
         at = low[..., None] + (high - low)[..., None] * AT  # (3 K, E, q)
-        over = self.over(x[:-1, None] + at * self.width[:, None], np.tile(np.arange(begin.size), 3))
-        fraction = over * (high - low)[..., None] * WEIGHTS
+        overlap = self.overlap(x[:-1, None] + at * self.width[:, None], np.tile(np.arange(begin.size), 3))
+        fraction = overlap * (high - low)[..., None] * WEIGHTS
         self.weight = eps_r / depth * fraction
         self.voltage = np.tile(voltage, 3)[:, None, None]
         self.shapes = np.stack([1.0 - at, at])  # (2, 3 K, E, q)
         whole = self.width * (1.0 - 2.0 / 3.0 * fraction.sum(axis=(0, 2)))
         self.along = eps_r * depth * whole / self.width**2  # (E,)
         every = np.arange(begin.size)
-        lines = self.over(np.broadcast_to(x, (begin.size, x.size))[..., None], every)[..., 0]  # (K, L)
+        lines = self.overlap(np.broadcast_to(x, (begin.size, x.size))[..., None], every)[..., 0]  # (K, L)
         self.at_lines = eps_r * depth * (1.0 - 2.0 / 3.0 * lines.sum(axis=0))  # (L,)
         self.at_ends = eps_r / depth * lines[:, [0, -1]]
 
-    def over(self, x: Floats, electrode: Ints) -> Floats:
-        """The share within the depth to either side of places (k, ..., q) that is electrode k."""
+    def overlap(self, x: Floats, electrode: Ints) -> Floats:
+        """Overlap: the fraction of electrode k within the depth to either side of positions (k, ..., q)."""
         begin, end, _ = self.pieces[electrode].T[:, :, None, None]
         up, down = (np.clip((x - edge) / (2.0 * self.depth) + 0.5, 0.0, 1.0) for edge in (begin, end))
         return np.asarray(up - down)
 
     def matrix(self) -> tuple[Floats, Floats]:
-        """Diagonal (L,) and off-diagonal (L - 1,) of what joins the matrix of the lowest row."""
+        """Diagonal (L,) and off-diagonal (L - 1,) added to the matrix of the bottom row."""
         weight = self.weight * self.width[:, None]
         own = [np.sum(weight * shape**2, axis=(0, 2)) + self.along for shape in self.shapes]
         beside = np.sum(weight * np.prod(self.shapes, 0), axis=(0, 2)) - self.along
         return np.append(own[0], 0.0) + np.append(0.0, own[1]), beside
 
     def load(self) -> Floats:
-        """What joins the right-hand side of the lowest row (L,)."""
+        """Contribution (L,) of the electrodes to the right-hand side of the bottom row."""
         weight = self.weight * self.width[:, None] * self.voltage
         own = [np.sum(weight * shape, axis=(0, 2)) for shape in self.shapes]
         return np.asarray(np.append(own[0], 0.0) + np.append(0.0, own[1]))
 
     def energy(self, phi: Floats) -> tuple[float, Floats]:
-        """The integral for potentials (L,) of the lowest row, and its derivative by x (L,) of the lines."""
+        """The energy for potentials (L,) of the bottom row, and its derivative by x (L,) of the lines."""
         beyond = phi[:-1, None] * self.shapes[0] + phi[1:, None] * self.shapes[1] - self.voltage
         rise = np.diff(phi)
         value = np.sum(self.weight * self.width[:, None] * beyond**2) + np.sum(self.along * rise**2)

@@ -26,7 +26,7 @@ from evfem.field.outlines import FLANK, SAME, TURN, Outline
 
 #: largest ratio of the curvatures at the two ends of a chord
 RATIO = 3.0
-#: sagitta of a chord, as a share of its distance to the electrode and of its radius
+#: sagitta of a chord, as a fraction of its distance to the electrode and of its radius
 SAGITTA = 3e-3
 #: most chords between two points
 MOST = 200

@@ -2,7 +2,7 @@ r"""Mapped quadrilaterals between an outline and the electrode below it.
 
 Columns stand at the outline's points and grow away from its corners; rows follow the outline, so
 that thin gaps need no small cells. From below: the slab, a block of rows up to the lower runs of
-the outline, which goes on as a share of the height under the higher ones, a block above it, and
+the outline, which goes on as a fraction of the height under the higher ones, a block above it, and
 for a body that ends in the air a third one from its upper side to a box far away. The body itself
 has no cells::
 
@@ -31,7 +31,7 @@ WEDGE = 0.75
 BOX = 1000.0
 #: how much slower they grow beside a body that ends, where the field's strength is asked for
 BESIDE = 0.5
-#: largest share of a block that one of its rows takes
+#: largest fraction of a block that one of its rows takes
 ROW = 0.2
 
 
@@ -53,7 +53,7 @@ class FieldMesh:
     periodic: bool
 
     def located(self, x: Floats, y: Floats) -> tuple[Ints, Floats]:
-        """Cells (n,) of places, coordinates (2, n) in them; above the air its end counts, else InputError."""
+        """Cells (n,) and local coordinates (2, n) of points; above the air its end counts, else InputError."""
         order = np.lexsort((self.row[self.cells[0]], self.line[self.cells[0]]))
         cells = self.cells[:, order]
         column = self.line[cells[0]]
@@ -76,14 +76,14 @@ class FieldMesh:
                 gaps = np.flatnonzero(cells[3, own][:-1] != cells[0, own][1:])
                 row = int(gaps[0]) if gaps.size else low.size - 1
             if row < 0 or (np.isfinite(y[k]) and y[k] > high[row]):
-                raise InputError("y", float(y[k]), f"places in slab or air: {low[0]:g} to {high[-1]:g} mm")
+                raise InputError("y", float(y[k]), f"positions in slab or air: {low[0]:g} to {high[-1]:g} mm")
             found[k] = own.start + row
             local[:, k] = fraction, min(1.0, (y[k] - low[row]) / (high[row] - low[row]))
         return order[found], local
 
 
 def fractions(low: float, high: float, growth: float) -> Floats:
-    """Rows of a block as shares of its height, with rows of the given shares at its two ends."""
+    """Rows of a block as fractions of its height, with rows of the prescribed sizes at its two ends."""
     return graded(0.0, 1.0, (low, high), growth, ROW, 3)
 
 
@@ -102,7 +102,7 @@ def columns(run: Run, sizes: Floats, reduced: float, growth: float) -> Floats:
 @dataclass(frozen=True)
 class _Ends:
     """A body that ends in the air: `sizes` of the cells at its two ends and height of the `box` (mm); `foot`
-    and `edge` are sizes at the lower and upper end of its end walls as shares of the two blocks beside them.
+    and `edge` are sizes at the lower and upper end of its end walls, relative to the two blocks beside them.
     """
 
     sizes: tuple[float, float]
@@ -265,7 +265,7 @@ class _Grid:
                          self.outline.periodic)  # fmt: skip
 
     def _lift(self, points: Floats) -> Floats:
-        """1 on the body, 0 on the slab, falling over the distance to the nearest low place."""
+        """1 on the body, 0 on the slab, falling over the distance to the nearest low point."""
         outline, x = self.outline, self.x
         low = np.full(x.size, np.inf)
         for piece in outline.pieces():

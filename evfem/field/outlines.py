@@ -27,10 +27,10 @@ from evfem.errors import InputError
 
 #: ends of an outline steeper than this, ``|n_y| < 0.3``, are flanks of a body that goes on above
 FLANK = 0.3
-ONE_WAY = "walls that go one way"
+MONOTONE_WALLS = "walls that go one way"
 #: heights closer than this share of the largest length are one height
 SAME = 1e-12
-#: share of the energy around a corner that its smallest cells may miss
+#: fraction of the energy around a corner that its smallest cells may miss
 CORNER = 1e-7
 #: the same of what a corner close to the slab adds, whose own field ends at the gap
 TIP = 1e-4
@@ -71,13 +71,15 @@ class Outline:
     @classmethod
     def of(cls, x: Values, height: Values, periodic: bool = True) -> Outline:
         """The outline of these points; InputError for what is none."""
-        x = np.atleast_1d(np.asarray(finite("x", x, "places in mm, finite numbers"), dtype=float))
+        x = np.atleast_1d(np.asarray(finite("x", x, "positions in mm, finite numbers"), dtype=float))
         height = np.atleast_1d(np.asarray(finite("height", height, "heights in mm"), dtype=float))
         if x.ndim != 1 or x.size < 2 or height.shape != x.shape:
             shapes = f"shapes {x.shape} and {height.shape}"
             raise InputError("x, height", shapes, "two rows of numbers, of the same length, at least 2")
         if np.any(np.diff(x) < 0.0) or x[-1] <= x[0]:
-            raise InputError("x", "places that go back", "places that do not decrease; equal ones are a wall")
+            raise InputError(
+                "x", "positions that go back", "positions that do not decrease; equal ones are a wall"
+            )
         if height.min() < 0.0:
             raise InputError("height", float(height.min()), "heights in mm above the slab, not negative")
         if periodic:
@@ -175,12 +177,12 @@ def _without_end_walls(x: Floats, height: Floats) -> tuple[Floats, Floats]:
     first, last = int(np.searchsorted(x, x[0], "right")) - 1, int(np.searchsorted(x, x[-1]))
     seam = np.diff(np.concatenate([height[last:], height[: first + 1]]))
     if np.any(seam > 0.0) and np.any(seam < 0.0):
-        raise InputError("height", "a wall that goes up and down where the period ends", ONE_WAY)
+        raise InputError("height", "a wall that goes up and down where the period ends", MONOTONE_WALLS)
     return x[first : last + 1], height[first : last + 1]
 
 
 def _upright(x: Floats, height: Floats) -> Floats:
-    """The places, where what is nearly a wall between two corners stands upright on its foot."""
+    """The positions, with nearly vertical walls between two corners made vertical at their foot."""
     x, dx, dh = x.copy(), np.diff(x), np.diff(height)
     step = np.where(np.abs(dh) > WALL * dx, np.sign(dh), 0.0) * (dx > 0.0)
     cuts = np.flatnonzero(np.diff(step)) + 1
@@ -207,7 +209,7 @@ def _without_repetitions(x: Floats, height: Floats) -> Floats:
     rises = np.sign(np.diff(height)) * same
     inner = same[:-1] & same[1:]
     if np.any(inner & (rises[:-1] * rises[1:] < 0)):
-        raise InputError("height", "a wall that goes up and down at one x", ONE_WAY)
+        raise InputError("height", "a wall that goes up and down at one x", MONOTONE_WALLS)
     keep = np.ones(x.size, dtype=bool)
     keep[1:-1] = ~inner & ~_straight(x, height)
     near = SAME * max(float(x[-1] - x[0]), float(height.max()))

@@ -47,7 +47,7 @@ class FieldSolution:
     solved: Potential = field(repr=False, compare=False)
 
     def potential(self, x: Values, y: Values) -> Values:
-        """Potential in V at places in slab or air (mm, arrays broadcast); InputError elsewhere.
+        """Potential in V at positions in slab or air (mm, arrays broadcast); InputError elsewhere.
 
         >>> plates = rigid_field([0.0, 1.0], [0.1, 0.1], voltage=100.0)
         >>> round(plates.potential(0.3, 0.025), 6)
@@ -57,7 +57,7 @@ class FieldSolution:
         return plain(self.voltage * self.solved.values(x, y))
 
     def field(self, x: Values, y: Values) -> tuple[Values, Values]:
-        """The two components of the field in V/mm at places in slab or air (mm)."""
+        """The two components of the field in V/mm at positions in slab or air (mm)."""
         x, y = _places(x, y)
         gradient = -self.voltage * self.solved.gradients(x, y)
         return plain(gradient[0]), plain(gradient[1])
@@ -79,7 +79,7 @@ class FieldSolution:
 
 
 def _places(x: Values, y: Values) -> tuple[Floats, Floats]:
-    x = np.asarray(finite("x", x, "places in mm"), dtype=float)
+    x = np.asarray(finite("x", x, "positions in mm"), dtype=float)
     return np.broadcast_arrays(x, np.asarray(y, dtype=float))  # type: ignore[return-value]
 
 

@@ -49,7 +49,7 @@ from evfem.tissue.ogden import BulkRelaxes
 #: The smallest and the largest ratio of height and width.
 SLIMMEST = 0.5, 1.2
 
-#: What a scan of the ridges takes the place of, and the part of its depth that two nodes may miss.
+#: parameters that a scan of the ridges replaces, and the fraction of its depth that two nodes may miss
 PROFILE = ("ridges", "ridge_height", "ridge_exponent", "ridge_phase", "ridge_crest", "ridge_groove")
 MISSED = 0.5
 
@@ -98,7 +98,7 @@ class FingerPad(LayeredFinger):
     0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape that meets the ratio of
     ridge to gross contact area of Adams et al. (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan`, or
     as `ridges` a `RidgeScan` or a `Texture` of heights (of `evfem texture import`; its middle comes below the
-    middle of the finger), takes the place of this profile; `ridge_width` then says how finely the pad is
+    middle of the finger), replaces this profile; `ridge_width` then sets how finely the pad is
     divided.
 
     **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the ridges: the
@@ -206,7 +206,7 @@ def _check_alone(pad: FingerPad) -> None:
 
 
 def _check_section(pad: FingerPad, section: Section) -> None:
-    """Refuse geometry whose parts do not fit into each other."""
+    """Raise InputError for inconsistent sizes."""
     (outermost, *_), (thickness, *_) = section.layers, section.thickness
     ridges, outer = section.ridges, section.outer
     check_cells(pad.cells_per_ridge, ridges is not None)

@@ -43,7 +43,7 @@ from evfem.mesh.quality import scaled_jacobian
 RIMS = ("fixed", "free", "nail")
 #: angle (degrees) at which the finger of Table 1 was held, whose length is seen from above
 HELD = 30.0
-#: smallest scaled Jacobian of a cell below measured ridges, and the largest part of the outline's
+#: smallest scaled Jacobian of a cell below measured ridges, and the largest fraction of the outline's
 #: smallest radius that the skin may have
 SMALLEST_SHAPE, THICKEST = 0.02, 0.7
 
@@ -256,7 +256,7 @@ def _ridges(tip: Fingertip) -> str | HeightMap:
 
 
 def _check_shape(tip: Fingertip, solid: Solid) -> None:
-    """Refuse geometry whose parts do not fit into each other."""
+    """Raise InputError for inconsistent sizes."""
     skin = sum(solid.thickness)
     check_skin(skin, solid.outer.smallest_radius, THICKEST)
     check_cells(tip.cells_per_ridge, tip.ridges != "none")

@@ -21,7 +21,7 @@ from evfem.common.arrays import Floats, Ints
 
 #: how far down a transition row (from 0 to 1) the nodes p1, p2 lie
 MIDDLE = 0.5
-#: corners (u as a share of the merged column, r) of a transition's four cells, and of another row's only one
+#: corners (u as a fraction of the merged column, r) of the four cells of a transition, and of a plain row's
 TEMPLATE = np.array(
     [
         [(1 / 3, 0), (2 / 3, 0), (2 / 3, MIDDLE), (1 / 3, MIDDLE)],

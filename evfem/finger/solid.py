@@ -17,7 +17,7 @@ follow the lines, and four sides whose lines go on to the rim along great circle
 The skin's interfaces are true offsets of the smooth ellipsoid along its normals; straight lines to
 the bone fill the hypodermis. Ridges are cut along the normals, and the columns below them merge
 three to one (`evfem.finger.blocks`). With a nail the upper half is the same lattice with
-:math:`e_y \ge 0`, without ridges; the nail takes the place of the outermost layer in those columns of
+:math:`e_y \ge 0`, without ridges; the nail replaces the outermost layer in those columns of
 the rectangle that lie under it, and the nail bed, dermis, that of all below.
 """
 

@@ -22,32 +22,32 @@ PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), 
 #: the same of an edge, and of a hexahedron, by dimensions; and of a triangle
 NODES = {1: np.array([[-1.0], [1.0], [0.0]]), 2: PLACES, 3: HEXAHEDRON.astype(float)}
 TRIANGLE = np.array([(-1, -1), (1, -1), (-1, 1), (0, -1), (0, 0), (-1, 0)], dtype=float)
-#: starts of the search for the nearest place of a face, so many each way; the nearest that are tried; most
-#: iterations, and the change of a place that ends them
+#: closest-point search on a face: number of starting points along each axis, of starting points that are
+#: iterated, largest number of iterations, and the change of coordinates that ends them
 STARTS, TRIED, ITERATIONS, CLOSE = 5, 8, 30, 1e-9
-#: how far outside of a side or cell, in its own coordinates, a place still belongs to it
+#: tolerance, in reference coordinates, within which a point outside a side or cell belongs to it
 ON = 1e-8
-#: so far from the middle, in these coordinates, a search for a place is given up
+#: distance from the centre, in reference coordinates, at which a search is abandoned
 FAR = 10.0
 
 Shape = Callable[[Floats], tuple[Floats, Floats]]
 
 
-def node_places(nodes: int, dim: int) -> Floats:
+def node_points(nodes: int, dim: int) -> Floats:
     """Places (m, d) of the nodes of an edge (2, 3), a triangle (3, 6), a quad (4, 9) or a cube (8, 27)."""
     return (TRIANGLE if dim == 2 and nodes in (3, 6) else NODES[dim])[:nodes]
 
 
-def shape_functions(nodes: int, places: Floats) -> tuple[Floats, Floats]:
-    """Values (..., m) and derivatives (..., m, d) at places (..., d) of the shape functions of such nodes.
+def shape_functions(nodes: int, points: Floats) -> tuple[Floats, Floats]:
+    """Values (..., m) and derivatives (..., m, d) at points (..., d) of the shape functions of such nodes.
 
     >>> value, slope = shape_functions(9, PLACES)
     >>> bool(np.allclose(value, np.eye(9))), bool(np.allclose(slope.sum(axis=1), 0.0))
     (True, True)
     """
-    if places.shape[-1] == 2 and nodes in (3, 6):
-        return _of_a_triangle(nodes, places)
-    t, at = places[..., None], NODES[places.shape[-1]][:nodes].T
+    if points.shape[-1] == 2 and nodes in (3, 6):
+        return _of_a_triangle(nodes, points)
+    t, at = points[..., None], NODES[points.shape[-1]][:nodes].T
     if nodes == 2 ** len(at):
         value, slope = 0.5 * (1.0 + t * at), 0.5 * at + 0.0 * t
     else:
@@ -59,9 +59,9 @@ def shape_functions(nodes: int, places: Floats) -> tuple[Floats, Floats]:
     return value.prod(axis=-2), np.swapaxes(factors.prod(axis=-2), -1, -2)
 
 
-def _of_a_triangle(nodes: int, places: Floats) -> tuple[Floats, Floats]:
+def _of_a_triangle(nodes: int, points: Floats) -> tuple[Floats, Floats]:
     """The same by area coordinates."""
-    area = 0.5 * np.concatenate([-places.sum(axis=-1, keepdims=True), 1.0 + places], axis=-1)
+    area = 0.5 * np.concatenate([-points.sum(axis=-1, keepdims=True), 1.0 + points], axis=-1)
     slope = np.broadcast_to([[-0.5, -0.5], [0.5, 0.0], [0.0, 0.5]], (*area.shape, 2))
     if nodes == 3:
         return area, slope
@@ -76,7 +76,7 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
 
     The interface is every edge (in space: face) that a cell of `region` shares with a cell of another
     region. Raises `InputError` if there is no such region or interface. Gauss and Newton's method
-    searches from the nearest of some places on every one.
+    iterations from the nearest of some points on every one.
     """
     points, patches = mesh.points[nodes], mesh.points[interface_of(mesh, region)]
     m, dim = patches.shape[1:]
@@ -87,9 +87,9 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
     for _ in range(ITERATIONS):
         value, slope = shape_functions(m, at)
         away = points[:, None] - np.einsum("ptm,ptmc->ptc", value, patch)
-        ways = np.einsum("ptma,ptmc->ptac", slope, patch)
-        normal = np.einsum("ptac,ptbc->ptab", ways, ways)
-        pull = np.einsum("ptac,ptc->pta", ways, away)
+        tangents = np.einsum("ptma,ptmc->ptac", slope, patch)
+        normal = np.einsum("ptac,ptbc->ptab", tangents, tangents)
+        pull = np.einsum("ptac,ptc->pta", tangents, away)
         before, at = at, np.clip(at + np.linalg.solve(normal, pull[..., None])[..., 0], -1.0, 1.0)
         if np.abs(at - before).max() < CLOSE:
             break
@@ -115,7 +115,7 @@ def inverted(shape: Shape, nodes: Floats, target: Floats, start: Floats) -> Floa
     it does not come there.
     """
     xi = np.tile(start, (len(nodes), 1))
-    with np.errstate(all="ignore"):  # of a place that is lost all is nan
+    with np.errstate(all="ignore"):  # a point that is not found is nan
         for _ in range(ITERATIONS):
             value, slope = shape(xi)
             away = target - np.einsum("cn,cnk->ck", value, nodes)

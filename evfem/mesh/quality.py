@@ -19,7 +19,7 @@ from evfem.mesh.solids import Refuse, listed, some, turned
 
 #: Extent of a finger's outline in mm: other numbers mean other units.
 SMALLEST, LARGEST = 1.0, 200.0
-#: Two nodes closer than this part of the outline's extent are the same place.
+#: Two nodes closer than this fraction of the outline's extent coincide.
 SAME_PLACE = 1e-7
 #: Pairs of nodes or edges near each other: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
@@ -82,12 +82,12 @@ def _nodes(mesh: Mesh, refuse: Refuse) -> None:
         refuse(f"{len(unused)} nodes that no cell uses (node {some(unused)})", "only nodes of cells")
     radius = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
     pairs = _pairs_within(mesh.points, radius)
-    apart = "one node per place: merge double nodes, or the parts come loose"
+    apart = "one node per position: merge double nodes, or the bodies come apart"
     if pairs is None:
-        refuse("too many nodes in the same place", apart)
+        refuse("too many nodes at the same position", apart)
     elif len(pairs):
         first, second = pairs[0]
-        refuse(f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})", apart)
+        refuse(f"{len(pairs)} pairs of nodes at the same position (nodes {first} and {second})", apart)
 
 
 def _oriented(mesh: Mesh, refuse: Refuse) -> Mesh:

@@ -5,7 +5,7 @@ between regions each region keeps its own average, for stress jumps there. Colou
 are linear in triangles.
 
 A field of the pad colours the outline, tractions are arrows as well. A node has its colour on its half of
-the edges beside it, as it has its share of their length in the model. Arrows are the tractions on the
+the edges beside it, as it has its fraction of their length in the model. Arrows are the tractions on the
 finger: contact pressure pushes along the normal of the surface, shear along its tangent, attraction pulls
 down. Pressure and shear stand in the surface, attraction begins at the outline.
 """
@@ -60,7 +60,7 @@ FIELDS = (*CELL_FIELDS, "displacement", *POINT_FIELDS)
 FROM_ZERO = ("von_mises", "gap", "contact_pressure", "electrostatic_traction")
 MIDDLES = {**dict.fromkeys(STRESSES, 0.0), "J": 1.0, "shear_traction": 0.0, "surface_sink": 0.0}
 Window = tuple[float, float, float, float]
-#: most arrows across a picture, and the longest one as a share of the surface's depth in it
+#: most arrows across a picture, and the longest one as a fraction of the surface's depth in it
 MOST_ARROWS, LONGEST = 36, 0.8
 TRACTIONS = ("contact_pressure", "shear_traction", "electrostatic_traction")
 
@@ -163,7 +163,7 @@ class Scale:
 def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float | None = None) -> Scale:
     """The scale of a field for the values that are shown, from their smallest to their largest.
 
-    A given end takes the place of one of these. A field with a sign has as much of its colours on either
+    A given end replaces one of these. A field with a sign has as much of its colours on either
     side of its middle, unless both ends are given. Raises InputError unless vmin is below vmax.
 
     >>> scale_of("von_mises", np.array([0.1, 0.4]), vmin=0.0)

@@ -146,7 +146,7 @@ class Beside:
         self.ax = ax
 
     def __call__(self, bar: Any, renderer: Any) -> Any:
-        """Where the bar is: the right neighbour of the axes, in parts of the figure."""
+        """Where the bar is: the right neighbour of the axes, in fractions of the figure."""
         from matplotlib.transforms import Bbox
 
         figure, box = whole_figure(self.ax), self.ax.get_position()

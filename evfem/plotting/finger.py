@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Near = Literal["contact"] | fields.Window | None
-#: what is shown below the surface and beside the finger, as a share of the picture or the finger
+#: what is shown below the surface and beside the finger, as a fraction of the picture or the finger
 BELOW, MARGIN = 0.16, 0.03
 #: width of a close-up over that of the contact; its height over its width, for the tissue and the pad
 WIDER, OF_TISSUE, OF_PAD = 1.2, 0.42, 0.3

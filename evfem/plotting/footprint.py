@@ -30,7 +30,7 @@ ENDS[9] = {-1.0: (-1.0, -2 / 3), 0.0: (-2 / 3, 2 / 3), 1.0: (2 / 3, 1.0)}
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: margin around what is shown as a share of its width
+#: margin around what is shown as a fraction of its width
 MARGIN, AROUND = 0.03, 0.2
 #: triangles of a face with 4 or 9 nodes
 FANS = {4: [[0, 1, 2], [0, 2, 3]]}

@@ -69,7 +69,7 @@ class Course:
 
     @property
     def depth(self) -> float | None:
-        """Indentation (mm) at the end; None if unchanged, infinite if set by a force, which always touches."""
+        """Indentation (mm) at the end; None if unchanged, infinite if set by a force (always in contact)."""
         return self.indentation if self.force is None else math.inf
 
     @property

@@ -52,7 +52,7 @@ class Solver:
     core: Annotated[
         float | str,
         {"allowed": _CORE, "check": _core},
-        "gap below which a line of the same work takes the place of a law too steep for the mesh",
+        "gap below which a line of the same work replaces a law too steep for the mesh",
     ] = "auto"
     symmetry: InitVar[object] = None
 

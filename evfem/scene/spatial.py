@@ -19,7 +19,7 @@ SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
 #: fifth may touch. Fitted to peaks of fingers with 5,000 to 53,000 nodes pressed to 0.5 or 1 N.
 PACKAGES, BODY, BODY_GROWTH, CONTACT = 0.13e9, 0.0226e9, 1.1, 27.0
 #: CPU time of a run (s): of packages and mesh; of a step that presses, which factorises about once, with
-#: 1,000 nodes, growing with the nodes to this power; of another step as a share of that. Fitted to thirteen
+#: 1,000 nodes, growing with the nodes to this power; of another step relative to that. Fitted to thirteen
 #: fingers like these, smooth and ridged, with and without voltage, relief, adhesion and time.
 BEGINNING, PRESSING, PRESSING_GROWTH, SLIDING = 0.7, 0.032, 1.5, 0.15
 

@@ -1,10 +1,10 @@
-r"""Whether a scene has one answer: its end by other ways that physics does not tell apart.
+r"""Check of uniqueness: final forces of a scene with other steps and solvers, which should not matter.
 
-A scene is run as it is, in twice the steps, with other drag where a barrier was met
-(`evfem.solver.hold`), with the other sparse solver, and with one input changed by a billionth. Each end
-is compared with the scene's own: the largest difference of its forces, as a share of the largest force,
-and of its indentation. Equal ends do not show that the answer is right: twice as many steps may miss the
-same branch. Different ones show that the answer depends on the way.
+A scene is run as it is, in twice the steps, with other drag where an energy barrier was met
+(`evfem.solver.hold`), with the other sparse solver, and with one input changed by 1e-9. Each final state is
+compared with the scene's own: the largest difference of forces, relative to the largest force, and of
+indentation. Agreement does not prove the answer: twice as many steps may miss the same branch. Disagreement
+shows that it depends on the solution path.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from evfem.simulation.run import simulate
 #: what is compared, and by how much it may differ
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
 AGREE = 1e-3
-#: first rates of drag beside a scene's own, as shares of it, and by how much an input is changed
+#: initial rates of drag relative to the scene's own, and the relative change of an input
 HOLDS, PERTURBATION = (0.25, 4.0), 1e-9
 #: an indentation (mm) below which differences are no longer relative to it
 SMALL = 0.01
@@ -37,8 +37,8 @@ SMALL = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """A row per `way`: the forces (N/mm) and the indentation (mm) at its end, and its `difference` from the
-    scene's own end; inf where it did not get there, and `why`.
+    """A row per variant (`way`): final forces (N/mm) and indentation (mm), and their `difference` from the
+    scene's own; inf if the variant did not complete, with the reason in `why`.
     """
 
     rows: list[dict[str, Any]]
@@ -62,12 +62,12 @@ class Checked:
         )
 
     def __str__(self) -> str:
-        said = "the ends agree" if self.agrees else "the ends differ: the answer depends on the way"
+        said = "the ends agree" if self.agrees else "the ends differ: the result depends on the solution path"
         return f"{self.table()}\n{said} (allowed: {AGREE:g})"
 
 
 def check(scene: Scene | str | Path) -> Checked:
-    """Run a scene in several ways and compare the ends; takes some five times as long as the scene.
+    """Run a scene with other steps and solvers and compare final forces; about five times as long as a run.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def check(scene: Scene | str | Path) -> Checked:
 
 
 def _ended(variant: str, scene: Scene, own: Result) -> dict[str, Any]:
-    """How a way ends; its warnings are the scene's own, said once."""
+    """The row of a variant; its warnings are those of the scene and not repeated."""
     with notices.status(variant), catch_warnings():
         simplefilter("ignore", UserWarning)
         try:
@@ -117,7 +117,7 @@ def _ended(variant: str, scene: Scene, own: Result) -> dict[str, Any]:
 
 
 def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
-    """The ways but for the other sparse solver, each with its scene."""
+    """The variants of the scene, without that of the other sparse solver."""
     motions: tuple[Any, ...] = scene.motion
     yield "twice the steps", replace(scene, motion=[replace(one, steps=2 * one.steps) for one in motions])
     strategy = scene.solver.strategy
@@ -133,7 +133,7 @@ def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
 
 
 def _row(variant: str, found: Result, own: Result) -> dict[str, Any]:
-    """How a way ends beside the scene's own end."""
+    """Final forces and indentation of a variant, and their difference from the scene's own."""
     end = {name: float(getattr(found, name)[-1]) for name in (*FORCES, "indentation")}
     known = {name: float(getattr(own, name)[-1]) for name in end}
     largest = max(abs(known[name]) for name in FORCES)

@@ -39,7 +39,7 @@ class Uniform:
             raise InputError("uniform", f"{self.low:g} to {self.high:g}", "two numbers, the lower one first")
 
     def quantile(self, probability: Floats) -> Floats:
-        """The value below which lies that share (0 to 1) of the probability."""
+        """The value below which lies that fraction (0 to 1) of the probability."""
         return self.low + probability * (self.high - self.low)
 
 
@@ -68,7 +68,7 @@ class Normal:
             raise InputError("between", f"{low:g} to {high:g}", allowed)
 
     def quantile(self, probability: Floats) -> Floats:
-        """The value below which lies that share (0 to 1) of the probability."""
+        """The value below which lies that fraction (0 to 1) of the probability."""
         normal = NormalDist(self.mean, self.sd)
         low, high = self.between or (-math.inf, math.inf)
         below, inside = normal.cdf(low), normal.cdf(high) - normal.cdf(low)

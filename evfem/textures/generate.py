@@ -1,4 +1,4 @@
-r"""Textures by generators, each with three knobs: frequency, amplitude, irregularity.
+r"""Generators of synthetic textures, each with three main parameters: frequency, amplitude, irregularity.
 
 - `grating`: ridges and grooves with cosine-shaped walls, irregularity moves every groove by up to
   an eighth of its period and changes its depth by up to half.
@@ -6,8 +6,8 @@ r"""Textures by generators, each with three knobs: frequency, amplitude, irregul
   frequencies are normally distributed with the standard deviation i/2 of the frequency.
 - `self_affine`: power spectral density ``q^-(1 + 2H)`` (Jacobs, Junge and Pastewka 2017,
   doi:10.1088/2051-672X/aa51f8) from the frequency upwards; H is 1 - irregularity.
-- `spectral`: ``q^-beta`` between two frequencies, one and eight times the knob; beta is
-  3 (1 - irregularity), so that 0 is smooth and 1 is white noise.
+- `spectral`: ``q^-beta`` between one and eight times the frequency; beta is 3 (1 - irregularity), so that
+  0 is smooth and 1 is white noise.
 
 All repeat after a whole number of periods. Amplitude is that of the sine with the same root mean
 square (half the depth of a grating); phases are drawn from a seed, the same on every machine.
@@ -27,25 +27,28 @@ from evfem.surface.textures import Grating
 from evfem.tensor import Array
 from evfem.textures.texture import Texture
 
-#: who may do what with a texture that was made from numbers alone
+#: licence of synthetic textures
 FREE = "CC0-1.0"
-#: periods of the knob's frequency in what repeats, samples of the shortest wave, shortest over longest
+#: periods of `frequency` in the period of a texture, samples of the shortest wave, highest over lowest
+#: frequency of `spectral`
 PERIODS, SAMPLES, BAND = 8, 32, 8
 AMPLITUDE = "of the sine with the same root mean square"
 
 
 @dataclass(frozen=True)
 class Knobs(Checked):
-    """Common parameters of the generators; `hurst` and `beta`, None: by the irregularity."""
+    """Parameters of the generators; `hurst` and `beta`, None: set by the irregularity."""
 
     frequency: Annotated[float, between(0.05, 10.0, "1/mm"), "of the first wave, or the lowest"] = 0.5
     amplitude: Annotated[float, number("mm above 0, up to 1", Within(0.0, 1.0, True), "mm"), AMPLITUDE] = 0.02
     irregularity: Annotated[float, between(0.0, 1.0), "from regular to irregular"] = 0.0
-    second: Annotated[float, between(0.0, 2.0), "share of the second harmonic of sinusoids"] = 0.0
+    second: Annotated[
+        float, between(0.0, 2.0), "amplitude of the second harmonic of sinusoids over the first"
+    ] = 0.0
     phase: Annotated[float, between(-10.0, 10.0, "rad"), "of the second harmonic"] = 0.0
     hurst: Annotated[float | None, between(0.0, 1.0), "Hurst exponent of self_affine"] = None
     beta: Annotated[float | None, between(0.0, 6.0), "exponent of the spectrum of spectral"] = None
-    seed: Annotated[int, SEED, "of what is drawn"] = 0
+    seed: Annotated[int, SEED, "of the random numbers"] = 0
 
 
 def make(kind: str, knobs: Knobs, name: str | None = None, licence: str = FREE) -> Texture:

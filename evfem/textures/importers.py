@@ -277,7 +277,7 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
     if path.suffix.lower() == ".wav":
         whole, stored, _ = wav.read(path, "file", "a WAV", several=True)
         rate, names = float(whole), []
-        columns = list(wav.shares(stored).reshape(len(stored), -1).T)
+        columns = list(wav.normalised_samples(stored).reshape(len(stored), -1).T)
     else:
         table = read_headed(path, "file")
         if table.names[0] != "time":

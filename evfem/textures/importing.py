@@ -26,7 +26,7 @@ from evfem.errors import InputError
 from evfem.textures.texture import Texture
 
 LEVELS = ("none", "mean", "line", "parabola")
-#: largest share of gaps that is filled, and rms slope of heights that no finger slides over
+#: largest fraction of gaps that is filled, and rms slope of heights that no finger slides over
 MOST_GAPS, STEEP = 0.5, 1.0
 #: kind -> class of its files, in the order in which they are asked
 IMPORTERS: dict[str, type[Importer]] = {}

@@ -1,8 +1,7 @@
-"""Twenty reference textures, all made from the parameters in `REFERENCES`: nothing to download, and
-no licence of others.
+"""Twenty synthetic reference textures, generated from the parameters in `REFERENCES` (licence: CC0-1.0).
 
-Their names say what they are like in wavelength and roughness; they are synthesised, not measured.
-`find` takes the name of one of them or the path of a texture of your own.
+Their names suggest wavelength and roughness; none is measured. `find` takes the name of one of them or the
+path of a texture of your own.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from evfem.errors import quoted, unknown
 from evfem.textures.generate import FREE, Knobs, make
 from evfem.textures.texture import Texture, read
 
-#: name -> what it is, its generator, and its knobs
+#: name -> description, generator, and its parameters
 REFERENCES: dict[str, tuple[str, str, Knobs]] = {
     "grating-1mm": ("a fine grating", "grating", Knobs(1.0, 0.01)),
     "grating-2mm": ("a grating", "grating", Knobs(0.5, 0.02)),
@@ -25,7 +24,7 @@ REFERENCES: dict[str, tuple[str, str, Knobs]] = {
     "wave-1mm": ("a fine sine", "sinusoids", Knobs(1.0, 0.01)),
     "wave-2mm": ("a sine", "sinusoids", Knobs(0.5, 0.03)),
     "wave-4mm": ("a long sine", "sinusoids", Knobs(0.25, 0.06)),
-    "saw-2mm": ("a leaning wave", "sinusoids", Knobs(0.5, 0.025, second=0.35)),
+    "saw-2mm": ("an asymmetric, saw-like wave", "sinusoids", Knobs(0.5, 0.025, second=0.35)),
     "hump-2mm": ("a wave with narrow crests", "sinusoids", Knobs(0.5, 0.025, second=0.3, phase=-1.5708)),
     "eq-25": ("the paper's texture (25)", "sinusoids", Knobs(0.954930, 0.025, second=1.0, phase=1.5708)),
     "weave": ("like a woven cloth", "sinusoids", Knobs(0.8, 0.02, 0.1, 0.3, seed=2)),
@@ -37,7 +36,7 @@ REFERENCES: dict[str, tuple[str, str, Knobs]] = {
     "stone": ("like sawn stone", "self_affine", Knobs(0.5, 0.015, 0.2, seed=8)),
     "cork": ("like cork", "self_affine", Knobs(0.25, 0.03, 0.5, seed=9)),
 }
-#: name -> what it is, x (mm) of its rows, friction at each, and the period (mm)
+#: name -> description, x (mm) of its rows, friction at each, and the period (mm)
 FRICTIONS: dict[str, tuple[str, tuple[float, ...], tuple[float, ...], float]] = {
     "friction-steps": ("stripes of two frictions", (0.0, 1.95, 2.05, 3.95), (0.3, 0.3, 0.5, 0.5), 4.0),
     "friction-ramps": ("friction that rises and falls", (0.0, 2.0), (0.3, 0.6), 4.0),

@@ -1,4 +1,4 @@
-"""Moduli that laws share, and Ogden's law by principal stretches (`materials`: the two forms of a law)."""
+"""Moduli common to the material laws, and Ogden's law in principal stretches (`evfem.tissue.laws`)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _BELOW_HALF = Within(-1.0, 0.5, above=True, below=True)
 POISSON = number("a number above -1 and below 0.5 (0.4999 is fine)", _BELOW_HALF)
 _POSITIVE_TIME = number("a relaxation time in s, at least 0", Within(0.0), "s")
 _DENSITY = number("a positive number in t/mm3", Within(0.0, above=True), "t/mm3")
-_SHARES = "rows [share of the equilibrium shear modulus, relaxation time in s], all larger than 0"
+_SHARES = "rows [ratio to the equilibrium shear modulus, relaxation time in s], all larger than 0"
 Pairs = tuple[tuple[float, float], ...]
 
 
 def shares_of(key: str, entered: Any) -> Pairs:
-    """Rows (share, seconds) of Maxwell branches, checked."""
+    """Rows (modulus ratio, relaxation time in s) of Maxwell branches, checked."""
     positive = Within(0.0, above=True)
     try:
         rows = [tuple(row) for row in entered]
@@ -35,7 +35,7 @@ def shares_of(key: str, entered: Any) -> Pairs:
 
 
 def relaxation_of(g: Sequence[Sequence[float]]) -> Pairs:
-    """The `relaxation=` that rows (g, seconds) mean, shares g of the INSTANTANEOUS shear modulus as other
+    """The `relaxation=` that rows (g, seconds) mean, fractions g of the INSTANTANEOUS shear modulus as other
     programs have them: g / (1 - sum of all g), of the modulus at rest, which stays (1 - sum) of theirs.
 
     >>> relaxation_of(g=((0.25, 1.0), (0.25, 0.1)))
@@ -44,11 +44,11 @@ def relaxation_of(g: Sequence[Sequence[float]]) -> Pairs:
     rows = shares_of("g", g)
     rest = 1.0 - sum(ratio for ratio, _ in rows)
     if not rest > 0.0:
-        raise InputError("g", quoted(g), "shares of the instantaneous shear modulus, in all below 1")
+        raise InputError("g", quoted(g), "fractions of the instantaneous shear modulus, in all below 1")
     return tuple((ratio / rest, time) for ratio, time in rows)
 
 
-# keys that laws share
+# keys common to several laws
 Young = Annotated[float, POSITIVE, "Young's modulus"]
 Poisson = Annotated[float, POISSON, "Poisson's ratio"]
 PoissonOrNone = Annotated[float | None, POISSON, "Poisson's ratio"]
@@ -56,7 +56,7 @@ Bulk = Annotated[float | None, POSITIVE, "bulk modulus, instead of nu"]
 Relaxation = Annotated[float | None, _POSITIVE_TIME, "relaxation time; without it the finger's"]
 BRANCHES = {"allowed": _SHARES, "check": shares_of, "type": list[list[float]]}
 Branches = Annotated[Pairs | None, BRANCHES, "Maxwell branches; without it the finger's"]
-BulkRelaxes = Annotated[bool, yes_or_no(), "true: the bulk modulus relaxes with the same shares"]
+BulkRelaxes = Annotated[bool, yes_or_no(), "true: the bulk modulus relaxes with the same ratios"]
 Density = Annotated[float, _DENSITY, "with dynamics = inertial"]
 
 

@@ -168,7 +168,7 @@ class Tissue:
 
     @cached_property
     def _shear(self) -> Componentwise:
-        """mu grad v : grad w, the share of the neo-Hookean tangent that does not change."""
+        """mu grad v : grad w, the fraction of the neo-Hookean tangent that does not change."""
         weighted = (self.space.weight * self.mu[:, None])[..., None, None] * self.space.gradient
         rows = np.swapaxes(self.space.gradient, 2, 3).reshape(len(weighted), -1, weighted.shape[2])
         return Componentwise(np.matmul(np.swapaxes(weighted, 2, 3).reshape(rows.shape).swapaxes(1, 2), rows))

@@ -169,7 +169,7 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
         (lambda: MeasuredCurve("time", "depth", [0.1], [1.0]), r'data\.over: given "depth", no column'),
         (lambda: MeasuredCurve("time", "position", [0.1], [1.0, 2.0]), "given 2 values; allowed: as many"),
         (lambda: MeasuredCurve("time", "position", [], []), "given 0 values"),
-        (lambda: MeasuredCurve("time", "position", [1, 1], [1, 2]), "the same place twice"),
+        (lambda: MeasuredCurve("time", "position", [1, 1], [1, 2]), "the same point twice"),
         (
             lambda: MeasuredCurve("normal_force", "indentation", [0.1, 0.2, 0.4, 0.3], [1, 2, 3, 2]),
             r"data\.at: given indentation 0\.2, 0\.4, then 0\.3 \(number 4\); .* a curve each",

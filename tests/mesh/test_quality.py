@@ -89,7 +89,7 @@ WRONG = {
     "metres": (scaled(1e-3), "between 1 and 200 mm"),
     "micrometres": (scaled(1e3), "between 1 and 200 mm"),
     "orphan nodes": (changed_cells(lambda c, r: (c[1:], r[1:])), "1 nodes that no cell uses (node 0)"),
-    "double nodes": (raw(shifted_copy(0.0)), "nodes in the same place (nodes"),
+    "double nodes": (raw(shifted_copy(0.0)), "nodes at the same position (nodes"),
     "bow tie": (changed_cells(crossed), "cells (cell 17"),
     "tangled cell": (moved(61 * 5 + 30, [0.0, -2.0]), "cells (cell"),
     "tangled mid-node": (

@@ -130,5 +130,5 @@ def test_the_branch_is_followed_where_iterations_jump_off_it():
 def test_ways_that_end_apart_are_told():
     found = ev.check(scene(*WAYS["voltage first"], core="off"))
     assert not found.agrees
-    assert "depends on the way" in str(found)
+    assert "depends on the solution path" in str(found)
     assert {row["way"] for row in found.rows} > {"the scene", "twice the steps", "an input changed by 1e-09"}
