@@ -53,7 +53,7 @@ class FieldMesh:
     periodic: bool
 
     def located(self, x: Floats, y: Floats) -> tuple[Ints, Floats]:
-        """Cells (n,) and local coordinates (2, n) of points; above the air its end counts, else InputError."""
+        """Cells (n,) and local coordinates (2, n) of points; above the air its end counts; or InputError."""
         order = np.lexsort((self.row[self.cells[0]], self.line[self.cells[0]]))
         cells = self.cells[:, order]
         column = self.line[cells[0]]

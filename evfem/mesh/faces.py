@@ -33,7 +33,7 @@ FAR = 10.0
 Shape = Callable[[Floats], tuple[Floats, Floats]]
 
 
-def node_points(nodes: int, dim: int) -> Floats:
+def node_places(nodes: int, dim: int) -> Floats:
     """Places (m, d) of the nodes of an edge (2, 3), a triangle (3, 6), a quad (4, 9) or a cube (8, 27)."""
     return (TRIANGLE if dim == 2 and nodes in (3, 6) else NODES[dim])[:nodes]
 
