@@ -1,4 +1,4 @@
-"""Exceptions of the package; each carries what was given and what is allowed.
+"""Exceptions of the package; an input error has the key, the value given and the admissible values.
 
 The command line maps them to its exit status: `InputError` 2, `NotConverged` 3, `StorageError` 4.
 """
@@ -23,7 +23,7 @@ class EvfemError(Exception):
 
 
 class Absent(Enum):
-    """What was given where nothing was; an enumeration, so that it is the same in every process."""
+    """Marks a missing value; an enumeration, so that it is identical in every process."""
 
     ABSENT = "missing"
 
@@ -69,7 +69,7 @@ def _cut(text: str, most: int) -> str:
 
 
 class InputError(EvfemError, ValueError):
-    """Input that cannot be used: names the key, what was given and what is allowed.
+    """Invalid input: names the key, the value given and the admissible values.
 
     `given` is a value, or words (`quoted` makes a value of a text), or `ABSENT`. Of the names that are
     allowed, the one that a text may have meant comes first.

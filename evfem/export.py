@@ -26,7 +26,7 @@ from evfem.simulation.result import CELL_FIELDS, LATER_FIELDS, POINT_FIELDS, Fra
 
 #: what the files of a run may take (bytes) where the scene does not say how they are to be written
 MOST = 25_000_000
-#: of a file that is compressed, at most this share is left of the numbers; text and tags (bytes) of a file
+#: largest ratio of compressed to uncompressed arrays; text and tags (bytes) of a file
 COMPRESSED, TAGS = 0.6, 4_000
 #: steps at which neither time nor position advances are told apart by this much (s or mm)
 INSTANT = 1e-9
@@ -97,8 +97,8 @@ def ordinal(number: int) -> str:
 
 
 def frame_size(mesh: Mesh, single: bool = False, compressed: bool = False, sinks: bool = False) -> int:
-    """Bytes of the file of one frame, to within its tags; with compression at most. `sinks`: whether the
-    surface gives way.
+    """Size (bytes) of the file of one frame, except for its tags; with compression an upper bound. `sinks`:
+    whether the surface is elastic.
     """
     real = 4 if single else 8
     stresses = 4 if mesh.dim == 2 else 6
@@ -107,8 +107,8 @@ def frame_size(mesh: Mesh, single: bool = False, compressed: bool = False, sinks
     cells = len(mesh.cells) * (
         4 * mesh.cells.shape[1] + 4 + 8 + 4 + (2 + stresses) * real
     )  # offset, type, region
-    share = COMPRESSED if compressed else 1.0
-    return round(share * (nodes + cells) * 4 / 3) + TAGS  # base64
+    ratio = COMPRESSED if compressed else 1.0
+    return round(ratio * (nodes + cells) * 4 / 3) + TAGS  # base64
 
 
 def paraview(result: Result, path: str | Path, *, skin: bool = False) -> Path:

@@ -1,11 +1,11 @@
-"""Parts of your own: any object with the right method is a law, a material, a surface, a form or an observer.
+"""User-defined components: any object with the documented method is a law, material, surface or observer.
 
-Nothing is inherited and nothing registered; the object goes where the package's own goes. What is
-called optional may be there or not. Arrays have any trailing shape; a method that takes complex
-numbers gets exact derivatives (`evfem.tensor.complex_step`), another one differences.
+There is no base class and no registration; the object is passed wherever one of the package is. Methods
+called optional may be missing. Arrays have any trailing shape; a method that takes complex numbers gets exact
+derivatives (`evfem.tensor.complex_step`), any other one finite differences.
 
 =====================  ========================================  =======================================
-part                   goes to                                   needs
+component              passed to                                 needs
 =====================  ========================================  =======================================
 electrostatic law      ``Scene(law=...)``                        `ForceLaw`
 rough faces            ``Scene(roughness_gap=...)``              `RoughnessLaw`
@@ -55,14 +55,14 @@ class AdhesionLaw(Protocol):
 
 @runtime_checkable
 class RoughnessLaw(Protocol):
-    """How far rough faces stay apart where they touch.
+    """Separation of rough faces in contact.
 
     Optional: `separation_derivative` (mm/MPa) of the same argument.
     """
 
     def separation(self, pressure: Any) -> Any:
-        """Mean separation in mm at contact pressures in MPa, 0 for a node that is open. It falls with
-        the pressure, and is finite at none. Complex-safe, or it is differenced.
+        """Mean separation in mm at contact pressures in MPa (0 for an open node). It falls with the pressure
+        and is finite at zero pressure. Complex-safe, or it is differenced.
         """
 
 
@@ -89,8 +89,9 @@ class WeakForm(Protocol):
 
     def __call__(self, u: Any, v: Any, w: Any) -> Any:
         """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with gradients
-        (`evfem.tensor.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary.
-        Over a region also `u.theta` and `v.theta`, the element's volume change, and `w.law`, its material.
+        (`evfem.tensor.grad`), and the position: `w.x` (2, ...) in mm, `w.n` the outward normal on a
+        boundary. Over a region also `u.theta` and `v.theta`, the element's volume change, and `w.law`, its
+        material.
         """
 
 
@@ -114,9 +115,9 @@ class Surface(Protocol):
 
 @runtime_checkable
 class Elastic(Protocol):
-    """How a surface gives way under forces on strips of it, linear and quasi-static.
+    """Compliance of a surface for forces on strips of it, linear and quasi-static.
 
-    Optional: `compliance_slope(x, lengths)` (1, 2n, 2n), in space (2, 3n, 3n), its derivatives by the place
+    Optional: `compliance_slope(x, lengths)` (1, 2n, 2n), in space (2, 3n, 3n), its derivatives by position
     of what is displaced; otherwise it is differenced.
     """
 
@@ -145,7 +146,7 @@ class CompleteSurface(Surface, Protocol):
 
     @property
     def elastic(self) -> Any:
-        """How the surface gives way, or None."""
+        """The compliance of the surface; None if rigid."""
 
     @property
     def is_flat(self) -> bool:
@@ -175,15 +176,15 @@ class CompleteSurface(Surface, Protocol):
     def friction_slope(self, x: Any) -> Any:
         """Derivative of the friction coefficient (1/mm), jumps left out."""
 
-    def relief(self, place: Any) -> Any:
-        """Heights (...) in mm, slopes (..., d) and curvatures (..., d, d) in 1/mm at places (..., d): x, and
+    def relief(self, position: Any) -> Any:
+        """Heights (...) in mm, slopes (..., d) and curvatures (..., d, d) in 1/mm at positions (..., d): x,
         in space x and z.
         """
 
-    def friction_at(self, place: Any) -> Any:
-        """Friction coefficients (...) at places (..., d)."""
+    def friction_at(self, position: Any) -> Any:
+        """Friction coefficients (...) at positions (..., d)."""
 
-    def friction_gradient(self, place: Any) -> Any:
+    def friction_gradient(self, position: Any) -> Any:
         """Their derivatives (..., d), jumps left out."""
 
     def friction_steps(self, short: float) -> Any:
@@ -202,7 +203,7 @@ class FrictionLaw(Protocol):
 
     def bound(self, pressure: Any, mu: Any, speed: Any, age: Any) -> Any:
         """Largest shear traction in MPa, not negative, at contact pressures in MPa, coefficients of
-        the surface at the node's place, speeds of slip in mm/s (0 for a node that sticks, or where
+        the surface at the node's position, speeds of slip in mm/s (0 for a node that sticks, or where
         no time passes) and times since it touched in s. Complex-safe, or it is differenced.
         """
 

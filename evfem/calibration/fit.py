@@ -345,7 +345,7 @@ def _at_bounds(parameters: Parameters, z: Floats) -> list[str]:
 
 
 def _misfit(problem: _Problem, residuals: Floats) -> list[str]:
-    """A sentence where residuals are larger than the given sd allow (chi-square test at 1 %)."""
+    """A warning if residuals are larger than the measured sd allow (chi-square test at 1 %)."""
     from scipy.stats import chi2
 
     if not problem.provenance["sd"]:
@@ -354,4 +354,6 @@ def _misfit(problem: _Problem, residuals: Floats) -> list[str]:
     ratio = float(residuals @ residuals) / freedom
     if ratio * freedom <= chi2.ppf(0.99, freedom):
         return []
-    return [f"residuals are {math.sqrt(ratio):.2g} times the given sd: the scene does not explain the data"]
+    return [
+        f"residuals are {math.sqrt(ratio):.2g} times the measured sd: the scene does not explain the data"
+    ]

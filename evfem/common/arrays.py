@@ -158,8 +158,8 @@ def mkl() -> Any:
     """MKL, or None without pypardiso; that loads scipy.sparse, and is asked only if `mkl` is no package."""
     if find_spec("pypardiso") is None:
         return None
-    if MKL not in os.environ and (place := mkl_library()) is not None:
-        os.environ[MKL] = place
+    if MKL not in os.environ and (path := mkl_library()) is not None:
+        os.environ[MKL] = path
     if MKL in os.environ:
         library = ctypes.CDLL(os.environ[MKL])
     else:
@@ -180,4 +180,4 @@ def mkl_library() -> str | None:
     except metadata.PackageNotFoundError:
         return None
     found = (str(file.locate()) for file in files if "mkl_rt" in file.name and ".lib" not in file.name)
-    return next((place for place in found if Path(place).exists()), None)
+    return next((path for path in found if Path(path).exists()), None)

@@ -96,7 +96,7 @@ ROUNDING = 1e-12
 FIELD_ROUNDING = 2e-10
 #: pivots of the bone below this fraction belong to a body without a hold
 SMALLEST_PIVOT = 1e-10
-#: a bone that moved less than this fraction of its next way has not moved along it [turns]
+#: a bone displacement below this fraction of the next one counts as none along it [turns]
 TURNED = 1e-9
 #: how far inside the rougher side a node is pinned to a jump of friction, mm: far above rounding, far below
 #: any mesh [jumps]
@@ -112,16 +112,15 @@ SHORT_RAMP = 0.5
 CHANGES = 3
 #: penalties take tributary lengths as at least this fraction of a node distance
 SHORTEST_LENGTH = 1e-3
-#: where the error of the path decides, the first part of a scene, as a fraction of its first step [press]
+#: adaptive steps (step doubling): length of the first substep of a scene over its first step [press]
 PATH_FIRST = 1.0 / 16.0
-#: a part is at most so many times as long as the one before where the error of the path decides, or as much
-#: shorter; that part times
+#: adaptive steps: largest ratio of the lengths of successive substeps, up or down
 PATH_CHANGE = 4.0
-#: this is tried
+#: adaptive steps: safety factor of the next length
 PATH_SAFETY = 0.9
-#: a part of a step, so small and still failing, is the place of the first release [snaps]
+#: a substep that fails at this fraction of the step is followed by the first release [snaps]
 RELEASED = 1.0 / 32.0
-#: after a release the next one within the same step comes at a part so many times as long [texture]
+#: after a release the next one within the same step follows a failed substep longer by this factor [texture]
 COARSER = 4.0
 #: factor by which the rate of drag of a released body falls, and rises [snaps]
 DRAG_CHANGE = 2.0
@@ -140,7 +139,7 @@ IMPERFECTION = 1e-5
 #: steps of a release, failed ones included, before it is given up [snaps]
 DRAG_STEPS = 400
 #: a step that failed where what takes stability away grows so fast, relative to what holds it, has no
-#: equilibrium near; the second, where the body gave way in its iterations [snaps]
+#: equilibrium near; the second, where the body softened in its iterations [snaps]
 CRITICAL, SOFTENED = 0.9, 0.5
 #: so many of the largest out-of-balance forces are named in a failure
 NAMED = 3

@@ -39,10 +39,10 @@ IN = {"time": "s", "voltage": "V", **dict.fromkeys(("x", "y", "z", "height", "po
 
 
 def piecewise_linear(position: Floats, value: Floats, x: Any) -> Floats:
-    """Value at x of rows (place, value): linear between them, constant beyond the ends; place must
+    """Value at x of rows (position, value): linear between them, constant beyond the ends; position must
     not decrease.
 
-    At a repeated place the later row holds from that place on. Only the real part of x counts.
+    At a repeated position the later row holds from there on. Only the real part of x counts.
 
     >>> piecewise_linear(np.array([0.0, 1.0, 1.0]), np.array([0.0, 4.0, 9.0]), [-1.0, 0.5, 1.0, 2.0]).tolist()
     [0.0, 2.0, 9.0, 9.0]
@@ -69,7 +69,7 @@ def piecewise_slope(position: Floats, value: Floats, x: Any) -> Floats:
 
 
 def numbers(key: str, entry: Any, allowed: str, axes: int = 1) -> Floats:
-    """`given` as a new array of finite floats with that many axes, or `InputError`.
+    """`entry` as a new array of finite floats with that many axes, or `InputError`.
 
     >>> numbers("x", [1, float("nan")], "lengths")
     Traceback (most recent call last):

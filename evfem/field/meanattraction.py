@@ -7,7 +7,7 @@ Under a sine of angular frequency w every layer has the complex permittivity
 .. math:: \nabla\cdot(\varepsilon^* \nabla\varphi) = 0, \qquad
           \varphi = U \text{ on the electrode}, \quad \varphi = 0 \text{ in living tissue}.
 
-No energy has the mean force as its derivative: what is lost in a cycle depends on the way. The
+The mean force is not the derivative of an energy: the loss in a cycle depends on the path. The
 force is the stress in the gap's medium around the pad, whose mean over the cycle is (J. R. Melcher,
 Continuum Electromechanics, MIT Press 1981, chapters 2 and 3)
 
@@ -65,8 +65,8 @@ def mean_pull(
     phi = cells.potential(strips, floating)
     found = cells.squares(phi)
     gap, skin = cells.layer == 1, cells.layer > 1
-    share = np.where(gap, cells.share, np.where(skin, 1.0, 0.0))
-    along = cells.by_x(found, share, np.where(gap, cells.rise, 0.0))
-    along[[0, -1]] = cells.by_x(found, np.ones_like(share), np.zeros_like(cells.rise))[[0, -1]]
+    fraction = np.where(gap, cells.share, np.where(skin, 1.0, 0.0))
+    along = cells.by_x(found, fraction, np.where(gap, cells.rise, 0.0))
+    along[[0, -1]] = cells.by_x(found, np.ones_like(fraction), np.zeros_like(cells.rise))[[0, -1]]
     up = cells.by_level(found)[2:].sum(axis=0)
     return MeanPull(0.5 * eps_0 * np.stack([along, up], axis=1), phi, cells.heights())

@@ -22,7 +22,7 @@ from evfem.common.views import short
 from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
 from evfem.finger.fingerpad import FingerPad
-from evfem.finger.fingerprint import PATTERNS, HeightMap, FingerprintPattern
+from evfem.finger.fingerprint import PATTERNS, FingerprintPattern, HeightMap
 from evfem.finger.layers import NAIL, thickness_of
 from evfem.finger.outline import Ridges
 from evfem.finger.sizes import (

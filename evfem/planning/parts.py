@@ -1,8 +1,9 @@
 """Checks of user-defined components of a scene before it is solved.
 
-`check_parts` evaluates user-defined laws once, near rest and at three gaps, a surface at a dozen positions
-of the path and laws of contact at three pressures, and raises InputError for unusable ones. Components of
-the package are not evaluated. `evaluated` and its like describe in a sentence what is wrong with a function.
+`check_components` evaluates user-defined laws once, near rest and at three gaps, a surface at a dozen
+positions of the path and laws of contact at three pressures, and raises InputError for unusable ones.
+Components of the package are not evaluated. `evaluated` and its like describe in a sentence what is wrong
+with a function.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ MOMENTS = 100
 HIGHEST_VOLTAGE = 5e5
 
 
-def check_parts(scene: Scene, dim: int) -> None:
+def check_components(scene: Scene, dim: int) -> None:
     """Raise InputError for a user-defined component that no run in `dim` dimensions can use, or an absurd
     voltage.
     """

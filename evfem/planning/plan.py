@@ -21,7 +21,7 @@ from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
 from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
-from evfem.planning.parts import check_parts
+from evfem.planning.parts import check_components
 from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
 from evfem.planning.resolution import oscillating, steps_line, too_fast, unresolved
 from evfem.planning.timescales import left_out, time_scales
@@ -154,7 +154,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     if not scene.motion:
         names = ", ".join(cls.__name__ for cls in MOTIONS.values())
         raise InputError("motion", ABSENT, f"at least one of {names}")
-    check_parts(scene, mesh.dim)
+    check_components(scene, mesh.dim)
     check_space(scene, mesh)
     if scene.output.probes:
         from evfem.scene.probes import points_of

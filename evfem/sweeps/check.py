@@ -94,15 +94,15 @@ def check(scene: Scene | str | Path) -> Checked:
     >>> ev.check(scene).agrees
     True
     """
-    given = scene if isinstance(scene, Scene) else load(scene)
+    checked = scene if isinstance(scene, Scene) else load(scene)
     with notices.status("the scene"):
-        own = simulate(given)
+        own = simulate(checked)
     rows = [
         _row("the scene", own, own),
-        *(_ended(variant, other, own) for variant, other in _others(given, own)),
+        *(_ended(variant, other, own) for variant, other in _others(checked, own)),
     ]
     with other_solver() as name:
-        rows += [_ended(f"sparse solver {name}", given, own)] if name else []
+        rows += [_ended(f"sparse solver {name}", checked, own)] if name else []
     return Checked(rows)
 
 

@@ -96,9 +96,9 @@ class SweepFolder:
             other = "another sweep"
             if version not in (None, evfem.__version__):
                 other = f"evfem {version!r}, not of {evfem.__version__!r}"
-            given = f"{self.path}, with {others} points of {other}"
+            problem = f"{self.path}, with {others} points of {other}"
             allowed = "another folder, --resume to keep them, --overwrite to remove them"
-            raise InputError("--out", given, allowed)
+            raise InputError("--out", problem, allowed)
 
     def _last(self) -> tuple[str | None, str | None]:
         """Fingerprint of the sweep that was started last in the folder, and the version that did."""
@@ -142,8 +142,8 @@ def _refuse_no_points(files: Sequence[Path]) -> None:
     for path in files:
         with path.open("rb") as file:
             if file.read(len(POINT_BEGINS)) != POINT_BEGINS:
-                given = f"{path.parent}, where {path.name} was not written by a sweep"
-                raise InputError("--out", given, "another folder, for files of others are never touched")
+                problem = f"{path.parent}, where {path.name} was not written by a sweep"
+                raise InputError("--out", problem, "another folder, for files of others are never touched")
 
 
 def _sound(answer: Answer) -> bool:

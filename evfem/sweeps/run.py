@@ -57,7 +57,7 @@ def sweep(
     workers
         Number of processes; None: one per core, 1: this process only.
     scheduler
-        Address of a Dask cluster in place of the processes; "local" starts one. The numbers are the
+        Address of a Dask cluster instead of processes; "local" starts one. The numbers are the
         same.
     progress
         Show a progress bar.
@@ -115,7 +115,7 @@ def sweep(
 
 
 class _Run:
-    """A sweep on its way: its points, the key of each, and the answers so far."""
+    """A running sweep: its points, the key of each, and the answers so far."""
 
     def __init__(self, plan: Sweep, folder: SweepFolder | None, progress: bool) -> None:
         self.plan, self.folder, self.began = plan, folder, clock.perf_counter()

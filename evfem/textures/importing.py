@@ -97,14 +97,14 @@ class Heights(Importer):
             inside = (x - x[0] >= start) & (x - x[0] <= stop)
             notes.append(f"Cut to {start:g} ... {min(stop, float(np.ptp(x))):g} mm.")
         if inside.sum() < 4:
-            given = f"{inside.sum()} of {x.size} points"
-            raise InputError("start, stop", given, "at least four points in what is left")
+            problem = f"{inside.sum()} of {x.size} points"
+            raise InputError("start, stop", problem, "at least four points between them")
         x, height = x[inside] - x[inside][0], height[inside]
         known = np.isfinite(height)
         if missing := int((~known).sum()):
             if missing > MOST_GAPS * x.size:
-                given = f"{missing} of {x.size} missing"
-                raise InputError("heights", given, f"at most {MOST_GAPS:.0%} of them")
+                problem = f"{missing} of {x.size} missing"
+                raise InputError("heights", problem, f"at most {MOST_GAPS:.0%} of them")
             notes.append(f"{missing} of {x.size} values missing, filled by straight lines.")
             height = np.interp(x, x[known], height[known])
         if self.level != "none":

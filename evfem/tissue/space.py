@@ -261,8 +261,8 @@ def check_orientation(mesh: Mesh, determinant: Floats) -> None:
     bad = np.flatnonzero((determinant <= 0.0).any(axis=1))
     if bad.size:
         centre = ", ".join(f"{x:.3g}" for x in mesh.points[mesh.cells[bad[0]]].mean(axis=0))
-        given = f"{bad.size} tangled cells, the first near ({centre})"
-        raise InputError("finger.mesh", given, "cells with a positive Jacobian at every quadrature point")
+        problem = f"{bad.size} tangled cells, the first near ({centre})"
+        raise InputError("finger.mesh", problem, "cells with a positive Jacobian at every quadrature point")
 
 
 def _constant(weight: Floats) -> tuple[Floats, Floats]:
@@ -273,8 +273,8 @@ def _constant(weight: Floats) -> tuple[Floats, Floats]:
 
 def _mean(gradient: Floats, weight: Floats) -> Floats:
     """Means (E, 1, n, dim) of gradients (E, Q, n, dim) over the cells."""
-    share = weight / weight.sum(axis=1, keepdims=True)
-    return np.einsum("eq,eqnd->end", share, gradient)[:, None]
+    mean = weight / weight.sum(axis=1, keepdims=True)
+    return np.einsum("eq,eqnd->end", mean, gradient)[:, None]
 
 
 def _linear(x: Floats, weight: Floats) -> Floats:

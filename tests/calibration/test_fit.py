@@ -183,7 +183,7 @@ def test_a_parameter_at_its_bound_is_said(path):
 def test_residuals_beyond_their_sd_are_said(path):
     found = ev.fit(path, measured(path, noise=0.1, sd=1e-5)[0], {E: BOUNDS[E]}, workers=1)
     (warning,) = found.warnings
-    assert warning.endswith("times the given sd: the scene does not explain the data")
+    assert warning.endswith("times the measured sd: the scene does not explain the data")
     assert f"residuals are {found.rms * np.sqrt(3 / 2):.2g} times" in warning
     assert "rms residual" in repr(found).splitlines()[0]
     assert repr(found).splitlines()[0].endswith(" sd")

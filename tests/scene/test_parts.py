@@ -11,7 +11,7 @@ from tools.refusals import refuses
 
 import evfem as ev
 from evfem.errors import InputError
-from evfem.planning.parts import check_parts
+from evfem.planning.parts import check_components
 from evfem.planning.plan import plan
 from evfem.tensor import ddot, det, grad, inv, positive_part, transpose
 
@@ -361,7 +361,7 @@ LISTED, ONE = surface(lambda x: list(waves(x))), surface(waves, friction_coeffic
 
 @pytest.mark.parametrize("surface", [surface(waves), KINKS, ONE, LISTED, SINGLE, GRATING])
 def test_a_surface_without_mistakes_is_taken(surface):
-    check_parts(on(surface), 2)
+    check_components(on(surface), 2)
 
 
 def test_a_surface_is_tried_along_the_way_alone():
@@ -372,12 +372,12 @@ def test_a_surface_is_tried_along_the_way_alone():
         assert np.real(x).max() <= 3.0
         return waves(x)
 
-    check_parts(on(surface(short)), 2)
-    refuses("AssertionError", check_parts, replace(on(surface(short)), motion=[PRESS, SLIDE, SLIDE]), 2)
+    check_components(on(surface(short)), 2)
+    refuses("AssertionError", check_components, replace(on(surface(short)), motion=[PRESS, SLIDE, SLIDE]), 2)
 
 
 def test_a_law_of_friction_behind_a_decorator_is_taken():
-    check_parts(
+    check_components(
         scene(None, *FAST, friction_law=friction(lambda pressure, *args, **kwargs: 0.001 + 0.0 * pressure)), 2
     )
 

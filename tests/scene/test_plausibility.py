@@ -13,7 +13,7 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.cli import main
-from evfem.planning.parts import check_parts
+from evfem.planning.parts import check_components
 from evfem.planning.plan import plan, scene_mesh
 from evfem.planning.plausibility import implausible, locking
 from evfem.scene import file as scenefile
@@ -212,7 +212,7 @@ def test_a_slide_that_never_touches_is_doubted(motion, more, said):
 
 def sentences(shipped):
     mesh, _ = scene_mesh(shipped)
-    check_parts(shipped, mesh.dim)
+    check_components(shipped, mesh.dim)
     moduli = {name: split(law, mesh.dim).shear_modulus for name, law in shipped.finger.materials.items()}
     return implausible(shipped, mesh, moduli)
 
