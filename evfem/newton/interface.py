@@ -124,7 +124,7 @@ class Interface:
             surface.friction_steps(constants.SHORT_RAMP * self.length), self.points[:, ::2]
         )
         self._least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
-        self.bed = bed_of(surface, pad, self.length, self._least)
+        self.bed: Any = bed_of(surface, pad, self.length, self._least)
         self.bounds = ProportionalFriction()
         self.duration = 0.0
         self.neighbourhood = constants.NEIGHBOURS * self.length

@@ -123,7 +123,7 @@ def make_model(scene: Scene) -> Model:
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     closing = needed.closing
-    parts = [make_attraction(closing, pad, surface)] if needed.has("electricity") else []
+    parts: list[Any] = [make_attraction(closing, pad, surface)] if needed.has("electricity") else []
     if scene.adhesion is not None:
         parts.append(make_adhesion(closing, pad, surface))
     own = [copy(room) for room in scene.rooms]  # what it keeps of a step is that of one model

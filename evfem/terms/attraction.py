@@ -30,7 +30,7 @@ from evfem.electrostatics.roughness import separation_derivative
 from evfem.surface.pad import Pad
 from evfem.surface.skin import Skin
 from evfem.tensor import derivative, mul, positive_part
-from evfem.terms.charging import NO_CHARGES, Charged, Charging, NoCharges
+from evfem.terms.charging import NO_CHARGES, Charged
 from evfem.terms.traction import TOUCHING, Entries, PadPath, PadState, PadTraction, Reading
 from evfem.tissue.forms import deformation_gradient, form
 
@@ -64,7 +64,7 @@ class Attraction(PadTraction):
     direction: str = "vertical"
     air_layer: bool = True
     roughness: Any = None
-    charging: Charging | NoCharges = NO_CHARGES
+    charging: Any = NO_CHARGES
     #: of its columns in the history
     name: str = field(default=ELECTROSTATIC, kw_only=True)
     #: whether it acts without a voltage; its law then takes the strength `ON` in the place of one

@@ -6,7 +6,7 @@ They are known under a law that is the pressure of the field in layers, Strong a
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class ChargeBooks(Room):
     """The balance of the source of a voltage, whose `attraction` it is, on the pad."""
 
     attraction: Any
-    columns: ClassVar[tuple[Column, ...]] = (
+    columns = (
         Column("source_work", "N", "of the voltage's source, where it is resolved in time"),
         Column("leakage_dissipation", "N", "by charge that crosses skin, gap, insulator"),
         Column("stretch_work", "N", "of the field on the pad's length, where it is resolved in time"),

@@ -144,7 +144,9 @@ class Bed(Rigid):
     """
 
     yields = True
-    columns = (Column("surface_sink", "mm", "largest displacement of an elastic surface into it"),)
+    columns: tuple[Column, ...] = (
+        Column("surface_sink", "mm", "largest displacement of an elastic surface into it"),
+    )
 
     def __init__(self, surface: Any, pad: Pad | Skin, spacing: float, least: float) -> None:
         self.surface, self.elastic, self.pad, self.least = surface, surface.elastic, pad, least
@@ -219,10 +221,10 @@ class Bed(Rigid):
     def sunk(
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
     ) -> dict[str, Floats]:
-        below, (c, gives, fraction), force = self.under(position, state), update, force()
-        given = below.given(force)
+        below, (c, gives, fraction), push = self.under(position, state), update, force()
+        given = below.given(push)
         given[c] = self.displacement(state)[c] + fraction * np.asarray(gives).reshape(c.size, -1)
-        return {DISPLACEMENT: given, GRADIENT: below.change(force)}
+        return {DISPLACEMENT: given, GRADIENT: below.change(push)}
 
     def energies(self, part: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
         energy, sunk = self._own.energy, [self.displacement(state) for state in part]
