@@ -50,7 +50,7 @@ ROOMS = {
     "terms": (
         {"numpy", "scipy"},
         "traction tractions charging attraction chargebooks fullfield drivenfield foundation slipping "
-        "friction hand",
+        "friction hand sources",
     ),
     "newton": (
         {"numpy", "scipy"},

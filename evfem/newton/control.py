@@ -122,9 +122,18 @@ class VoltageStep:
 class VoltageControl:
     """Control of the voltage: `voltage` (V), prescribed or the largest; `free`: it is an unknown."""
 
-    follows: Any = False
     free: Any = False
+    #: whether it is found from what the pad does
+    sought = False
     voltage: float = 0.0
+
+    def raised(self, end: VoltageControl, fraction: float) -> VoltageControl:
+        """The control at a fraction of a first step whose `end` has the full voltage."""
+        return self
+
+    def held(self, state: State) -> VoltageControl:
+        """The control while a released body goes its way."""
+        return self
 
     def begin(self, old: State) -> None:
         """A step from `old` begins."""
@@ -172,13 +181,16 @@ class GivenVoltage(VoltageControl):
     def guess(self, voltage: float) -> float:
         return self.voltage
 
+    def raised(self, end: VoltageControl, fraction: float) -> VoltageControl:
+        return end if end.free else GivenVoltage(fraction * end.voltage)
+
 
 class ConstrainedVoltage(VoltageControl):
     """The voltage is an unknown, and a quantity of the state has a prescribed value: one more equation,
     linear in voltage and displacements, regular where a prescribed voltage has no equilibrium.
     """
 
-    free = True
+    free = sought = True
 
     def read(self, attraction: Any, pad: PadState) -> tuple[Reading, float]:
         """The quantity and its prescribed value."""
@@ -239,6 +251,9 @@ class GivenGap(ConstrainedVoltage):
 
     gap: float
 
+    def raised(self, end: VoltageControl, fraction: float) -> VoltageControl:
+        return end
+
     def read(self, attraction: Any, pad: PadState) -> tuple[Reading, float]:
         return smallest_gap(pad), self.gap
 
@@ -266,7 +281,10 @@ class FollowFriction(VoltageControl):
     voltage: float
     direction: tuple[float, ...] = (1.0,)
     _mode: str = field(default=UNKNOWN, repr=False, compare=False)
-    follows = True
+    sought = True
+
+    def held(self, state: State) -> VoltageControl:
+        return GivenVoltage(state.voltage)
 
     @property
     def free(self) -> bool:
@@ -321,15 +339,15 @@ def sticks(state: State) -> bool:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds, in three
-    dimensions z (mm); x and z are those of the `drive`, behind a hand others than the bone's.
+    """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds, in space
+    (z,) (mm); x and z are those of the `drive`, behind a hand others than the bone's.
     """
 
     x: float
     height: HeightControl
     voltage: VoltageControl
     duration: float = 0.0
-    z: float | None = None
+    z: tuple[float, ...] = ()
     drive: Drive = RIGID
 
     @classmethod
@@ -339,7 +357,7 @@ class Target:
         >>> Target.held(np.array([0.5, -0.1, 2.0]), 100.0).bone(np.zeros(3)).tolist()
         [0.5, -0.1, 2.0]
         """
-        z = float(bone[2]) if len(bone) == 3 else None
+        z = tuple(bone[2:].tolist())
         return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage), z=z)
 
     def bone(self, present: Floats) -> Floats:
@@ -352,14 +370,14 @@ class Target:
     @property
     def free(self) -> Any:
         """Components of the bone's translation that are unknowns, (dim,) bool."""
-        free = np.full(2 if self.z is None else 3, self.drive.free)
+        free = np.full(2 + len(self.z), self.drive.free)
         free[1] = self.height.free
         return free
 
     @property
     def place(self) -> Floats:
         """x[, z] of the drive (d,)."""
-        return np.array([self.x] if self.z is None else [self.x, self.z])
+        return np.array([self.x, *self.z])
 
     def increment(self, present: Floats) -> Floats:
         """Expected displacement of the bone from its `present` translation (dim,)."""
@@ -373,8 +391,7 @@ class Target:
 
     def at_once(self, bone: Floats) -> Target:
         """The target while no time passes: the bone (dim,) stays where it is along the display."""
-        z = None if self.z is None else float(bone[2])
-        return replace(self, x=float(bone[0]), z=z, duration=0.0, drive=RIGID)
+        return replace(self, x=float(bone[0]), z=tuple(bone[2:].tolist()), duration=0.0, drive=RIGID)
 
     def begun(self, old: State) -> Target:
         """The target of a step that starts from `old`."""

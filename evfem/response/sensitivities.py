@@ -54,7 +54,7 @@ from evfem.contact.signorini import OPEN
 from evfem.electrostatics.laws import traction_derivative
 from evfem.errors import InputError, quoted, readable, unknown
 from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
-from evfem.newton.control import FollowFriction, Target, Unsupported
+from evfem.newton.control import Target, Unsupported
 from evfem.newton.state import State
 from evfem.planning.plan import scene_mesh
 from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
@@ -212,7 +212,7 @@ class _Differentiated:
 
 def _refused(target: Target, new: State) -> str:
     """Why a part is not differentiated, or nothing."""
-    if target.voltage.follows or target.voltage.free or isinstance(target.voltage, FollowFriction):
+    if target.voltage.sought:
         return SOUGHT
     return LIFTED if isinstance(target.height, Unsupported) and bool((new.status != OPEN).any()) else ""
 

@@ -337,7 +337,8 @@ class Loop:
 
 def _exactly(path: Path, asked: Asked) -> Path:
     """The path with its end where it was asked for, to the last digit."""
-    places = {"x": asked.position, "z": asked.position_z}
+    across = None if asked.position_z is None else (asked.position_z,)
+    places: dict[str, Any] = {"x": asked.position, "z": across}
     ends: dict[str, Any] = {name: place for name, place in places.items() if place is not None}
 
     def exact(done: float, fraction: float) -> Target:

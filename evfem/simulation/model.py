@@ -12,9 +12,7 @@ import numpy as np
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.rooms import BodyTerm, Column, Room
-from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.roughness import roughness_of
-from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.newton.equilibrium import Equilibrium
@@ -36,6 +34,7 @@ from evfem.terms.chargebooks import ChargeBooks
 from evfem.terms.charging import NO_CHARGES, Charging, NoCharges
 from evfem.terms.friction import LawFriction
 from evfem.terms.hand import Drive, drive_of
+from evfem.terms.sources import source_of
 from evfem.terms.traction import PadTraction
 from evfem.terms.tractions import sum_of
 from evfem.tissue.body import Body
@@ -203,8 +202,7 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
 def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attraction:
     """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
     scene, mesh, electrics = closing.scene, closing.mesh, closing.electrics
-    if isinstance(scene.voltage, FollowForce):
-        _check_quadratic(scene)
+    source_of(scene.voltage).check(scene)
     law, layers = electrics.attraction
     rough = roughness_of(scene.roughness_gap)
     charging: Charging | NoCharges = NO_CHARGES
@@ -237,14 +235,3 @@ def make_adhesion(closing: Closing, pad: Any, surface: Any) -> Attraction:
     return Attraction(
         closing.adhesion, None, *common, roughness=rough, name="adhesive", always=True, label="adhesion"
     )
-
-
-def _check_quadratic(scene: Scene) -> None:
-    """The squared voltage can be an unknown only of laws that are proportional to it."""
-    layers = Layers.of(scene.electrics.lossless(scene.electrics.insulator))
-    assert scene.law is not None
-    once, twice = (scene.law.traction(0.1, voltage, layers) for voltage in (1.0, 2.0))
-    if not np.isclose(twice, 4.0 * once, rtol=1e-9):
-        raise InputError(
-            "electrostatics.law", scene.law, "a law proportional to the squared voltage, to follow a force"
-        )

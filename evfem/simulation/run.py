@@ -19,25 +19,20 @@ from evfem.common import notices
 from evfem.common.arrays import Floats, blas_limits
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
-from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import NotConverged, Unresolved
+from evfem.newton import control
 from evfem.newton.control import (
-    FollowFriction,
     Force,
     GivenGap,
-    GivenVoltage,
     HeightControl,
     Indentation,
-    KeptCharge,
     Target,
     Unsupported,
     VoltageControl,
 )
 from evfem.newton.state import State, StepFailed
 from evfem.planning.resolution import allowed_error
-from evfem.protocols import Observer, TimeSignal
+from evfem.protocols import Observer
 from evfem.scene.file import scene_at
 from evfem.scene.motion import Course
 from evfem.scene.scene import Scene
@@ -59,6 +54,7 @@ from evfem.simulation.model import Model, linearised, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.simulation.works import SubstepWork
 from evfem.solver.stepping import Path, Stepper
+from evfem.terms.sources import Moment, source_of
 from evfem.tissue.kernels.blocks import loops
 
 if TYPE_CHECKING:
@@ -69,8 +65,6 @@ Start = dict[str, float]
 START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
 #: the first part of a run under a voltage that can close nodes one by one: it is raised in such parts
 FIRST_PART = 0.125
-#: coulombs per metre of depth in a nanocoulomb per millimetre
-NANO = 1e-6
 
 
 @dataclass(frozen=True)
@@ -167,12 +161,13 @@ class Run:
 
     def __init__(self, scene: Scene, resume: Saved | None) -> None:
         self.scene = scene
+        self.source = source_of(scene.electrics.voltage)
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
         allowed, body = allowed_error(scene), self.model.body
         equilibrium = self.model.equilibrium
         self.stepper = Stepper(equilibrium, body=body, allowed=allowed, rise=partial(climb, self.model))
-        if self.model.closing.trapped and self.voltage_at(0.0, 0.0) != 0.0:
+        if self.model.closing.trapped and self.source.start != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
         self.probes: Probes | None = None
@@ -184,7 +179,7 @@ class Run:
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
-        self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
+        self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.source.start)
         self.state = self.state.remembering(self.model.drive.memory(self.state.bone.size))
         if resume is not None:
             self._restore(resume)
@@ -199,29 +194,6 @@ class Run:
         )
         run.rows, run.frames, run.probed = self.rows.copy(), self.frames.copy(), self.probed.copy()
         return run
-
-    @property
-    def voltage(self) -> Any:
-        """The voltage that the run follows."""
-        return self.scene.electrics.voltage
-
-    def voltage_at(self, position: float, time: float) -> float:
-        """The scene's own voltage when the bone is at `position` (mm), at `time` (s)."""
-        voltage = self.voltage
-        if isinstance(voltage, FollowForce):
-            return 0.0
-        if isinstance(voltage, VoltageProfile):
-            return float(voltage(position))
-        return float(voltage(time)) if isinstance(voltage, TimeSignal) else float(voltage)
-
-    def _kept(self, time: float, begin: float) -> KeptCharge | None:
-        """Control of the electrode's charge at `time` (s) in a step from `begin`, or None."""
-        voltage = self.voltage
-        if isinstance(voltage, ChargeControl):
-            return KeptCharge(NANO * voltage.charge_at(time) / eps_0)
-        if isinstance(voltage, OpenCircuit) and begin >= voltage.after:
-            return KeptCharge()
-        return None
 
     # -- from motions to targets
 
@@ -250,18 +222,15 @@ class Run:
 
         The voltage acts in full from the first step on; only a first step in parts raises it on the way.
         """
-        now, (begun, reached), voltage = self.time, shares, self.voltage
-        given = isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
-        raised = not self.rows and not given
+        now, (begun, reached) = self.time, shares
+        raised = not (self.rows or self.source.prescribed(seconds))
 
         def target(done: float, fraction: float) -> Target:
             time, share = now + fraction * seconds, begun + fraction * (reached - begun)
             at = self._target(course, start, reached if fraction == 1.0 else share, time)
-            if (kept := self._kept(time, now)) is not None:
-                at = replace(at, voltage=kept)
-            elif raised and fraction < 1.0 and not at.voltage.follows:
+            if raised and fraction < 1.0:
                 end = self._target(course, start, reached, now + seconds).voltage
-                at = replace(at, voltage=end if end.free else GivenVoltage(fraction * end.voltage))
+                at = replace(at, voltage=at.voltage.raised(end, fraction))
             return replace(at, duration=(fraction - done) * seconds)
 
         return target
@@ -270,7 +239,7 @@ class Run:
         """Where a motion starts: bone, indentation, force, voltage, and whether the finger is loose."""
         start = dict.fromkeys(START, 0.0)
         if rows_before == 0:
-            return start | {"voltage": self.voltage_at(0.0, 0.0)}
+            return start | {"voltage": self.source.start}
         row = self.rows[rows_before - 1]
         start |= {name: row[name] for name in START if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
@@ -298,33 +267,21 @@ class Run:
 
         position = towards("position", start["position"] + course.travel[0])
         position_z = towards("position_z", start["position_z"] + course.travel[1])
-        voltage = towards("voltage", course.voltage)
-        if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
-            voltage = self.voltage_at(position, time)
         bone = self.model.bone(position, towards("indentation", course.indentation), position_z)
+        way = course.direction[: bone.size - 1]
+        along = float(np.dot((position, position_z)[: bone.size - 1], way))
+        slides, ramp = bool(course.distance), towards("voltage", course.voltage)
+        moment = Moment(ramp, time, self.time, position, along, way, slides)
         height: HeightControl = Indentation(float(bone[1]))
         if course.force is not None:
             height = Force(towards("applied_force", course.force))
         elif course.hold == "force":
-            loose = self._loose(course, start, voltage, time)
+            loose = bool(start["loose"]) and course.gap is None and not self.source.pulls(moment)
             height = Unsupported(float(bone[1])) if loose else Force(start["applied_force"])
-        drive: VoltageControl = GivenVoltage(voltage)
+        voltage: VoltageControl = self.source.control(moment, control)
         if course.gap is not None:
-            drive = GivenGap(towards("min_gap", course.gap))
-        along = position_z if bone.size == 3 else None
-        if isinstance(self.voltage, FollowForce) and course.distance:
-            way = course.direction if bone.size == 3 else (1.0,)
-            wish = float(self.voltage(position * way[0] + sum(way[1:]) * position_z))
-            drive = FollowFriction(wish, self.voltage.largest_voltage, way)
-        return Target(position, height, drive, z=along, drive=self.model.drive)
-
-    def _loose(self, course: Course, start: Start, voltage: float, time: float) -> bool:
-        """Whether a held force is that of any height: the finger is loose, not attracted at `time` (s)."""
-        if isinstance(self.voltage, FollowForce) or course.gap is not None:
-            return False
-        if isinstance(self.voltage, ChargeControl):
-            voltage = self.voltage.charge_at(time)
-        return bool(start["loose"]) and voltage == 0.0
+            voltage = GivenGap(towards("min_gap", course.gap))
+        return Target(position, height, voltage, z=tuple(bone[2:].tolist()), drive=self.model.drive)
 
     # -- one requested step
 

@@ -49,7 +49,7 @@ from evfem.common.constants import (
     DRAG_STEPS,
     IMPERFECTION,
 )
-from evfem.newton.control import GivenVoltage, Target
+from evfem.newton.control import Target
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.tissue.body import Body
 
@@ -111,8 +111,7 @@ class Relaxation:
 
     def _held(self, state: State, target: Target) -> Target:
         """The loads of the steps with drag: a snap takes no time, but where hand or charge have their own."""
-        if target.voltage.follows:
-            target = replace(target, voltage=GivenVoltage(state.voltage))
+        target = replace(target, voltage=target.voltage.held(state))
         return target if self.charged or target.drive.timed else replace(target, duration=0.0)
 
     def _dragged(self, state: State, target: Target, begin: Floats, drag: DragSchedule) -> State | None:

@@ -252,7 +252,7 @@ class Stepper:
         attraction = self.equilibrium.attraction
         if self.rise is None or not attraction.acts(new.voltage):
             return False
-        return not (target.voltage.free or target.voltage.follows) and self.rise(old, new, target) > CLIMB
+        return not target.voltage.sought and self.rise(old, new, target) > CLIMB
 
     def _found(self, state: State, target: Target, start: State | None = None) -> State:
         return self.equilibrium.step(state, target, start)

@@ -1,0 +1,165 @@
+"""Sources of the voltage: what each prescribes at a moment of a run, and the control that it makes.
+
+===================  ===========================  ==========================================
+source               prescribes                   control (`evfem.newton.control`)
+===================  ===========================  ==========================================
+`Source`             the voltage of ramps         `GivenVoltage`
+`ProfileSource`      voltage over the position    `GivenVoltage`
+`SignalSource`       voltage over time            `GivenVoltage`
+`ChargeSource`       charge of the electrode      `KeptCharge`
+`OpenSource`         voltage, then nothing        `GivenVoltage`, then `KeptCharge`
+`ForceSource`        friction force in slides     `FollowFriction`, elsewhere `GivenVoltage`
+===================  ===========================  ==========================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.electrostatics.laws import Layers, eps_0
+from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
+from evfem.errors import InputError
+from evfem.protocols import TimeSignal
+
+#: coulombs per metre of depth in a nanocoulomb per millimetre
+NANO = 1e-6
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Of a target: the `voltage` (V) of ramps, the `time` (s) there and at the `begin` of the step, x of the
+    drive, its position (mm) `along` the `direction` in which it moves, and whether it `slides`.
+    """
+
+    voltage: float
+    time: float = 0.0
+    begin: float = 0.0
+    x: float = 0.0
+    along: float = 0.0
+    direction: tuple[float, ...] = (1.0,)
+    slides: bool = False
+
+
+@dataclass(frozen=True)
+class Source:
+    """A constant voltage, or that of ramps; `signal` is the scene's."""
+
+    signal: Any = 0.0
+
+    def at(self, moment: Moment) -> float:
+        """The voltage (V) at a moment."""
+        return moment.voltage
+
+    @property
+    def start(self) -> float:
+        """The voltage (V) at the beginning of a run."""
+        return self.at(Moment(float(self.signal)))
+
+    def control(self, moment: Moment, controls: Any) -> Any:
+        """The control of a target, made of those of `evfem.newton.control`."""
+        return controls.GivenVoltage(self.at(moment))
+
+    def prescribed(self, seconds: float) -> bool:
+        """Whether the voltage has a course of its own in a step of so many seconds."""
+        return False
+
+    def pulls(self, moment: Moment) -> bool:
+        """Whether anything may attract an unloaded finger at a moment."""
+        return self.at(moment) != 0.0
+
+    def check(self, scene: Any) -> None:
+        """Raise InputError for a scene whose law it cannot have."""
+
+
+class ProfileSource(Source):
+    """A voltage over the position of the bone."""
+
+    def at(self, moment: Moment) -> float:
+        return float(self.signal(moment.x))
+
+    @property
+    def start(self) -> float:
+        return self.at(Moment(0.0))
+
+    def prescribed(self, seconds: float) -> bool:
+        return True
+
+
+class SignalSource(Source):
+    """A voltage over time."""
+
+    def at(self, moment: Moment) -> float:
+        return float(self.signal(moment.time))
+
+    @property
+    def start(self) -> float:
+        return self.at(Moment(0.0))
+
+    def prescribed(self, seconds: float) -> bool:
+        return seconds > 0.0
+
+
+class ChargeSource(SignalSource):
+    """A charge of the electrode over time."""
+
+    def control(self, moment: Moment, controls: Any) -> Any:
+        return controls.KeptCharge(NANO * self.signal.charge_at(moment.time) / eps_0)
+
+    def pulls(self, moment: Moment) -> bool:
+        return bool(self.signal.charge_at(moment.time) != 0.0)
+
+
+class OpenSource(SignalSource):
+    """A voltage until the electrode is disconnected, then its charge."""
+
+    def control(self, moment: Moment, controls: Any) -> Any:
+        kept = moment.begin >= self.signal.after
+        return controls.KeptCharge() if kept else super().control(moment, controls)
+
+
+class ForceSource(Source):
+    """Whatever voltage makes the friction force follow a target in slides; elsewhere it stays."""
+
+    @property
+    def start(self) -> float:
+        return 0.0
+
+    def control(self, moment: Moment, controls: Any) -> Any:
+        if not moment.slides:
+            return super().control(moment, controls)
+        target, largest = float(self.signal(moment.along)), self.signal.largest_voltage
+        return controls.FollowFriction(target, largest, moment.direction)
+
+    def pulls(self, moment: Moment) -> bool:
+        return True
+
+    def check(self, scene: Any) -> None:
+        """The squared voltage can be an unknown only of laws that are proportional to it."""
+        layers = Layers.of(scene.electrics.lossless(scene.electrics.insulator))
+        once, twice = (scene.law.traction(0.1, voltage, layers) for voltage in (1.0, 2.0))
+        if not np.isclose(twice, 4.0 * once, rtol=1e-9):
+            allowed = "a law proportional to the squared voltage, to follow a force"
+            raise InputError("electrostatics.law", scene.law, allowed)
+
+
+#: kinds of a scene's voltage, the particular ones first
+KINDS = (
+    (FollowForce, ForceSource),
+    (ChargeControl, ChargeSource),
+    (OpenCircuit, OpenSource),
+    (VoltageProfile, ProfileSource),
+    (TimeSignal, SignalSource),
+)
+
+
+def source_of(voltage: Any) -> Source:
+    """The source of a scene's voltage.
+
+    >>> source_of(100.0).start, source_of(VoltageProfile([0.0], [50.0])).start
+    (100.0, 50.0)
+    """
+    return next((source(voltage) for kind, source in KINDS if isinstance(voltage, kind)), Source(voltage))
