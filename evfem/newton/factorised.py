@@ -30,11 +30,10 @@ from evfem.newton.anderson import Anderson
 from evfem.newton.control import Target, VoltageProblem
 from evfem.newton.interface import Interface
 from evfem.newton.linearisation import Linearisation
-from evfem.newton.pressure import Pressure
+from evfem.newton.pressure import Unbalanced, make_pressure
 from evfem.newton.state import (
     Balance,
     Limits,
-    MixedBalance,
     Reusable,
     State,
     StepFailed,
@@ -64,7 +63,8 @@ class FactorisedBody:
         self.attraction = attraction
         self.size, self.pad = body.space.size, interface.pad
         self.linearisation = Linearisation(body, interface, self.attraction, limits)
-        self.pressure, self.record = Pressure(body.tissue, self.linearisation), self.linearisation.record
+        self.pressure = make_pressure(body.tissue, self.linearisation)
+        self.record = self.linearisation.record
         longest = constants.LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self.travel = Travel(interface, longest)
         self._anderson = Anderson()
@@ -113,20 +113,11 @@ class FactorisedBody:
         nodal[self.pad.nodes] -= (pad := attraction + self.interface.contact_forces(state))
         forces = self.body.reduce(nodal)
         state = replace(state, attraction=attraction, reaction=forces[self.body.bone])
-        residual, mixed = self._largest(state, target, forces), self._with_pressure(state, target, forces)
-        place = self.interface.positions(state.u)
-        residual = max(residual, self.interface.bed.missed(place, state, pad))
+        largest = lambda other: self._largest(state, target, other)  # noqa: E731
+        missed = self.interface.bed.missed(self.interface.positions(state.u), state, pad)
+        residual = max(largest(forces), missed)
+        mixed = self.pressure.balance(state, Unbalanced(forces, residual, largest, self.body.reduce))
         return state, Balance(forces, residual, attraction, mixed)
-
-    def _with_pressure(self, state: State, target: Target, forces: Floats) -> MixedBalance | None:
-        """The balance with the pressure as an unknown, where it is one; `forces` (n,) without."""
-        if not self.pressure.active:
-            return None
-        misfit = self.pressure.misfit(state)
-        further = self.pressure.further_forces(state, misfit)
-        if further is not None:
-            forces = forces + self.body.reduce(further)
-        return MixedBalance(forces, self._largest(state, target, forces), misfit)
 
     def _largest(self, state: State, target: Target, forces: Floats) -> float:
         """The largest of the out-of-balance forces (n,), relative to the reaction in them."""
@@ -172,22 +163,22 @@ class FactorisedBody:
         if self._scaled_down:  # a part of the way to where it leads: no image of the map that is mixed
             self._anderson.reset()
             return after
-        return self._mixed(state, after, target)
+        return self._combined(state, after, target)
 
-    def _mixed(self, state: State, after: State, target: Target) -> State:
+    def _combined(self, state: State, after: State, target: Target) -> State:
         """Anderson's combination of `after` with iterates before; `after` if too far. Prescribed: exact."""
-        mixed = self._anderson.next_iterate(state, after)
-        if mixed is not after:
-            travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
+        combined = self._anderson.next_iterate(state, after)
+        if combined is not after:
+            travel = abs(float(combined.bone[1] - state.bone[1])) if target.height.free else 0.0
             # it may turn cells inside out, or take away a bone that nothing holds
             if (
                 travel > self.travel.longest
-                or not self.body.tissue.smallest_J(mixed.u) > constants.SMALLEST_J
+                or not self.body.tissue.smallest_J(combined.u) > constants.SMALLEST_J
             ):
                 self._anderson.reset()
                 return after
-        voltage = mixed.voltage if target.voltage.free else after.voltage
-        return replace(mixed, bone=np.where(target.free, mixed.bone, after.bone), voltage=voltage)
+        voltage = combined.voltage if target.voltage.free else after.voltage
+        return replace(combined, bone=np.where(target.free, combined.bone, after.bone), voltage=voltage)
 
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
         """The next iterate; nodes that sank in become candidates, many of them start the way again."""
@@ -218,8 +209,6 @@ class FactorisedBody:
         delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))
         update = Update(found, bone, delta, driven.change, self._largest_fraction(state.u, delta))
         moved = self._moved(state, target, update)
-        if balance.mixed is None:
-            return moved
         return moved.remembering(self.pressure.after(state, balance.mixed.misfit, delta, update.fraction))
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:

@@ -16,6 +16,7 @@ Methods Appl. Mech. Eng. 313 (2017) 986-1005 (stresses of displacement elements 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,7 @@ from evfem.common.arrays import Floats
 from evfem.common.rooms import Room
 from evfem.errors import InputError
 from evfem.newton.linearisation import Linearisation
-from evfem.newton.state import State
+from evfem.newton.state import MixedBalance, State
 from evfem.tissue.weakform import Tissue
 
 #: the pressure between two substeps
@@ -33,55 +34,78 @@ NO_PRESSURE: Floats = np.zeros((0, 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Pressure(Room):
-    """The pressure as an unknown beside u, if nearly incompressible: `pressure` of an iterate's memory."""
+class Unbalanced:
+    """Out-of-balance forces (n,) and their residual; what the residual of other forces is, and how nodal
+    forces (N, dim) are reduced.
+    """
+
+    forces: Floats
+    residual: float
+    largest: Callable[[Floats], float]
+    reduce: Callable[[Floats], Floats]
+
+
+class NoPressure(Room):
+    """Compressible tissue, whose pressure is no unknown. Answers what `Pressure` does."""
+
+    shape: tuple[int, ...] = NO_PRESSURE.shape
+
+    def check(self, q: Floats) -> None:
+        """Refuse a pressure from a checkpoint that has not one value for each point."""
+        if q.shape != self.shape:
+            given = "no usable factor_memory.pressure"
+            raise InputError("checkpoint", given, f"numbers of the shape {self.shape}")
+
+    def first(self, u: Floats) -> dict[str, Floats]:
+        """The first iterate of a step from an equilibrium at u (N, 2)."""
+        return {}
+
+    def balance(self, state: State, found: Unbalanced) -> MixedBalance:
+        """The balance that the iterations follow."""
+        return MixedBalance(found.forces, found.residual, NO_PRESSURE)
+
+    def after(self, state: State, misfit: Floats, du: Floats, fraction: float) -> dict[str, Floats]:
+        """The next iterate, after the fraction of an increment du (N, 2) of the displacements."""
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Pressure(NoPressure):
+    """The pressure as an unknown beside u: `pressure` of an iterate's memory."""
 
     tissue: Tissue
     linearisation: Linearisation
 
     @property
-    def active(self) -> bool:
-        """Whether the pressure is an unknown."""
-        return self.tissue.nearly_incompressible
-
-    def check(self, q: Floats) -> None:
-        """Refuse a pressure from a checkpoint that has not one value for each point."""
-        expected = self.tissue.space.weight.shape if self.active else NO_PRESSURE.shape
-        if q.shape != expected:
-            raise InputError(
-                "checkpoint", "no usable factor_memory.pressure", f"numbers of the shape {expected}"
-            )
+    def shape(self) -> tuple[int, ...]:  # type: ignore[override]
+        return self.tissue.space.weight.shape
 
     def memory(self, state: Any) -> dict[str, Floats]:
-        return {"pressure": NO_PRESSURE} if self.active else {}
+        return {"pressure": NO_PRESSURE}
 
     def accept(self, old: Any, new: Any) -> dict[str, Floats]:
-        return self.memory(new)
-
-    def of(self, state: State) -> Floats | None:
-        """The iterate's, None where it is no unknown."""
-        found = state.memory.get("pressure", NO_PRESSURE)
-        return found if found.size else None
+        return {"pressure": NO_PRESSURE}
 
     def first(self, u: Floats) -> dict[str, Floats]:
-        """The first iterate of a step from an equilibrium at u (N, 2)."""
-        return {"pressure": self.tissue.pressure(u)} if self.active else {}
+        return {"pressure": self.tissue.pressure(u)}
 
-    def misfit(self, state: State) -> Floats:
-        """Residual of the pressure, q(u) - q."""
-        return self.tissue.pressure(state.u) - state.memory["pressure"]
-
-    def further_forces(self, state: State, misfit: Floats) -> Floats | None:
-        """Forces (N, 2) of the misfit along the older tangent's volume less the present one's, or None."""
-        at = self.linearisation.reusable
-        if not self.active or at is None or at.state.u is state.u:
-            return None
-        return self.tissue.pressure_forces(at.state.u, misfit) - self.tissue.pressure_forces(state.u, misfit)
+    def balance(self, state: State, found: Unbalanced) -> MixedBalance:
+        """With the misfit q(u) - q, and the forces as the older tangent takes them."""
+        misfit = self.tissue.pressure(state.u) - state.memory["pressure"]
+        forces, at = found.forces, self.linearisation.reusable
+        if at is not None and at.state.u is not state.u:
+            before, now = (self.tissue.pressure_forces(u, misfit) for u in (at.state.u, state.u))
+            forces = forces + found.reduce(before - now)
+        return MixedBalance(forces, found.largest(forces), misfit)
 
     def after(self, state: State, misfit: Floats, du: Floats, fraction: float) -> dict[str, Floats]:
-        """The next iterate, after the fraction of an increment du (N, 2) of the displacements."""
         at = self.linearisation.reusable
-        if not self.active or at is None:
+        if at is None:
             return {}
         change: Floats = misfit + self.tissue.pressure_change(at.state.u, du)
         return {"pressure": state.memory["pressure"] + fraction * change}
+
+
+def make_pressure(tissue: Tissue, linearisation: Linearisation) -> NoPressure:
+    """The pressure of tissue, an unknown where it is nearly incompressible."""
+    return Pressure(tissue, linearisation) if tissue.nearly_incompressible else NoPressure()

@@ -151,22 +151,22 @@ class MixedBalance:
 @dataclass(frozen=True)
 class Balance:
     """Residual of an iterate: out-of-balance forces (n,) in N/mm, the largest relative to the reaction, the
-    attraction (P, 2), and the mixed problem's residual if it is solved.
+    attraction (P, 2), and the mixed problem's residual, the same where it is not solved.
     """
 
     forces: Floats
     residual: float
     attraction: Floats
-    mixed: MixedBalance | None = None
+    mixed: MixedBalance
 
     @property
     def remaining(self) -> float:
         """The residual of the unknowns that are iterated."""
-        return self.residual if self.mixed is None else self.mixed.residual
+        return self.mixed.residual
 
     def of_tangent(self, here: bool) -> Floats:
         """The forces (n,) that a tangent made at this iterate (`here`), or elsewhere, has to remove."""
-        return self.forces if here or self.mixed is None else self.mixed.forces
+        return self.forces if here else self.mixed.forces
 
 
 def findings(body: Body, state: State, balance: Balance) -> str:

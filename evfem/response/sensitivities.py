@@ -62,7 +62,7 @@ from evfem.response.parameters import Parameter, parameter_of, scene_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
-from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL
+from evfem.simulation.history import COLUMNS, EVERY, ROOM_COLUMNS
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
@@ -162,7 +162,7 @@ class _Differentiated:
 
     def _span(self) -> tuple[float, float]:
         """Which part of the step was accepted: the last one tried, or its halves one after the other."""
-        spans = self._calls[-1:] if self.run.stepper.allowed is None else self._calls[-2:]
+        spans = self.run.stepper.scheme.spans(self._calls)
         self._taken += 1
         return spans[self._taken - 1]
 
@@ -380,7 +380,7 @@ def sensitivities(
         raise InputError("parameters", "no keys", "dotted keys of the scene, and ShapeChange objects")
     known = {one.name: one for one in given}
     with blas_limits(), notices.shown(progress):
-        base = COLUMNS if scene_mesh(scene)[0].dim == 2 else (*COLUMNS, *SPATIAL)
+        base = EVERY[scene_mesh(scene)[0].dim]
         wanted = _columns((*base, *ROOM_COLUMNS), columns)
         run = _Differentiated(scene, known, any(map(is_work, wanted)))
         there = run.run.model.column_names

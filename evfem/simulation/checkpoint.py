@@ -27,6 +27,7 @@ from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
+from evfem.terms.tractions import pull_off_of
 
 CHECKPOINT_FORMAT = "evfem-checkpoint-9"
 ANOTHER = "a run of another scene"
@@ -74,8 +75,8 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
         "sums": np.array(list(ledger.sums.values())),
         "internal_forces": end.forces,
         "given_forces": end.given,
-        "pull": np.array(ledger.pull),
-        "came_off": ledger.came_off,
+        "pull": np.array(ledger.pull_off.pull),
+        "came_off": ledger.pull_off.came_off,
         "energies": np.array([end.stored, end.springs, end.kinetic]),
     }
 
@@ -84,7 +85,9 @@ def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
     """The ledger from the arrays of a checkpoint."""
     sums = dict(zip(Ledger(model).sums, arrays["sums"].tolist(), strict=True))
     end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
-    return Ledger(model, sums, end, float(arrays["pull"]), came_off=arrays["came_off"])
+    pull_off = pull_off_of(model.attraction)
+    pull_off.pull, pull_off.came_off = float(arrays["pull"]), arrays["came_off"]
+    return Ledger(model, sums, end, pull_off)
 
 
 def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:

@@ -35,6 +35,8 @@ STRAINED = 0.1
 BORNE = 1.0
 
 
+#: unit of forces by dimension
+FORCES = {2: "N/mm", 3: "N"}
 #: penetration that is told, relative to the size of the finger
 SUNK = 1e-6
 
@@ -65,7 +67,7 @@ def through(model: Model, sunk: Floats) -> Iterator[str]:
 
 def off(found: Floats, dim: int) -> Iterator[str]:
     """Where adhesion let go of the finger: rows (k, 2) of the step and the pull."""
-    unit = "N" if dim == 3 else "N/mm"
+    unit = FORCES[dim]
     for step, pull in found:
         yield f"in step {int(step)} the finger came off: adhesion held it up to a pull of {pull:.3g} {unit}"
 

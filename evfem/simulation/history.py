@@ -147,6 +147,8 @@ ABOUT: Mapping[str, Mapping[str, Any]] = {
     **ROOM_COLUMNS,
     **SPATIAL,
 }
+#: columns of every finger, by its dimension
+EVERY: Mapping[int, tuple[str, ...]] = {2: COLUMNS, 3: (*COLUMNS, *SPATIAL)}
 #: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
 UNITS, WHOLE_UNITS, MEANINGS = (
     {name: str(ABOUT[name][told]) for name in (*COLUMNS, *ROOM_COLUMNS)}

@@ -18,6 +18,7 @@ from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import Books, SubstepWork
 from evfem.surface.pad import Pad, reach, surface_state
 from evfem.terms.attraction import ELECTROSTATIC
+from evfem.terms.tractions import NoPullOff, PullOff
 
 
 def unloaded(state: State) -> State:
@@ -26,23 +27,16 @@ def unloaded(state: State) -> State:
     return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
 
 
-#: a finger that does not touch has come off when adhesion holds less than this share of the last pull
-LEFT = 0.01
-
-
 @dataclass
 class Ledger:
-    """Running sums of a run by the history's columns, and the books at the end of its last part; the `pull`
-    (N/mm) on a touching finger that adhesion holds, that at which it `let_go` in this step, 0 if it did not,
-    and rows (k, 2) of the steps and pulls at which it `came_off`.
+    """Running sums of a run by the history's columns, the energies at the end of its last substep, and the
+    watch for a finger that comes off.
     """
 
     model: Model
     sums: dict[str, float] = field(default_factory=dict)
     end: Books | None = None
-    pull: float = 0.0
-    let_go: float = 0.0
-    came_off: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    pull_off: PullOff = field(default_factory=NoPullOff)
 
     def __post_init__(self) -> None:
         names = (one.name for one in self.model.columns if one.name.endswith(ADDED))
@@ -60,17 +54,9 @@ class Ledger:
         return works["snap_dissipation"] > 0.0
 
     def _watch(self, new: State) -> None:
-        """Remember the pull at which a finger that adhesion holds comes off: that of the last equilibrium."""
-        if self.model.scene.adhesion is None:
-            return
-        equilibrium = self.model.equilibrium
-        always = [part.name for part in self.model.attraction.parts if part.always]
-        pulls = equilibrium.pulls(new)
-        holds = -float(sum(pulls[name][:, 1].sum() for name in always))
-        if not new.touching.any() and self.pull > 0.0 and holds < LEFT * self.pull:
-            self.let_go, self.pull = self.pull, 0.0
-        elif self.model.body.drag_rate == 0.0:
-            self.pull = max(0.0, float(new.reaction[1])) if new.touching.any() or holds > 0.0 else 0.0
+        """Remember the pull at which a finger that tractions hold comes off."""
+        pulls, always = self.model.equilibrium.pulls(new), self.model.held_by
+        self.pull_off.watch(new, {name: pulls[name] for name in always}, self.model.body.drag_rate == 0.0)
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
         """Present sums and energy balance."""
@@ -84,8 +70,7 @@ class Ledger:
         """The forces, widths and energies of a state; costs are added by the caller."""
         model, end = self.model, self.end
         assert end is not None
-        if self.let_go:
-            self.came_off, self.let_go = np.vstack([self.came_off, [step, self.let_go]]), 0.0
+        self.pull_off.ends(step)
         position = model.equilibrium.interface.places(state)
         contact = model.equilibrium.interface.contact_forces(state).sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
@@ -131,11 +116,9 @@ class Ledger:
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
         """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""
-        if self.model.mesh.dim == 2:
-            return [0], np.ones(1)
-        courses = self.model.scene.courses[: motion_index + 1]
+        courses, axes = self.model.scene.courses[: motion_index + 1], self.model.mesh.dim - 1
         slides = [course.direction for course in courses if course.distance]
-        return [0, 2], np.array(slides[-1] if slides else (1.0, 0.0))
+        return [0, 2][:axes], np.array((slides[-1] if slides else (1.0, 0.0))[:axes])
 
 
 def _components(name: str, force: Floats) -> dict[str, float]:

@@ -29,7 +29,7 @@ from evfem.scene.motion import FORCE, INDENTATION, VOLTAGE, Course, Motion
 from evfem.scene.scene import SIGNALS, Scene
 from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import Request, Run, Start
-from evfem.solver.stepping import Path
+from evfem.solver.path import Path
 
 #: forces that have an error; those below `FAINT` of the largest have none of their own
 FORCES, FAINT = ("normal_force", "tangential_force", "electrostatic_force"), 1e-3

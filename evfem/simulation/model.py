@@ -24,7 +24,7 @@ from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
-from evfem.simulation.history import COLUMNS, SPATIAL
+from evfem.simulation.history import EVERY
 from evfem.solver.linearbody import LinearBody
 from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
@@ -70,6 +70,11 @@ class Model:
         return (*self.body.rooms, *self.drive.books, *self.equilibrium.interface.rooms)
 
     @cached_property
+    def held_by(self) -> tuple[str, ...]:
+        """Names of the tractions that hold a finger without a voltage."""
+        return tuple(part.name for part in self.attraction.parts if part.always)
+
+    @cached_property
     def shown(self) -> tuple[Room, ...]:
         """Rooms with columns of their own."""
         charges = (ChargeBooks(one) for one in self.attraction.parts[:1] if one.flows)
@@ -79,8 +84,7 @@ class Model:
     @property
     def column_names(self) -> tuple[str, ...]:
         """All columns of its history."""
-        base = COLUMNS if self.mesh.dim == 2 else (*COLUMNS, *SPATIAL)
-        return (*base, *(one.name for one in self.columns))
+        return (*EVERY[self.mesh.dim], *(one.name for one in self.columns))
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
@@ -102,8 +106,7 @@ class Model:
 
     def bone(self, position: float, indentation: float, position_z: float = 0.0) -> Floats:
         """Translation of the bone (dim,) in mm."""
-        along = [position_z] if self.mesh.dim == 3 else []
-        return np.array([position, -(indentation + self.first_gap), *along])
+        return np.array([position, -(indentation + self.first_gap), position_z][: self.mesh.dim])
 
     def indentation(self, bone: Floats) -> float:
         """Bone travel beyond first touch in mm, negative when hovering."""

@@ -27,6 +27,7 @@ from evfem.simulation.history import (
     ABOUT,
     COLUMNS,
     DRIFT,
+    EVERY,
     KINDS,
     NEEDED,
     ROOM_COLUMNS,
@@ -50,6 +51,8 @@ from evfem.simulation.history import (
 )
 from evfem.simulation.provenance import provenance as provenance
 
+#: components of a stress, in the plane without those across it
+STRESSES = ("xx", "yy", "zz", "xy", "yz", "xz")
 #: key of the provenance of a total, with its depth (mm)
 WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
@@ -95,6 +98,13 @@ DIMENSIONS = {"N": "node", "E": "cell", "dim": "axis", "stresses": "stress"}
 POINT_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape == ("N",))
 #: fields of nodes that older versions did not write: they were 0
 LATER_FIELDS = ("surface_sink",)
+
+
+def stresses(dim: int) -> int:
+    """Number of components of a stress that may differ from 0."""
+    return 2 * dim
+
+
 CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
 
@@ -136,7 +146,7 @@ class Result(History, FurtherColumns):
                 odd = sorted(set(row) ^ set(COLUMNS))
                 raise InputError("row", f"missing or unknown {odd}", ", ".join(COLUMNS))
         columns = {name: column_of(name, [row[name] for row in rows]) for name in COLUMNS}
-        further = SPATIAL if mesh.dim == 3 else ()
+        further = EVERY[mesh.dim][len(COLUMNS) :]
         in_space = {name: column_of(name, [row[name] for row in rows]) for name in further}
         names = [name for name in (rows[0] if rows else ()) if name not in (*COLUMNS, *SPATIAL)]
         in_rooms = {name: column_of(name, [row[name] for row in rows]) for name in names}
@@ -330,7 +340,7 @@ class Result(History, FurtherColumns):
             "step": self.step,
             "frame": [frame.step for frame in self.frames],
             "axis": list(axes),
-            "stress": ["xx", "yy", "zz", "xy", "yz", "xz"][: 4 if self.mesh.dim == 2 else 6],
+            "stress": list(STRESSES[: stresses(self.mesh.dim)]),
             "region": ("cell", self.mesh.region, {"names": json.dumps(dict(self.mesh.region_names))}),
             **{axis: ("node", place, {"units": "mm"}) for axis, place in places},
         }
@@ -367,7 +377,7 @@ def load(path: str | Path) -> Result:
     try:
         columns = {name: _column_of(arrays, name) for name in COLUMNS}
         mesh = mesh_of(arrays)
-        in_space = {name: _column_of(arrays, name) for name in (SPATIAL if mesh.dim == 3 else ())}
+        in_space = {name: _column_of(arrays, name) for name in EVERY[mesh.dim][len(COLUMNS) :]}
         there = [key.removeprefix("history/") for key in arrays if key.startswith("history/")]
         names = [name for name in there if name not in (*COLUMNS, *SPATIAL)]
         in_rooms = {name: _column_of(arrays, name) for name in names}
@@ -422,7 +432,7 @@ def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:
     none = {f"frames/{name}": np.zeros_like(arrays["frames/gap"]) for name in LATER_FIELDS}
     columns = {spec.name: (none | dict(arrays))[f"frames/{spec.name}"] for spec in fields(Frame)}
     size: dict[str, int] = {"N": len(mesh.points), "E": len(mesh.cells), "dim": mesh.dim}
-    size["stresses"] = 6 if mesh.dim == 3 else 4
+    size["stresses"] = stresses(mesh.dim)
     count = len(columns["step"])
     for name, shape in _SHAPES.items():
         expected = (count, *(size[n] for n in shape))

@@ -53,8 +53,10 @@ from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, linearised, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.simulation.works import SubstepWork
-from evfem.solver.stepping import Path, Stepper
+from evfem.solver.path import Halves, Path, Whole
+from evfem.solver.stepping import Stepper
 from evfem.terms.sources import Moment, source_of
+from evfem.terms.tractions import pull_off_of
 from evfem.tissue.kernels.blocks import loops
 
 if TYPE_CHECKING:
@@ -163,10 +165,11 @@ class Run:
         self.scene = scene
         self.source = source_of(scene.electrics.voltage)
         self.model: Model = make_model(scene)
-        self.ledger = Ledger(self.model)
+        self.ledger = Ledger(self.model, pull_off=pull_off_of(self.model.attraction))
         allowed, body = allowed_error(scene), self.model.body
+        scheme = Whole() if allowed is None else Halves(allowed)
         equilibrium = self.model.equilibrium
-        self.stepper = Stepper(equilibrium, body=body, allowed=allowed, rise=partial(climb, self.model))
+        self.stepper = Stepper(equilibrium, body=body, scheme=scheme, rise=partial(climb, self.model))
         if self.model.closing.trapped and self.source.start != 0.0:
             self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
@@ -188,7 +191,9 @@ class Run:
         """Another run that goes on from here with tissue that is linear about the present state."""
         run = copy(self)
         run.model = model = linearised(self.model, self.state)
-        run.ledger = replace(self.ledger, model=model, sums=self.ledger.sums.copy())
+        ledger = self.ledger
+        own = {"sums": ledger.sums.copy(), "pull_off": replace(ledger.pull_off)}
+        run.ledger = replace(ledger, model=model, **own)
         run.stepper = replace(
             self.stepper, equilibrium=model.equilibrium, body=model.body, rise=partial(climb, model)
         )
@@ -336,13 +341,12 @@ class Run:
             "candidates": int(self.model.equilibrium.body.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",
+            **self.stepper.scheme.told,
         }
-        if self.stepper.allowed is not None:
-            solver["path_error"] = self.stepper.path_error
         about = provenance(self.scene, self.model.mesh, solver)
         if (core := self.model.closing.core) is not None:
             about["core"] = core.told
-        said = (*through(self.model, self.sunk), *off(self.ledger.came_off, self.model.mesh.dim))
+        said = (*through(self.model, self.sunk), *off(self.ledger.pull_off.came_off, self.model.mesh.dim))
         if further := [one for one in self.model.columns if one.name not in ROOM_COLUMNS]:
             about["columns"] = [[one.name, one.unit, one.meaning] for one in further]
         about["warnings"] = [*said, *doubtful(self.scene, self.rows)]

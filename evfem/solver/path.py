@@ -16,10 +16,93 @@ Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, 2nd
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
-from evfem.common.constants import PATH_CHANGE, PATH_SAFETY, SMALLEST_FORCE
+from evfem.common.constants import PATH_CHANGE, PATH_FIRST, PATH_SAFETY, SMALLEST_FORCE
+from evfem.newton.control import Target
 from evfem.newton.state import State
+from evfem.newton.strategy import Strategy
+
+#: from the fraction of a step that is done (0 to 1) and the next one to the target there
+Path = Callable[[float, float], Target]
+#: the equilibrium at a target from a state, its iterations begun at another one
+Solve = Callable[[State, Target, State | None], State]
+#: substeps that were solved one after the other: their targets and ends
+Solved = list[tuple[Target, State]]
+
+
+class Whole:
+    """A substep is one equilibrium; its length follows how many iterations that takes."""
+
+    def first(self, substep: float) -> float:
+        """The first substep of a run, as a fraction of its step."""
+        return substep
+
+    def solve(
+        self, solve: Solve, state: State, path: Path, span: tuple[float, float]
+    ) -> tuple[Solved, float]:
+        """The equilibria of a substep over the `span` of a step, and their error."""
+        target = path(*span)
+        return [(target, solve(state, target, None))], 0.0
+
+    def refused(self, error: float, length: float, strategy: Strategy) -> float | None:
+        """The length to be tried in the place of one with this error, None if that is accepted."""
+        return None
+
+    def following(self, substep: float, length: float, error: float, easy: bool, strategy: Strategy) -> float:
+        """The next substep after one of this length and error; `easy`: it took few iterations."""
+        return min(1.0, strategy.growth * substep) if easy else substep
+
+    def spans(self, calls: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        """Spans of the equilibria accepted last, of those that were asked for."""
+        return calls[-1:]
+
+    @property
+    def told(self) -> dict[str, float]:
+        """What the provenance of a run says of it."""
+        return {}
+
+
+@dataclass
+class Halves(Whole):
+    """A substep is two halves, that differ from one whole by at most `allowed`; `largest`: accepted so far."""
+
+    allowed: float
+    largest: float = 0.0
+
+    def first(self, substep: float) -> float:
+        return PATH_FIRST
+
+    def solve(
+        self, solve: Solve, state: State, path: Path, span: tuple[float, float]
+    ) -> tuple[Solved, float]:
+        whole, middle = path(*span), 0.5 * (span[0] + span[1])
+        first, second = path(span[0], middle), path(middle, span[1])
+        half = solve(state, first, None)
+        end = solve(half, second, None)
+        return [(first, half), (second, end)], relative_difference(solve(state, whole, end), end)
+
+    def refused(self, error: float, length: float, strategy: Strategy) -> float | None:
+        if error <= self.allowed or length <= strategy.smallest_part + 1e-12:
+            self.largest = max(self.largest, error)
+            return None
+        return max(length_factor(error / self.allowed) * length, strategy.smallest_part)
+
+    def following(self, substep: float, length: float, error: float, easy: bool, strategy: Strategy) -> float:
+        """One that was shortened to hit the end of a step does not shorten the next."""
+        cut = length < (1.0 - 1e-9) * substep
+        wanted = max(length_factor(error / self.allowed) * length, strategy.smallest_part)
+        return min(1.0, max(wanted, substep) if cut else wanted)
+
+    def spans(self, calls: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        return calls[-2:]
+
+    @property
+    def told(self) -> dict[str, float]:
+        return {"path_error": self.largest}
 
 
 def relative_difference(once: State, twice: State) -> float:

@@ -13,15 +13,15 @@ ends close enough to them; its length follows that error (`evfem.solver.path`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from evfem.common.constants import COARSER, PATH_FIRST, RELEASED
+from evfem.common.constants import COARSER, RELEASED
 from evfem.newton.control import Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.solver.hold import held
-from evfem.solver.path import length_factor, relative_difference
+from evfem.solver.path import Path, Whole
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.tissue.body import Body
 
@@ -29,10 +29,6 @@ from evfem.tissue.body import Body
 BARRIER = "the equilibrium that was found lies behind a barrier, which the finger would not climb"
 #: a climb that is rounding, as a share of the stored energy
 CLIMB = 1e-3
-#: from the fraction of a step that is done (0 to 1) and the next one to the target there
-Path = Callable[[float, float], Target]
-#: steps that were solved one after the other: their targets and ends
-Solved = list[tuple[Target, State]]
 
 
 class Accounts(Protocol):
@@ -63,8 +59,8 @@ class Release:
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step, that worked
     last. `body` is what is released where no equilibrium is near; without it such a step fails. `snaps`:
-    parts in which stability was lost without a release. Where the error of the path of a part is limited it
-    is at most `allowed`, and `path_error` the largest accepted.
+    parts in which stability was lost without a release. The
+    `scheme` says what a part is made of (`evfem.solver.path`).
     """
 
     equilibrium: Equilibrium
@@ -73,8 +69,7 @@ class Stepper:
     body: Body | None = None
     relaxations: int = 0
     snaps: int = 0
-    allowed: float | None = None
-    path_error: float = 0.0
+    scheme: Whole = field(default_factory=Whole)
     rise: Callable[[State, State, Target], float] | None = None
     barriers: int = 0
     held: int = 0
@@ -82,8 +77,7 @@ class Stepper:
 
     def __post_init__(self) -> None:
         self._release = Release(RELEASED, self.substep)
-        if self.allowed is not None:
-            self.substep = PATH_FIRST
+        self.substep = self.scheme.first(self.substep)
 
     def follow(self, state: State, path: Path, accounts: Accounts) -> tuple[State, int]:
         """From `state` to the end of `path`; the accounts see every converged substep. Returns the end
@@ -97,7 +91,7 @@ class Stepper:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
             try:
-                parts, error = self._part(state, path, done, fraction)
+                parts, error = self.scheme.solve(self.solve, state, path, (done, fraction))
             except StepFailed as failed:
                 left, target = 1.0 - done, path(done, fraction)
                 self.substep = 0.5 * (fraction - done)
@@ -105,7 +99,9 @@ class Stepper:
                 if rest is not None:
                     state, done, substeps = rest, fraction, substeps + 1
                 continue
-            if not self._keeps(error, fraction - done):
+            shorter = self.scheme.refused(error, fraction - done, strategy)
+            if shorter is not None:
+                self.substep = shorter
                 continue
             self._release = replace(self._release, trusted=self.substep, unstable=False)
             for target, new in parts:
@@ -114,10 +110,8 @@ class Stepper:
                     self.equilibrium.begin(state, target)
                 self.snaps += bool(accounts.accept(state, new))
                 state, substeps = new, substeps + 1
-            if self.allowed is not None:
-                self._set_length(error, fraction - done)
-            elif self.equilibrium.record.iterations - before <= strategy.easy:
-                self.substep = min(1.0, strategy.growth * self.substep)
+            easy = self.equilibrium.record.iterations - before <= strategy.easy
+            self.substep = self.scheme.following(self.substep, fraction - done, error, easy, strategy)
             done = fraction
         return state, substeps
 
@@ -149,33 +143,6 @@ class Stepper:
         least = self.equilibrium.strategy.smallest_part
         timed = self.body is not None and not self._relaxation(self.body).applies(target)
         return least**2 if timed else least
-
-    def _keeps(self, error: float, part: float) -> bool:
-        """Whether a part with this error of its path is accepted; if not, the next one is shorter."""
-        least = self.equilibrium.strategy.smallest_part
-        if self.allowed is None or error <= self.allowed or part <= least + 1e-12:
-            self.path_error = max(self.path_error, error)
-            return True
-        self.substep = max(length_factor(error / self.allowed) * part, least)
-        return False
-
-    def _set_length(self, error: float, part: float) -> None:
-        """The next part's length; a part shortened to hit the end of a step does not shorten it."""
-        assert self.allowed is not None
-        cut = part < (1.0 - 1e-9) * self.substep
-        wanted = max(length_factor(error / self.allowed) * part, self.equilibrium.strategy.smallest_part)
-        self.substep = min(1.0, max(wanted, self.substep) if cut else wanted)
-
-    def _part(self, state: State, path: Path, done: float, fraction: float) -> tuple[Solved, float]:
-        """The equilibria of a part to accept, and the error of its path: two halves where that is limited."""
-        whole = path(done, fraction)
-        if self.allowed is None:
-            return [(whole, self.solve(state, whole))], 0.0
-        middle = 0.5 * (done + fraction)
-        first, second = path(done, middle), path(middle, fraction)
-        half = self.solve(state, first)
-        end = self.solve(half, second)
-        return [(first, half), (second, end)], relative_difference(self.solve(state, whole, start=end), end)
 
     def _relaxation(self, body: Body) -> Relaxation:
         return Relaxation(body, self.solve, self.equilibrium.attraction.flows)

@@ -3,12 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.terms.traction import Entries, NoTraction, PadState, PadTraction
+
+#: a finger that does not touch has come off when what holds it has fallen below this share of the last pull
+LEFT = 0.01
+
+
+@dataclass
+class PullOff:
+    """Watches for the pull at which a finger that tractions hold without a voltage comes off: the `pull`
+    (N/mm) on it in the last equilibrium, that at which it `let_go` in this step, 0 if it did not, and rows
+    (k, 2) of the steps and pulls at which it `came_off`.
+    """
+
+    pull: float = 0.0
+    let_go: float = 0.0
+    came_off: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def watch(self, state: Any, forces: dict[str, Floats], rests: bool) -> None:
+        """An accepted state under these forces (P, dim) by name; `rests` without drag."""
+        holds = -float(sum(force[:, 1].sum() for force in forces.values()))
+        if not state.touching.any() and self.pull > 0.0 and holds < LEFT * self.pull:
+            self.let_go, self.pull = self.pull, 0.0
+        elif rests:
+            self.pull = max(0.0, float(state.reaction[1])) if state.touching.any() or holds > 0.0 else 0.0
+
+    def ends(self, step: int) -> None:
+        """A step of that number is done."""
+        if self.let_go:
+            self.came_off, self.let_go = np.vstack([self.came_off, [step, self.let_go]]), 0.0
+
+
+class NoPullOff(PullOff):
+    """Nothing holds the finger but a voltage."""
+
+    def watch(self, state: Any, forces: dict[str, Floats], rests: bool) -> None:
+        return
+
+
+def pull_off_of(attraction: Any) -> PullOff:
+    """What watches a finger under a sum of tractions."""
+    return PullOff() if any(part.always for part in attraction.parts) else NoPullOff()
 
 
 def sum_of(parts: Sequence[Any]) -> Any:

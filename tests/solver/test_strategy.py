@@ -14,6 +14,7 @@ from evfem.newton.strategy import Strategy
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
+from evfem.solver.path import Halves
 from evfem.solver.stepping import Stepper
 from evfem.surface.surfaces import Flat
 from evfem.terms.attraction import NoAttraction
@@ -234,7 +235,7 @@ class Decaying(Steps):
 def decayed(allowed):
     """How far the end is off, in parts of the exact one; the parts' lengths; the stepper."""
     steps, ends = Decaying(Strategy(), 1.0), [0.0]
-    stepper = Stepper(steps, allowed=allowed)
+    stepper = Stepper(steps, scheme=Halves(allowed))
     start = SimpleNamespace(reaction=np.ones(1), bone=np.zeros(2))
     path = lambda done, fraction: SimpleNamespace(duration=fraction - done)  # noqa: E731
     kept = Unbooked()
@@ -252,7 +253,7 @@ def test_the_error_of_the_path_sets_the_length_of_its_parts():
     off, parts, stepper = decayed(1e-4)
     assert parts[-2] == pytest.approx(0.9 * 2.0 * np.sqrt(1e-4), rel=0.02)
     assert off == pytest.approx(parts[-2] / 4.0, rel=0.05)
-    assert 0.7e-4 < stepper.path_error <= 1e-4
+    assert 0.7e-4 < stepper.scheme.largest <= 1e-4
     finer, twice, _ = decayed(0.25e-4)
     assert len(twice) == pytest.approx(2 * len(parts), abs=4)
     assert finer == pytest.approx(off / 2.0, rel=0.1)
@@ -268,7 +269,7 @@ def test_shares_are_above_zero(name):
 def test_parts_that_err_too_much_are_done_again_shorter():
     _, parts, stepper = decayed(1e-6)
     assert parts[:3] == pytest.approx([1 / 16, 1 / 64, 1 / 256])
-    assert stepper.path_error <= 1e-6
+    assert stepper.scheme.largest <= 1e-6
 
 
 def test_few_automatic_steps_agree_with_many_given_ones():
