@@ -68,7 +68,7 @@ class Whole:
 
 @dataclass
 class Halves(Whole):
-    """A substep is two halves, that differ from one whole by at most `allowed`; `largest`: accepted so far."""
+    """A substep is two halves that differ from one whole by at most `allowed`; the `largest` so far."""
 
     allowed: float
     largest: float = 0.0
