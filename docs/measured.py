@@ -24,9 +24,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from sentences import Found, filled, fingerprint, fingertip, fringe, moisture, parameters, short, soft
+
 from evfem.studies import NAMES, paper
 from evfem.studies.common import markdown
-from sentences import Found, filled, fingerprint, fingertip, fringe, moisture, parameters, short, soft
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent

@@ -17,10 +17,10 @@ from tempfile import TemporaryDirectory
 os.environ["OMP_NUM_THREADS"] = "1"
 
 import numpy as np
-from evfem.studies.common import commit, processor
 
 import evfem as ev
 from evfem.simulation.provenance import origin
+from evfem.studies.common import commit, processor
 
 RESULTS = Path(__file__).parent / "results"
 #: the command; without PARDISO as where it is not installed

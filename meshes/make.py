@@ -11,11 +11,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from evfem.studies.benchmark import benchmark_mesh
 
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
+from evfem.studies.benchmark import benchmark_mesh
 
 
 def triangles(mesh: Mesh) -> Mesh:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from evfem.meshes import FOLDER
 
 from evfem.common.storage import disk, write_text
 from evfem.common.tables import csv_text
+from evfem.meshes import FOLDER
 from evfem.scene.file import loads
 from evfem.scene.scene import Scene
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from evfem.meshes import FOLDER
 
 import evfem as ev
 from evfem.mesh.file import read
+from evfem.meshes import FOLDER
 
 from .case import Group, Log, Verdict, alike
 from .scenes import benchmark, block, finger, grid, layered, pad, scene, shaken
