@@ -2,6 +2,7 @@
 
 import csv
 import re
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -64,6 +65,33 @@ def test_half_of_a_finger_says_that_the_whole_is_computed():
     with pytest.raises(ev.InputError) as caught:
         ev.Solver(symmetry=True)
     assert str(caught.value) == told.format("True")
+
+
+@pytest.mark.parametrize("coupling", ["staggered", "staggered_once"])
+def test_the_staggered_coupling_says_that_it_was_removed(coupling):
+    told = (
+        f'electrostatics.coupling: given "{coupling}"; allowed: nothing: the staggered coupling was removed '
+        "in 0.4.0 (the equilibria of staggered are those of monolithic); leave the key out"
+    )
+    scene = ev.default_scene()
+    with pytest.raises(ev.InputError) as caught:
+        ev.scenefile.loads(with_coupling(scene, coupling))
+    assert str(caught.value) == told
+    with pytest.raises(ev.InputError) as caught:
+        ev.Scene(scene.finger, scene.surface, motion=scene.motion, coupling=coupling)
+    assert str(caught.value) == told
+
+
+def test_the_monolithic_coupling_of_old_files_has_no_effect():
+    scene = ev.default_scene()
+    read = ev.scenefile.loads(with_coupling(scene, "monolithic"))
+    assert (read, read.digest()) == (scene, scene.digest())
+    assert replace(read, coupling="monolithic") == scene
+    assert "coupling" not in ev.scenefile.dump(read)
+
+
+def with_coupling(scene, coupling):
+    return ev.scenefile.dump(scene).replace("[electrostatics]", f'[electrostatics]\ncoupling = "{coupling}"')
 
 
 def moved():

@@ -20,8 +20,12 @@ import numpy as np
 from evfem.errors import InputError, Mistakes, quoted
 
 MOST_STEPS = 1_000_000
-#: removed keys and what replaces them, for one release
-GONE = {"solver.symmetry": "nothing: gone since 0.3, the whole finger is computed"}
+#: removed keys, or values of keys, and what replaces them, for one release
+GONE = {
+    "solver.symmetry": "nothing: gone since 0.3, the whole finger is computed",
+    "electrostatics.coupling": "nothing: the staggered coupling was removed in 0.4.0 (the equilibria of "
+    "staggered are those of monolithic); leave the key out",
+}
 Values = Any  # a number, or an array of numbers: real, or complex in a complex step
 
 

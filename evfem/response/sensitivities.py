@@ -373,7 +373,6 @@ def sensitivities(
     2.00005
     """
     scene = scene_of(scene)
-    _check(scene)
     single = isinstance(parameters, str) or hasattr(parameters, "applied")
     given = [parameter_of(scene, each) for each in ([parameters] if single else parameters)]
     if not given:
@@ -392,13 +391,6 @@ def sensitivities(
         finally:
             bar.close()
     return _gathered(run, known, tuple(name for name in wanted if name in there))
-
-
-def _check(scene: Scene) -> None:
-    """Refuse what is not differentiated as a whole."""
-    if scene.coupling == "staggered_once" and scene.law is not None:
-        given = "staggered_once, whose forces are those of another place"
-        raise InputError("electrostatics.coupling", given, "monolithic or staggered, to be differentiated")
 
 
 def _columns(names: Sequence[str], columns: str | Sequence[str] | None) -> tuple[str, ...]:

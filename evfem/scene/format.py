@@ -294,7 +294,7 @@ class Electrostatics:
 
     def scene_keys(self, law: Any, ramped: bool) -> dict[str, Any]:
         """What it says of a scene beside its law; `ramped`: the voltage may begin without one."""
-        names = ("air_layer", "direction", "field", "grounded", "coupling", "roughness_gap")
+        names = ("air_layer", "direction", "field", "grounded", "roughness_gap")
         own = {"law": law, "voltage": self._voltage(not ramped)}
         return own | {"drive": self._drive()} | {name: getattr(self, name) for name in names}
 

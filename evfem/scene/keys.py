@@ -50,9 +50,11 @@ def read(
     mistakes, meant = Mistakes(), set[str]()
     for name, value in table.items():
         path = _join(prefix, name)
+        if name in known:
+            continue
         if path in GONE:
             mistakes.found.append(InputError(path, shown(value), GONE[path]))
-        elif name not in known:
+        else:
             mistakes.found.append(_unknown_key(path, name, known, homes or {}))
             meant |= {*near(name, known)}
     for key in keys:

@@ -8,12 +8,12 @@ outline at the start.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import Annotated, Any, Protocol, cast, runtime_checkable
 
-from evfem.common.checks import Within, check_fields, number, one_of, real, set_frozen, yes_or_no
+from evfem.common.checks import GONE, Within, check_fields, number, one_of, real, set_frozen, yes_or_no
 from evfem.common.digest import digest
 from evfem.common.rooms import BodyTerm, Room
 from evfem.common.views import called, changed, short, table
@@ -38,7 +38,6 @@ from evfem.tissue.forms import Form
 DIRECTIONS = ("vertical", "normal")
 #: the attraction column by column, by Poisson's problem, or whichever the bounds ask for
 FIELDS = ("local", "full", "auto")
-COUPLINGS = ("monolithic", "staggered", "staggered_once")
 #: names of the tractions of a voltage and of adhesion
 TAKEN = ("electrostatic", "adhesive")
 #: voltages that are no number
@@ -52,7 +51,18 @@ FieldChoice = Annotated[
 ]
 Grounded = Annotated[bool, yes_or_no(), "false: the finger has no charge; with field full"]
 Adhesion = Annotated[AdhesionLaw | None, {"allowed": ADHESION, "check": adhesion_of}]
-Coupling = Annotated[str, one_of(*COUPLINGS), "staggered_once: the paper's, once in each step"]
+
+
+def monolithic(key: str, value: object) -> str:
+    """The coupling of old files, which is always that; InputError for another."""
+    if not isinstance(value, str) or value != "monolithic":
+        raise InputError(key, quoted(value), GONE["electrostatics.coupling"])
+    return value
+
+
+Coupling = Annotated[
+    str, {"names": ("monolithic",), "check": monolithic}, "without effect; kept for files of 0.3"
+]
 
 
 @runtime_checkable
@@ -108,7 +118,7 @@ class Scene:
     motion: Motions = Motions()
     air_layer: AirLayer = field(default=True, kw_only=True)
     direction: Direction = field(default="vertical", kw_only=True)
-    coupling: Coupling = field(default="monolithic", kw_only=True)
+    coupling: InitVar[object] = field(default=None, kw_only=True)  # without effect
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: RoughnessGap = field(default=0.0, kw_only=True)
     adhesion: Adhesion = field(default=None, kw_only=True)
@@ -125,16 +135,17 @@ class Scene:
         default="local", kw_only=True
     )  # the last one: from here on `field` is its default
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, coupling: object) -> None:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms), rooms=tuple(self.rooms))
         mistakes = Mistakes()
+        with mistakes.of_a_part():
+            monolithic("electrostatics.coupling", "monolithic" if coupling is None else coupling)
         checks = (
             _check_electrostatics,
             check_drive,
             _check_friction,
             _check_elastic,
-            _check_adhesion,
             _check_hand,
             _check_motion,
             _check_speeds,
@@ -328,12 +339,6 @@ def _check_elastic(scene: Scene) -> None:
         raise InputError("surface.elastic", "an elastic surface under a voltage that is sought", allowed)
 
 
-def _check_adhesion(scene: Scene) -> None:
-    if scene.adhesion is not None and scene.law is not None and scene.coupling == "staggered_once":
-        allowed = "monolithic or staggered: adhesion is told apart from the attraction at one place alone"
-        raise InputError("electrostatics.coupling", "staggered_once with adhesion", allowed)
-
-
 def _check_motion(scene: Scene) -> None:
     pressed = False
     for i, course in enumerate(scene.courses):
@@ -343,8 +348,6 @@ def _check_motion(scene: Scene) -> None:
             raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
         if ramps and isinstance(scene.voltage, SIGNALS):
             raise InputError(key, "a voltage ramp beside a voltage profile or signal", "one of the two")
-        if course.gap is not None and scene.coupling != "monolithic":
-            raise InputError(f"{key}.gap", f"a gap with coupling = {scene.coupling}", "coupling = monolithic")
         if course.hold == "force" and not pressed:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"

@@ -26,8 +26,6 @@ def add_parts(random: Draw, tables: Tables) -> None:
         tables["surface"]["elastic"] = layer | {"thickness": random.spread(0.2, 5.0)}
     if random.chance(0.06):
         tables["adhesion"] = _adhesion(random)
-        if electric.get("coupling") == "staggered_once":
-            electric["coupling"] = "staggered"
 
 
 def _sought(tables: Tables) -> bool:

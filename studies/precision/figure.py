@@ -21,8 +21,6 @@ ELEMENTS = {
 POINTS = {
     "q2p1_penalty_100": ("penalty 100 N/mm³", "x"),
     "q2p1_penalty_10000": ("penalty 10 000 N/mm³", "+"),
-    "q2p1_staggered": ("staggered", "1"),
-    "q2p1_staggered_once": ("staggered, once per step", "2"),
     "q2p1_rigid": ("rigid outline", "*"),
     "outline_quadrature": ("quadrature of the outline", "P"),
     "closed_form_plate": ("plate, closed form", "X"),

@@ -104,8 +104,6 @@ def full() -> list[Case]:
     cases += [Case("A", 2, "q1"), *(Case(problem, 2) for problem in _FINGERS)]
     cases += [Case("hover", level, rigid=True) for level in (0, 1, 2)]
     cases += [Case(problem, 1, penalty=penalty) for problem in "AB" for penalty in PENALTIES]
-    cases += [Case(problem, 1, coupling="staggered") for problem in ("C", "ramp")]
-    cases += [Case("ramp", 1, coupling="staggered_once")]
     cases += [Case("B", 0, steps=steps) for steps in STEPS if steps != 30]
     cases += [Case(pad, "coarse", e) for pad in PADS for e in ELEMENTS]
     cases += [Case(pad, "medium", e) for pad in PADS for e in ("q1_fbar", "q2p1")]
@@ -117,6 +115,6 @@ def full() -> list[Case]:
 def quick() -> list[Case]:
     """What tests need: every kind of case, on the coarsest mesh."""
     cases = [Case(problem, 0, element) for problem in ("A", "hover") for element in ("q1", "q2p1")]
-    cases += [Case("A", 1), Case("hover", 1), Case("C", 0), Case("C", 0, coupling="staggered")]
+    cases += [Case("A", 1), Case("hover", 1), Case("C", 0)]
     cases += [Case("A", 0, penalty=penalty) for penalty in PENALTIES]
     return [*cases, Case("hover", 0, rigid=True), Case("hover", 0, fast=False)]

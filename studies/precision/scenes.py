@@ -43,7 +43,6 @@ class Case:
     level: int | str
     element: str = "q2p1"
     penalty: float = 0.0
-    coupling: str = "monolithic"
     steps: int = 30
     rigid: bool = False
     fast: bool = True
@@ -54,7 +53,6 @@ class Case:
     def variant(self) -> str:
         """What is not as recommended, or the element alone."""
         said = [f"penalty_{self.penalty:g}"] if self.penalty else []
-        said += [self.coupling] if self.coupling != "monolithic" else []
         said += [f"{self.steps}_steps"] if self.steps != 30 else []
         said += ["rigid"] if self.rigid else []
         said += ["plain"] if not self.fast else []
@@ -94,7 +92,7 @@ def build(case: Case) -> ev.Scene:
     surface = ev.Display(insulator=problem.INSULATOR, friction=friction, y=y)
     voltage, law = _voltage(case), ev.Kaczmarek() if case.problem not in "AB" else None
     how: dict[str, Any] = {"solver": ev.Solver(**solver), "output": ev.Output(every=1000)}
-    return ev.Scene(finger, surface, law, voltage, _motion(case), coupling=case.coupling, **how)
+    return ev.Scene(finger, surface, law, voltage, _motion(case), **how)
 
 
 def _voltage(case: Case) -> float:

@@ -1,4 +1,4 @@
-"""Error against CPU seconds: elements, meshes, contact schemes, couplings, steps, back ends, models.
+"""Error against CPU seconds: elements, meshes, contact schemes, steps, back ends, models.
 
 Also how time and memory of a step grow with the nodes, and where a step's time goes. Beside json, csv and
 picture the tables are written as work_precision.md.
@@ -26,7 +26,7 @@ ASSUMPTIONS = {
     "steps": "the step size of B is judged on its mesh by its own limit, first order from the two shortest",
     "cpu_s": "process time from the mesh to the last step, imports and compilation left out, one thread, "
     "in a process that has run before; least of three for runs below a second",
-    "recommended": "exact contact, monolithic; the cheapest measured run; a star where the reference is less "
+    "recommended": "exact contact; the cheapest measured run; a star where the reference is less "
     "certain than the goal",
     "plain": "pypardiso cannot be imported: SuperLU",
     "growth": "scene B's finger, four press and four slide steps of 0.1 mm; the first press step counts as "

@@ -269,32 +269,28 @@ def test_a_slab_that_rests_ages_and_one_that_touches_anew_is_fresh():
 
 
 @pytest.mark.parametrize("law", [LOAD_INDEX, ADHESIVE], ids=["load index", "adhesive"])
-def test_every_node_of_a_finger_obeys_and_both_couplings_agree(law):
-    found = []
-    for coupling in ("monolithic", "staggered"):
-        scene = ev.Scene(
-            benchmark_finger(),
-            ev.Display(friction=[[0.0, 0.2], [0.5, 0.4]]),
-            ev.Kaczmarek(),
-            800.0,
-            [ev.Press(force=0.03, steps=2), slid(distance=0.5)],
-            coupling=coupling,
-            friction_law=law,
-        )
-        found.append(result := ev.simulate(scene))
-        frame, pad = result.frames[-1], result.mesh.node_sets["pad"]
-        x = (result.mesh.points[:, 0] + frame.displacement[:, 0])[pad]
-        p, shear, status = (
-            values[pad] for values in (frame.contact_pressure, frame.shear_traction, frame.contact_status)
-        )
-        bound = law.bound(np.maximum(p, 0.0), scene.surface.friction_coefficient(x), 0.0, 0.0)
-        facing = (p > 1e-3 * p.max()) & (status > 0)
-        slips = facing & (status == 2)
-        assert slips.sum() > 3
-        np.testing.assert_allclose(np.abs(shear[slips]), bound[slips], rtol=1e-6)
-        assert (np.abs(shear) <= bound + 1e-6 * bound.max())[facing].all()
-        assert left_over(result) < 1e-6
-    np.testing.assert_allclose(found[0].tangential_force, found[1].tangential_force, rtol=1e-6)
+def test_every_node_of_a_finger_obeys(law):
+    scene = ev.Scene(
+        benchmark_finger(),
+        ev.Display(friction=[[0.0, 0.2], [0.5, 0.4]]),
+        ev.Kaczmarek(),
+        800.0,
+        [ev.Press(force=0.03, steps=2), slid(distance=0.5)],
+        friction_law=law,
+    )
+    result = ev.simulate(scene)
+    frame, pad = result.frames[-1], result.mesh.node_sets["pad"]
+    x = (result.mesh.points[:, 0] + frame.displacement[:, 0])[pad]
+    p, shear, status = (
+        values[pad] for values in (frame.contact_pressure, frame.shear_traction, frame.contact_status)
+    )
+    bound = law.bound(np.maximum(p, 0.0), scene.surface.friction_coefficient(x), 0.0, 0.0)
+    facing = (p > 1e-3 * p.max()) & (status > 0)
+    slips = facing & (status == 2)
+    assert slips.sum() > 3
+    np.testing.assert_allclose(np.abs(shear[slips]), bound[slips], rtol=1e-6)
+    assert (np.abs(shear) <= bound + 1e-6 * bound.max())[facing].all()
+    assert left_over(result) < 1e-6
 
 
 def test_a_wished_friction_force_is_found_under_a_law():

@@ -66,11 +66,11 @@ def test_what_is_no_gap_is_refused():
 MOTION = [ev.Press(force=0.05, steps=2), ev.Slide(0.4, steps=2)]
 
 
-def touchscreen(rough, coupling="monolithic", core="auto"):
+def touchscreen(rough, core="auto"):
     surface, output = ev.Display(ev.TOUCHSCREEN), ev.Output(every=4)
     return ev.Scene(
         benchmark_finger(), surface, ev.StrongTroxel(), 100.0, MOTION,
-        coupling=coupling, output=output, roughness_gap=rough, solver=ev.Solver(core=core),
+        output=output, roughness_gap=rough, solver=ev.Solver(core=core),
     )  # fmt: skip
 
 
@@ -91,13 +91,8 @@ def test_a_rough_touchscreen_converges_as_a_smooth_one_and_obeys_the_law_at_ever
 
 
 @FALLING
-def test_both_couplings_find_the_same_equilibrium_and_the_books_close(law):
-    together, alternating = (ev.simulate(touchscreen(law, c)) for c in ("monolithic", "staggered"))
-    for name in ("applied_force", "electrostatic_force", "normal_force", "indentation"):
-        np.testing.assert_allclose(together[name][:2], alternating[name][:2], rtol=1e-6)
-        # an edge node whose attraction exceeds its contact force may stay or let go
-        np.testing.assert_allclose(together[name][2:], alternating[name][2:], rtol=1e-3)
-    assert max(left_over(together), left_over(alternating)) < 1e-7
+def test_the_books_close_above_faces_that_come_closer_under_pressure(law):
+    assert left_over(ev.simulate(touchscreen(law))) < 1e-7
 
 
 def test_a_constant_gap_is_a_thicker_layer_of_air():

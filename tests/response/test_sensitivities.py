@@ -255,7 +255,6 @@ CASES = {
     "its ratio": (lambda: yielding("indentation"), "surface.elastic.nu"),
     "its thickness": (lambda: yielding("indentation", direction="normal"), "surface.elastic.thickness"),
     "friction on it": (lambda: yielding("force"), "surface.friction"),
-    "rounds": (lambda: block(coupling="staggered"), "electrostatics.voltage"),
 }
 
 
@@ -293,12 +292,6 @@ def test_what_is_no_parameter_is_refused_in_a_sentence(key, said):
 def test_what_a_finger_computes_is_no_parameter():
     with pytest.raises(ev.InputError, match="materials, which Dome computes; allowed: what is given to it"):
         ev.sensitivities(dome_scene(ev.Press(indentation=0.1, steps=1)), "finger.materials.lower.E")
-
-
-def test_an_attraction_of_another_place_is_refused():
-    """Its forces are no function of the state that the step ends at: they would be wrong by up to 30 %."""
-    with pytest.raises(ev.InputError, match="monolithic or staggered"):
-        ev.sensitivities(block(coupling="staggered_once"), "surface.friction")
 
 
 def test_a_voltage_that_follows_a_force_is_not_differentiated_and_said_so():

@@ -33,7 +33,7 @@ insulator_thickness = 0.09
 insulator_eps_r = 3.35
 air_layer = true                  # false: only touching nodes carry force, eq. (10)
 direction = "vertical"            # vertical (the paper) | normal
-coupling = "monolithic"           # monolithic | staggered | staggered_once
+coupling = "monolithic"           # without effect, of files of 0.3
 [[motion]]
 kind = "press"                    # press | slide | hover | voltage
 force = 0.05                      # or indentation = 1.5
@@ -150,7 +150,6 @@ def scenes(folder):
         ev.StrongTroxel(),
         motion=[ev.VoltageRamp(0.1, steps=1)],
         air_layer=False,
-        coupling="staggered_once",
         solver=ev.Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
         output=ev.Output(3),
     )

@@ -189,19 +189,13 @@ def test_friction_sees_adhesion_as_a_load():
     assert result.adhesive_force[-1] == pytest.approx(covered, rel=0.15)
 
 
-def test_staggered_rounds_without_a_voltage_have_no_electrostatic_force():
-    """Their attraction is that of the round before, within the tolerance of the last one."""
+def test_without_a_voltage_there_is_no_electrostatic_force_beside_adhesion():
     motion = [ev.Press(indentation=0.5, steps=2), ev.VoltageRamp(voltage=100.0, steps=1)]
     surface = ev.Sinusoid(terms=[[0.0127, 1.2, 5.2]], insulator=ev.Layer(0.007, 3.0), friction=0.9)
-    given = {"adhesion": ev.Capillary(0.02, 78.5, 0.009), "coupling": "staggered"}
-    found = ev.simulate(ev.Scene(PAD, surface, ev.Kaczmarek(), 0.0, motion, **given))
+    adhesion = ev.Capillary(0.02, 78.5, 0.009)
+    found = ev.simulate(ev.Scene(PAD, surface, ev.Kaczmarek(), 0.0, motion, adhesion=adhesion))
     assert found.electrostatic_force[:2].tolist() == [0.0, 0.0]
     assert found.electrostatic_force[2] > 1e-6
-
-
-def test_adhesion_is_refused_where_the_attraction_is_of_another_place():
-    given = {"adhesion": MOIST, "coupling": "staggered_once", "law": ev.Kaczmarek(), "voltage": 100.0}
-    refuses("monolithic or staggered", scene_of, ev.Display(), **given)
 
 
 def test_rough_faces_out_of_reach_do_not_adhere():

@@ -157,11 +157,6 @@ def test_a_wider_gap_than_without_a_voltage_is_refused_with_a_sentence():
         ev.simulate(scene(2, 0.0, [ev.VoltageRamp(gap=0.2, steps=1)]))
 
 
-def test_a_gap_needs_the_monolithic_coupling():
-    with pytest.raises(ev.InputError, match="coupling = monolithic"):
-        scene(2, 0.0, [ev.VoltageRamp(gap=0.05)], coupling="staggered")
-
-
 @pytest.mark.parametrize("seconds", [0.0, 1e-3])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, seconds):

@@ -33,9 +33,7 @@ def test_penalty_error_falls_with_its_stiffness(numbers):
 
 
 @pytest.mark.slow
-def test_staggered_coupling_and_plain_packages_change_nothing(numbers):
-    assert numbers["C.L0.q2p1_staggered.change_percent"] < 1e-3
-    assert numbers["C.L0.q2p1_staggered.iterations"] > numbers["C.L0.q2p1.iterations"]
+def test_plain_packages_change_nothing(numbers):
     assert numbers["hover.L0.q2p1_plain.change_percent"] < 1e-6
 
 
