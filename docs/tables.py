@@ -12,7 +12,7 @@ from evfem.response.file import SensitivityTable
 from evfem.scene import schema as scenes
 from evfem.scene.schema import Entry, Section
 from evfem.simulation.history import MEANINGS
-from evfem.simulation.result import COLUMNS, UNITS
+from evfem.simulation.result import UNITS
 from evfem.sweeps import file as sweeps
 from evfem.textures.importers import IMPORTERS
 

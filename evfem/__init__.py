@@ -94,6 +94,8 @@ _MODULES = {
     "tensor": "tensor",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
+#: names of a public module that are made above it: it asks for them here
+_ABOVE = {"electrostatics": dict.fromkeys(("FieldSolution", "rigid_field"), "field.rigid")}
 #: what a name of tensor algebra is since 0.4, and a class that is only received
 _ALGEBRA = ("ddot", "det", "dot", "grad", "inv", "mul", "positive_part", "trace", "transpose")
 _RECEIVED = {
@@ -154,6 +156,14 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
     globals()[name] = value
     return value
+
+
+def _from_above(module: str, name: str) -> Any:
+    """What a public module hands on of a module that stands above it."""
+    own = module.removeprefix(f"{__name__}.")
+    if name not in _ABOVE[own]:
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+    return getattr(_import_module(f"{__name__}.{_ABOVE[own][name]}"), name)
 
 
 def __dir__() -> list[str]:

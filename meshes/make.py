@@ -15,7 +15,7 @@ import numpy as np
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
-from evfem.studies.benchmark import benchmark_mesh
+from evfem.meshes.benchmark import benchmark_mesh
 
 
 def triangles(mesh: Mesh) -> Mesh:

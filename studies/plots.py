@@ -27,7 +27,6 @@ COLOURS = {
 }
 #: of the first curves of a panel
 FIRST = [COLOURS[name] for name in ("kaczmarek", "strong_troxel", "fe", "measured")]
-QUICK = "--quick: coarser and shorter than the study"
 
 
 def panels(height: float, columns: int, width: float = WIDTH, rows: int = 1, **grid: Any) -> Any:
@@ -64,15 +63,6 @@ def not_shown(figure: Figure, what: str) -> None:
     """A line at the foot of the figure on measured points that the paper plots but does not print."""
     figure.supxlabel(
         f"{what}: only plotted in the paper, not shown", fontsize="x-small", color=COLOURS["neutral"]
-    )
-
-
-def say_quick(figure: Figure) -> None:
-    """A line of its own at the head of a figure: what it shows is coarser and shorter."""
-    line = 0.18 / figure.get_figheight()
-    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - line))
-    figure.text(
-        0.99, 1.0 - 0.2 * line, QUICK, ha="right", va="top", fontsize="x-small", color=COLOURS["neutral"]
     )
 
 

@@ -6,7 +6,9 @@ A new file of `evfem/` must be given its place in `ROOMS`.
 import ast
 import sys
 import tomllib
-from importlib.util import find_spec
+from graphlib import TopologicalSorter
+from importlib import import_module
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
 import pytest
@@ -193,6 +195,55 @@ def test_a_module_imports_only_what_stands_before_it():
         ours, _ = ours_and_others(name)
         edges += [f"{name} -> {other}" for other in sorted(ours - set(ORDER[:place]) - BUILT)]
     assert not edges
+
+
+def executed(node):
+    """What stands below a node, but for what type checkers alone read."""
+    for child in ast.iter_child_nodes(node):
+        if not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
+            yield child
+            yield from executed(child)
+
+
+def test_a_front_door_hands_on_nothing_from_above():
+    """`electrostatics.rigid_field`, which the field makes, comes through the door of the package."""
+    arrows, rooms = [], list(ROOMS)
+    for place, room in enumerate(rooms):
+        above = {f"evfem.{name}" for name in rooms[place + 1 :]}
+        for path in (PACKAGE / room).rglob("__init__.py"):
+            found = {".".join(full.split(".")[:2]) for full in imported(executed(tree_of(path)))}
+            arrows += [f"{room} -> {other}" for other in sorted(found & above)]
+    assert not arrows
+
+
+def beside(folder):
+    """Modules of `evfem.studies` or `evfem.meshes` but for front doors, with the names that each imports."""
+    root, edges = Path(import_module(f"evfem.{folder}").__file__).parent, {}
+    for path in sorted(root.rglob("*.py")):
+        name = ".".join(("evfem", folder, *path.relative_to(root).with_suffix("").parts))
+        nodes = list(ast.walk(tree_of(path)))
+        found = {full for full in imported(nodes) if not full.startswith("evfem..")}
+        for node in nodes:
+            if isinstance(node, ast.ImportFrom) and node.level:
+                home = resolve_name("." * node.level + (node.module or ""), name.rpartition(".")[0])
+                found |= {f"{home}.{alias.name}" for alias in node.names}
+        if path.name != "__init__.py":
+            edges[name] = found
+    return edges
+
+
+def test_studies_take_meshes_and_each_other_in_no_circle():
+    meshes, studies = beside("meshes"), beside("studies")
+    assert "evfem.studies.common" in studies
+    back = {name for name, found in meshes.items() if any(one.startswith("evfem.studies") for one in found)}
+    assert not back
+    known = meshes | studies
+    edges = {
+        name: {other for other in known if any(f"{one}.".startswith(f"{other}.") for one in found)}
+        for name, found in known.items()
+    }
+    assert "evfem.meshes.benchmark" in edges["evfem.studies.peers.problem"]
+    TopologicalSorter(edges).prepare()  # a CycleError names the circle
 
 
 def test_a_room_uses_only_its_packages():

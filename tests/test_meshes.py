@@ -12,8 +12,8 @@ from tools.refusals import refuses
 import evfem.meshes
 from evfem.mesh import file as meshfile
 from evfem.mesh.quality import scaled_jacobian
+from evfem.meshes.benchmark import LEVELS, benchmark_mesh
 from evfem.meshes.make import RECIPES
-from evfem.studies.benchmark import LEVELS, benchmark_mesh
 
 README = (evfem.meshes.FOLDER / "README.md").read_text(encoding="utf-8")
 

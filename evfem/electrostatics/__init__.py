@@ -3,6 +3,7 @@
 The full field of rigid bodies is loaded when it is first asked for: the closed forms need numpy alone.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from evfem.electrostatics.alternating import (
@@ -41,8 +42,4 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """PEP 562: what needs scipy and scikit-fem."""
-    if name not in ("FieldSolution", "rigid_field"):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from evfem.field import rigid
-
-    return getattr(rigid, name)
+    return import_module("evfem")._from_above(__name__, name)

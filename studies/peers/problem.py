@@ -13,8 +13,7 @@ import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
-
-from ..benchmark import benchmark_mesh
+from evfem.meshes.benchmark import benchmark_mesh
 
 MATERIALS = {"tissue": ev.NeoHookean(E=0.05, nu=0.48), "skin": ev.NeoHookean(E=1.0, nu=0.30)}
 PLANE = -6.395  # height of the rigid surface, mm

@@ -15,11 +15,11 @@ import scipy.sparse as sparse
 from pypardiso import PyPardisoSolver
 
 from evfem.common.arrays import Floats, Ints
-from evfem.terms.attraction import Attraction
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.mesh.mesh import Mesh
 from evfem.surface.pad import make_pad
 from evfem.surface.surfaces import Flat
+from evfem.terms.attraction import Attraction
 
 from .apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact
 from .problem import FRICTION, GIVEN, LAYERS, MATERIALS, PLANE, VOLTAGE, Way, path, scene_mesh

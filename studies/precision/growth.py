@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 import evfem as ev
+from evfem.meshes.benchmark import divided_mesh
 
-from ..benchmark import divided_mesh
 from ..common import Series, alone, markdown
 from ..peers.apart import resident_MB
 from ..peers.problem import PLANE, TOLERANCE

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 from evfem.electrostatics.forces import EllipsoidalPad, pad_force_per_depth, plate_force
 from evfem.electrostatics.laws import Kaczmarek
+from evfem.meshes.benchmark import OUTER
 
-from ..benchmark import OUTER
 from ..common import alone
 from ..peers.problem import LAYERS
 from .scenes import ELEMENTS, GAP, HOVER_VOLTAGE, PADS, Case, build, forces

@@ -10,11 +10,10 @@ from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import Layer
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.mesh.mesh import Mesh
+from evfem.meshes.benchmark import benchmark_mesh
 from evfem.scene.motion import Motion
 from evfem.scene.scene import Output, Scene
 from evfem.tissue.laws import NeoHookean
-
-from ..benchmark import benchmark_mesh
 
 SKIN = Electrical(stratum_corneum_thickness=0.38, stratum_corneum_eps_r=1650.0)
 INSULATOR = Layer(thickness=0.09, eps_r=3.35)

@@ -10,7 +10,7 @@ from evfem.errors import InputError, StorageError
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import scaled_jacobian
-from evfem.studies.benchmark import benchmark_mesh
+from evfem.meshes.benchmark import benchmark_mesh
 
 
 def stored(folder, **changes):

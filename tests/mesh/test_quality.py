@@ -8,7 +8,7 @@ from tools.mesh_parts import REGIONS, of_kind, raw
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
-from evfem.studies.benchmark import benchmark_mesh
+from evfem.meshes.benchmark import benchmark_mesh
 
 
 def shifted_copy(gap):

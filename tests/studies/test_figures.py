@@ -98,7 +98,7 @@ def test_the_picture_of_a_quick_study_says_so_beside_everything_else(quick, tmp_
     plots.panel_letter(figure.axes[0], "a")
     plots.not_shown(figure, "measured points")
     common.Study("one", {}, {}, {}, [], lambda: figure).finish(tmp_path, quick)
-    notes = [text for text in figure.texts if text.get_text() == plots.QUICK]
+    notes = [text for text in figure.texts if text.get_text() == common.QUICK]
     assert len(notes) == int(quick)
     others = [*figure.axes, *(text for text in figure.texts if text not in notes)]
     for note in notes:

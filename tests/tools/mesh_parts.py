@@ -3,8 +3,8 @@
 import numpy as np
 
 from evfem.mesh.mesh import raised
+from evfem.meshes.benchmark import benchmark_mesh
 from evfem.meshes.make import triangles
-from evfem.studies.benchmark import benchmark_mesh
 
 #: numbers of its regions
 REGIONS = {"tissue": 0, "skin": 1}
