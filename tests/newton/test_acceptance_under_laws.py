@@ -6,7 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node, pushed, shifted
+from tools.steps import (
+    GAP,
+    MESH,
+    MU,
+    PAD,
+    SLIP,
+    TOLERANCE,
+    Script,
+    accepted,
+    begin_under,
+    legal,
+    node,
+    pushed,
+    shifted,
+)
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, StabilityRatio
@@ -14,7 +28,6 @@ from evfem.newton.control import GivenVoltage, Indentation, Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Folded, Limits, StepFailed
-from evfem.newton.strategy import Strategy
 from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.surface.surfaces import Flat
 from evfem.terms.attraction import NoAttraction
@@ -40,12 +53,12 @@ def lawful(kind, law, surface=None):
     everything, and the largest shear of every node (P,).
     """
     interface, old, good = legal(surface or Flat(friction=MU, y=0.0), kind)
-    interface.law, interface.duration = law, SECONDS
+    begin_under(law, interface, SECONDS)
     give, before = np.zeros((PAD.nodes.size, 2)), np.zeros_like(good.contact_force)
     if kind is PenaltyInterface:
         interface.penalties = PENALTIES
         give, before[:, 1] = 1.0 / np.outer(PAD.length(X), PENALTIES), 0.05
-    old = replace(old, age=np.full(PAD.nodes.size, 0.2), contact_force=before)
+    old = replace(old, contact_force=before).remembering({"contact_time": np.full(PAD.nodes.size, 0.2)})
     touching, normal = good.status != OPEN, good.contact_force[:, 0]
     sign = np.select([good.status == FORWARD, good.status == BACKWARD], [1.0, -1.0], 0.0)
     shear = good.contact_force[:, 1]
@@ -62,12 +75,8 @@ def lawful(kind, law, surface=None):
 
 
 def first_accepted(interface, old, states):
-    """Number of the iterate that the solver accepts; it keeps its displacements."""
-    script = Script(states, (0.0, 0.0))
-    solver = Equilibrium(script, interface, NoAttraction(), Limits(TOLERANCE, Strategy(iterations=2)))
-    target = Target(0.0, Indentation(0.0), GivenVoltage(0.0), interface.duration)
-    found = solver.step(old, target)
-    return next(k for k, state in enumerate(states) if state.u is found.u)
+    """Number of the iterate that the solver accepts at the end of half a second."""
+    return accepted(interface, old, states, target=Target(0.0, Indentation(0.0), GivenVoltage(0.0), SECONDS))
 
 
 def breakers(limit, give):
@@ -173,8 +182,8 @@ def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     """
     interface, old, new = legal(FLAT, PenaltyInterface)
     interface.penalties, law = (50.0, 2e3), RateFriction(speed=1.0, exponent=0.7)
-    interface.law, interface.duration = law, 2e-3
-    old = replace(old, age=np.zeros(PAD.nodes.size))
+    begin_under(law, interface, 2e-3)
+    old = old.remembering({"contact_time": np.zeros(PAD.nodes.size)})
     k = node(FORWARD)
     normal, shear = new.contact_force[k]
     length, give = PAD.length(MESH.points[PAD.nodes, 0])[k], interface.compliance(old)[k, 1]

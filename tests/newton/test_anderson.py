@@ -24,7 +24,6 @@ def state(u, force=0.0, bone=0.0, squared=0.0, status=OPEN):
         voltage=KILOVOLT * np.sqrt(squared),
         attraction=zero[:1],
         reaction=zero[0],
-        velocity=zero,
         last_increment=zero,
     )
 

@@ -69,7 +69,7 @@ def test_iterations_begin_ahead_on_the_last_steps_way(pressed, depth, fraction):
     1.5 times (`Strategy.reach`), and not at all back.
     """
     body, state, _ = pressed
-    begun = body.begin(state, Target.held(np.array([0.0, -depth]), 1000.0), False, state)
+    begun = body.begin(state, Target.held(np.array([0.0, -depth]), 1000.0), state)
     np.testing.assert_allclose(begun.u, state.u + fraction * state.last_increment, atol=1e-14)
     np.testing.assert_allclose(begun.bone, [0.0, -0.2 * (1.0 + fraction)], atol=1e-14)
     assert begun.contact_force is state.contact_force
@@ -121,7 +121,7 @@ def test_a_combination_of_iterates_that_collapses_cells_is_not_taken(pressed, mo
     monkeypatch.setattr(Anderson, "next_iterate", lambda self, before, after: combined)
     monkeypatch.setattr(body.record, "residuals", [1e-3, 2e-3])
     balance = body.balance(state, state.attraction, target)[1]
-    begun, forgotten = body.begin(state, target, False, state), []
+    begun, forgotten = body.begin(state, target, state), []
     monkeypatch.setattr(Anderson, "reset", lambda self: forgotten.append(1))
     after = body.advance(state, begun, target, balance)
     assert np.array_equal(after.u, flat) == taken
@@ -139,7 +139,7 @@ def test_a_combination_of_iterates_whose_bone_leaves_is_not_taken(pressed, monke
     monkeypatch.setattr(Anderson, "next_iterate", lambda self, before, after: combined)
     monkeypatch.setattr(body.record, "residuals", [1e-3, 2e-3])
     for asked, moved in ((free, taken), (target, True)):
-        begun = body.begin(state, asked, False, state)
+        begun = body.begin(state, asked, state)
         balance = body.balance(state, state.attraction, asked)[1]
         after = body.advance(state, begun, asked, balance)
         assert np.array_equal(after.u, combined.u) == moved

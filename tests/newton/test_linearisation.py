@@ -35,7 +35,7 @@ def made(surface=None, voltage=0.0, law=None, body=ROUND, **options):
     options = {"solver": Solver(core="off")} | options  # the law itself
     model = make_model(Scene(body, surface, law, voltage, motion=[Press(force=0.1)], **options))
     state = model.equilibrium.rest(np.zeros(2), voltage)
-    model.equilibrium.body.linearisation.begin(state, False)
+    model.equilibrium.body.linearisation.begin(state)
     return model.equilibrium.body.linearisation, model, state
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from tools.domes import LINEAR, Dome, dome, dome_scene
+from tools.steps import begin_under
 
 import evfem as ev
 from evfem.contact.condensed import Candidates
@@ -133,7 +134,7 @@ def sunk(state, depth):
 def test_candidates_grow_within_a_step_and_what_has_left_is_let_go_in_the_next():
     body, model, state = at_rest()
     linear, free = body.linearisation, int(model.pad.free.sum())
-    linear.begin(state, False)
+    linear.begin(state)
     linear.choose_candidates(state, 0.0)
     few = linear.candidates
     assert 0 < few.size < 0.2 * free
@@ -148,7 +149,7 @@ def test_candidates_grow_within_a_step_and_what_has_left_is_let_go_in_the_next()
     wide = linear.candidates
     linear.choose_candidates(touches, 0.0)
     assert set(linear.candidates) >= {rim, *wide}
-    linear.begin(state, False)
+    linear.begin(state)
     linear.candidates = wide
     linear.choose_candidates(touches, 0.0)
     assert rim in linear.candidates
@@ -162,7 +163,7 @@ def test_what_is_attracted_more_than_a_body_holds_is_a_candidate(stiff, many):
     display = ev.Display(y=-0.005, insulator=ev.Layer(thickness=0.01, eps_r=3.35), friction=0.3)
     body, model, state = at_rest(2500.0, display, tissue=ev.NeoHookean(E=stiff, nu=0.45))
     linear = body.linearisation
-    linear.begin(state, False)
+    linear.begin(state)
     linear.choose_candidates(state, 0.0)
     area = model.pad.tributary(model.equilibrium.interface.positions(state.u))
     most = 10.0 * model.scene.finger.law.shear_modulus / 2.0 * area
@@ -212,9 +213,10 @@ UNDER_LAWS = {
 def test_a_state_obeys_every_law_or_not(case, law):
     moved, status, way, share, lift, obeys = UNDER_LAWS[case]
     interface, old, new, node = touching(FLAT, [10.0, 0.0, 0.0], moved, status)
-    interface.law, interface.duration = LAWS[law], 0.5
+    begin_under(LAWS[law], interface, 0.5)
     # open before, so that contact is fresh
-    old = replace(old, age=np.full(old.status.size, 0.2), status=np.full_like(old.status, OPEN))
+    old = replace(old, status=np.full_like(old.status, OPEN))
+    old = old.remembering({"contact_time": np.full(old.status.size, 0.2)})
     limit = 0.5 * 10.0
     if LAWS[law] is not None:
         area = interface.tributary(new)[node]

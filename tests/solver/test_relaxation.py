@@ -159,7 +159,7 @@ def test_stability_is_that_of_the_body_with_its_present_drag():
         model.body.release(rest.u, 1.0)
         state = solver.step(rest, target)
         model.body.release(state.u, rate)
-        solver.body.begin(state, target, False, state)
+        solver.body.begin(state, target, state)
         margin = solver.body.leaves(state, state, target)
         assert (margin is not None and margin.ratio > 1.0) is unstable
 

@@ -9,12 +9,12 @@ from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.mesh.mesh import raised
 from evfem.newton.control import Target
 from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.friction import LawFriction, ProportionalFriction
 from evfem.newton.interface import Interface
 from evfem.newton.state import Balance, Limits, Record
 from evfem.newton.strategy import Strategy
+from evfem.rooms import Room
 from evfem.surface.pad import make_pad
-from evfem.terms.attraction import NoAttraction
-from evfem.tissue.dynamics import NO_BRANCHES, NO_RATES
 from tools.meshes import block
 
 TOLERANCE, MU = 1e-6, 0.5
@@ -31,10 +31,7 @@ class Script:
     def __init__(self, states, residuals):
         self.size, self.record = len(MESH.points), Record()
         self.states, self.residuals, self.left = states, residuals, None
-        self.body = SimpleNamespace(at_rest=NO_BRANCHES, rates=lambda u: NO_RATES)
-
-    def known(self, old, target):
-        return None
+        self.body, self.pressure = SimpleNamespace(rooms=()), Room()
 
     def begin(self, old, target, start):
         return self.states[0]
@@ -45,9 +42,6 @@ class Script:
 
     def advance(self, old, state, target, balance):
         return self.states[self.record.iterations + 1]
-
-    def accepted(self, old, state):
-        return state
 
     def leaves(self, old, state, target):
         return self.left
@@ -82,18 +76,27 @@ def legal(surface, kind=Interface):
     return interface, old, new
 
 
+def begin_under(law, interface, seconds):
+    """A step of so many seconds begins under a law of friction, None for Coulomb's."""
+    nodes = interface.pad.nodes.size
+    interface.bounds = ProportionalFriction() if law is None else LawFriction(law, nodes)
+    interface.duration = seconds
+    interface.bounds.begin(None, seconds)
+
+
 def node(status):
     """The first pad node with this status."""
     return int(np.flatnonzero(np.resize([OPEN, STICK, FORWARD, BACKWARD], PAD.nodes.size) == status)[0])
 
 
 def accepted(interface, old, states, residuals=(0.0, 0.0), target=None, tries=2):
-    """Number of the iterate that the solver accepts."""
+    """Number of the iterate that the solver accepts; it keeps its displacements, which are its own here."""
+    states = [replace(state, u=state.u.copy()) for state in states]
     script = Script(states, residuals)
     limits = Limits(TOLERANCE, Strategy(iterations=tries))
     target = target or Target.held(old.bone, 0.0)
     found = Equilibrium(script, interface, NoAttraction(), limits).step(old, target)
-    return next(k for k, state in enumerate(states) if state is found)
+    return next(k for k, state in enumerate(states) if state.u is found.u)
 
 
 def shifted(state, where, change, axis):
