@@ -90,7 +90,7 @@ def problem(element, divisions=(2, 1), least=0.0):
 def damping(space, rate, before):
     """The term with these rates, in a step that begins at `before`."""
     term = Dynamics(space, rate * STEP, None)
-    term.begin(before, 0.0 * before, STEP)
+    term.begin_from(before, 0.0 * before, STEP)
     return term
 
 
