@@ -91,7 +91,7 @@ def test_a_rough_touchscreen_converges_as_a_smooth_one_and_obeys_the_law_at_ever
 
 
 @FALLING
-def test_the_books_close_above_faces_that_come_closer_under_pressure(law):
+def test_the_books_close_between_rough_faces(law):
     assert left_over(ev.simulate(touchscreen(law))) < 1e-7
 
 

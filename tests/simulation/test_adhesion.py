@@ -189,7 +189,7 @@ def test_friction_sees_adhesion_as_a_load():
     assert result.adhesive_force[-1] == pytest.approx(covered, rel=0.15)
 
 
-def test_without_a_voltage_there_is_no_electrostatic_force_beside_adhesion():
+def test_without_a_voltage_adhesion_is_no_electrostatic_force():
     motion = [ev.Press(indentation=0.5, steps=2), ev.VoltageRamp(voltage=100.0, steps=1)]
     surface = ev.Sinusoid(terms=[[0.0127, 1.2, 5.2]], insulator=ev.Layer(0.007, 3.0), friction=0.9)
     adhesion = ev.Capillary(0.02, 78.5, 0.009)

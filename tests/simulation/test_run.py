@@ -202,6 +202,12 @@ def test_a_motion_begins_where_the_last_one_ended():
     np.testing.assert_allclose(result.indentation, [-0.2] * 8 + [-0.05, 0.1, -0.1], rtol=1e-13)
 
 
+@pytest.mark.parametrize("direction", ["vertical", "normal"])
+def test_load_contact_and_attraction_are_in_balance(direction):
+    result = run(Display(), law=Kaczmarek(), voltage=2500.0, direction=direction)
+    assert balance(result).max() < 1e-7
+
+
 def direct_force(mesh, displacement, gap_to, voltage):
     """Quadrature of (8b) over the deformed outline: vertical traction per projected length, edge by edge."""
     s, weight = np.polynomial.legendre.leggauss(12)
