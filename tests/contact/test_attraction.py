@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tools.grids import assembled
+from tools.pads import seen
 
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.finger.fingerpad import FingerPad
@@ -62,7 +63,9 @@ def differences(attraction, position, touching, h=1e-6):
     columns = []
     for unit in np.eye(position.size):
         step = h * unit.reshape(position.shape)
-        ahead, behind = (attraction.forces(position + s, 800.0, touching) for s in (step, -step))
+        ahead, behind = (
+            attraction.forces(seen(attraction, position + s, 800.0, touching)) for s in (step, -step)
+        )
         columns.append((ahead - behind).ravel() / (2 * h))
     return np.array(columns).T
 
@@ -72,7 +75,7 @@ def differences(attraction, position, touching, h=1e-6):
 @surfaces
 def test_vertical_forces_are_pressure_times_projected_length(law, surface, order):
     attraction, position = make(law, surface, order)
-    forces = attraction.forces(position, 800.0, everyone(attraction))
+    forces = attraction.forces(seen(attraction, position, 800.0, everyone(attraction)))
     gap = position[:, 1] + 1.0 - surface.height(position[:, 0])
     assert (gap > 0).all()
     length = attraction.pad.length(position[:, 0])
@@ -89,9 +92,9 @@ def test_forces_along_a_way_are_those_at_each_of_its_places(surface, direction):
     ways, voltages = np.array([0.0, 0.02, 0.05]), np.array([300.0, 0.0, 900.0])
     touching = np.arange(len(position)) == 2
     positions = position + ways[:, None, None] * np.array([1.0, -0.5])
-    along = attraction.forces_along(positions, voltages, touching)
+    along = attraction.forces_along(seen(attraction, positions, voltages, touching))
     for found, where, voltage in zip(along, positions, voltages, strict=True):
-        np.testing.assert_array_equal(found, attraction.forces(where, voltage, touching))
+        np.testing.assert_array_equal(found, attraction.forces(seen(attraction, where, voltage, touching)))
 
 
 @directions
@@ -100,20 +103,24 @@ def test_without_air_layer_only_touching_nodes_carry_force(direction):
     with_air, position = make(Kaczmarek(), surface, 1, direction)
     without, _ = make(Kaczmarek(), surface, 1, direction, air_layer=False)
     nobody = np.zeros(9, dtype=bool)
-    assert not without.forces(position, 800.0, nobody).any()
+    assert not without.forces(seen(without, position, 800.0, nobody)).any()
     np.testing.assert_array_equal(
-        without.forces(position, 800.0, everyone(without)), with_air.forces(position, 800.0, nobody)
+        without.forces(seen(without, position, 800.0, everyone(without))),
+        with_air.forces(seen(with_air, position, 800.0, nobody)),
     )
     one = np.arange(9) == 3
-    downward = without.forces(position, 800.0, one)[:, 1]
+    downward = without.forces(seen(without, position, 800.0, one))[:, 1]
     assert np.flatnonzero(downward).tolist() == [3]
-    assert downward[3] == with_air.forces(position, 800.0, one)[3, 1]
+    assert downward[3] == with_air.forces(seen(with_air, position, 800.0, one))[3, 1]
 
 
 @directions
 def test_forces_grow_with_the_square_of_the_voltage_whatever_its_sign(direction):
     attraction, position = make(Kaczmarek(), SURFACES[1], 2, direction)
-    forces = [attraction.forces(position, voltage, everyone(attraction)) for voltage in (0.0, 500.0, -1000.0)]
+    forces = [
+        attraction.forces(seen(attraction, position, voltage, everyone(attraction)))
+        for voltage in (0.0, 500.0, -1000.0)
+    ]
     assert not forces[0].any()
     np.testing.assert_allclose(forces[2], 4.0 * forces[1], rtol=1e-14)
 
@@ -128,7 +135,7 @@ def test_forces_grow_with_the_square_of_the_voltage_whatever_its_sign(direction)
 def test_stiffness_by_central_differences(law, direction, surface, order, air_layer):
     attraction, position = make(law, surface, order, direction, air_layer)
     touching = np.arange(9) % 3 != 1
-    stiffness = attraction.stiffness(position, 800.0, touching).toarray()
+    stiffness = attraction.stiffness(seen(attraction, position, 800.0, touching)).toarray()
     expected = differences(attraction, position, touching)
     np.testing.assert_allclose(stiffness, expected, atol=2e-8 * np.abs(expected).max())
 
@@ -147,7 +154,7 @@ def test_normal_forces_are_minus_the_derivative_of_the_energy(law, surface, orde
     for i, unit in enumerate(np.eye(position.size)):
         step = h * unit.reshape(position.shape)
         expected[i] = -(energy(position + step) - energy(position - step)) / (2 * h)
-    forces = attraction.forces(position, 800.0, everyone(attraction)).ravel()
+    forces = attraction.forces(seen(attraction, position, 800.0, everyone(attraction))).ravel()
     np.testing.assert_allclose(forces, expected, atol=1e-8 * np.abs(expected).max())
     assert np.abs(forces[::2]).max() > 0.1 * np.abs(forces[1::2]).max()  # the sideways part is there
 
@@ -157,8 +164,8 @@ def test_trial_states_that_penetrate_count_as_touching():
     sunk, touching = position.copy(), position.copy()
     sunk[3, 1], touching[3, 1] = -1.2, -1.0
     np.testing.assert_array_equal(
-        attraction.forces(sunk, 800.0, everyone(attraction)),
-        attraction.forces(touching, 800.0, everyone(attraction)),
+        attraction.forces(seen(attraction, sunk, 800.0, everyone(attraction))),
+        attraction.forces(seen(attraction, touching, 800.0, everyone(attraction))),
     )
 
 
@@ -180,7 +187,7 @@ def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, 
         x=points.x, n=points.normal, law=rule.law, layers=LAYERS, voltage=800.0, surface=surface
     )
     form = Integral(attraction, points, Parts(2, value=True, grad=True), w)
-    forces = rule.forces(position, 800.0, None)
+    forces = rule.forces(seen(rule, position, 800.0))
     found = -form.forces(u)[pad.nodes]
     assert found[:, 1].sum() == pytest.approx(forces[:, 1].sum(), rel=total)
     if order == 2:
@@ -190,5 +197,5 @@ def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, 
         unknown = (2 * pad.nodes[:, None] + [0, 1]).ravel()
         K = -assembled(space, form.cell_tangents(u), points.cells)[unknown][:, unknown]
         np.testing.assert_allclose(
-            K.toarray(), rule.stiffness(position, 800.0, None).toarray(), atol=1e-12 * np.abs(K).max()
+            K.toarray(), rule.stiffness(seen(rule, position, 800.0)).toarray(), atol=1e-12 * np.abs(K).max()
         )

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tools.meshes import arc
+from tools.pads import seen
 from tools.refusals import refuses
 
 import evfem as ev
@@ -32,7 +33,7 @@ def test_the_full_field_of_a_flat_outline_is_the_law():
         pad, points = arc(60, radius, 2.0)
         points[:, 1] *= 0.5
         points[:, 1] += 0.1
-        local, full = (a.forces(points, 500.0, None) for a in attractions(pad, points, surface, 0.0))
+        local, full = (a.forces(seen(a, points, 500.0)) for a in attractions(pad, points, surface, 0.0))
         differences.append(full[:, 1].sum() / local[:, 1].sum() - 1.0)
     assert 0.0 < differences[2] < 1e-3
     rates = np.log2(np.divide(differences[:-1], differences[1:]))
@@ -46,9 +47,9 @@ def test_nodal_forces_are_known_to_what_counts_as_rounding():
     points[:, 1] = np.maximum(points[:, 1] - 0.005, 0.0)
     _, full = attractions(pad, points, surface)
     touching, rng = points[:, 1] <= 0.0, np.random.default_rng(5)
-    forces = full.forces(points, 361.0, touching)
+    forces = full.forces(seen(full, points, 361.0, touching))
     moved = [points + 1e-15 * rng.normal(size=points.shape) for _ in range(5)]
-    noise = max(np.abs(full.forces(there, 361.0, touching) - forces).max() for there in moved)
+    noise = max(np.abs(full.forces(seen(full, there, 361.0, touching)) - forces).max() for there in moved)
     assert 1e-14 < noise / np.abs(forces).max() < full.rounding
 
 
@@ -68,7 +69,7 @@ def test_nodal_forces_are_the_derivative_of_the_energy(quadratic):
 
     quotients = [energy(k * step) - energy(-k * step) for k in (1, 2, 3)]
     slope = (45.0 * quotients[0] - 9.0 * quotients[1] + quotients[2]) / (60.0 * step)
-    assert np.sum(full.forces(points, 1.0, None) * way) == pytest.approx(slope, rel=1e-7)
+    assert np.sum(full.forces(seen(full, points, 1.0)) * way) == pytest.approx(slope, rel=1e-7)
 
 
 def test_the_fields_stiffness_is_the_derivative_of_its_forces(monkeypatch):
@@ -90,13 +91,13 @@ def test_the_fields_stiffness_is_the_derivative_of_its_forces(monkeypatch):
             if closed[node]:
                 way[node] = [1.0, slope[node]] if axis == 0 else 0.0
             # one-sided: the insulator is on one side of it
-            ends = [full.forces(points + k * step * way, volts, None).ravel() for k in (0, 1, 2)]
+            ends = [full.forces(seen(full, points + k * step * way, volts)).ravel() for k in (0, 1, 2)]
             exact[:, 2 * node + axis] = (4.0 * ends[1] - ends[2] - 3.0 * ends[0]) / (2.0 * step)
     largest = np.abs(exact).max()
-    far = full.fringe_stiffness(points, volts, None).toarray()
+    far = full.full_stiffness(seen(full, points, volts)).toarray()
     assert np.abs(far - exact).max() < 0.03 * largest
     monkeypatch.setattr(fullfield, "APART", size)
-    one_by_one = full.fringe_stiffness(points, volts, None).toarray()
+    one_by_one = full.full_stiffness(seen(full, points, volts)).toarray()
     assert np.abs(one_by_one - exact).max() < 1e-4 * largest
 
 
@@ -104,7 +105,7 @@ def test_touching_nodes_are_pulled_as_by_the_law():
     """Where all of the outline touches, the field is that of insulator and skin in series."""
     pad, points = arc(10, 3.0, 2.0)
     points[:, 1] = 0.0
-    local, full = (a.forces(points, 300.0, None) for a in attractions(pad, points, ev.Display(y=0.0)))
+    local, full = (a.forces(seen(a, points, 300.0)) for a in attractions(pad, points, ev.Display(y=0.0)))
     assert full[:, 1].sum() == pytest.approx(local[:, 1].sum(), rel=1e-3)
     assert full[3:-3, 1] == pytest.approx(local[3:-3, 1], rel=0.13)  # four chords share out an edge
 
@@ -128,7 +129,7 @@ def test_what_is_behind_an_overhang_has_no_column():
     points[5] = points[4] + [-0.1, 0.3]
     assert full.visible(points).shape == (8, 9)
     assert 5 not in full.visible(points).indices
-    assert full.forces(points, 1.0, None)[5] == pytest.approx([0.0, 0.0])
+    assert full.forces(seen(full, points, 1.0))[5] == pytest.approx([0.0, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -146,7 +147,7 @@ def test_a_capacitance_outside_its_bounds_is_an_error(monkeypatch, beyond):
     pad, points = arc(4, 3.0, 2.0)
     points[:, 1] += 0.1
     _, full = attractions(pad, points, ev.Display(y=0.0))
-    bounds = full.bounds(*full.outline(points, full.visible(points)))
+    bounds = full.bounds(*full.outline(full.bare(points), full.visible(points)))
     edge = bounds.lower if beyond < 0.0 else bounds.upper
     found = SimpleNamespace(value=edge * (1.0 + 0.01 * beyond))
     monkeypatch.setattr(type(full), "solve", lambda *_: found)
@@ -182,7 +183,7 @@ def test_a_hovering_pad_feels_the_field_of_its_outline():
     """The same points in `rigid_field`, which takes the curve; its ends are planes of symmetry."""
     pad, points = arc(80, 3.0, 1.0, quadratic=False)
     points[:, 1] += 0.04 * (1.0 - np.cos(8.0 * np.pi * points[:, 0])) + 0.02
-    local, full = (a.forces(points, 100.0, None) for a in attractions(pad, points, ev.Display(y=0.0), 0.0))
+    local, full = (a.forces(seen(a, points, 100.0)) for a in attractions(pad, points, ev.Display(y=0.0), 0.0))
     x = np.append(points[:, 0], 1.0 + points[1:, 0])
     height = np.append(points[:, 1], points[-2::-1, 1])
     rigid = ev.electrostatics.rigid_field(x, height, slab=ev.FILM, voltage=100.0)
@@ -271,7 +272,7 @@ def test_a_pad_beside_the_electrode_is_pulled_towards_it():
     for end in (9.0, 0.013, -9.0):
         surface = ev.Display(y=0.0, electrodes=[[-20.0, end, 1.0]])
         _, full = attractions(pad, points, surface)
-        forces.append(full.forces(points, 300.0, None).sum(axis=0))
+        forces.append(full.forces(seen(full, points, 300.0)).sum(axis=0))
     on, across, beside = forces
     assert across[1] == pytest.approx(0.5 * on[1], rel=0.1)
     assert abs(beside[1]) < 1e-3 * abs(on[1])
@@ -287,7 +288,7 @@ def test_the_force_does_not_waver_when_nodes_pass_an_edge():
     forces = []
     for end in np.linspace(0.0, 0.025, 6):
         _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, end, 1.0]]))
-        forces.append(full.forces(points, 300.0, None).sum(axis=0)[0])
+        forces.append(full.forces(seen(full, points, 300.0)).sum(axis=0)[0])
     assert np.ptp(forces) < 0.01 * abs(np.mean(forces))
 
 
@@ -343,7 +344,7 @@ def test_bounds_know_how_uneven_the_display_is():
     surface = ev.Sinusoid(terms=[[0.05, 8.0, 0.3]], insulator=ev.Layer(0.02, 4.0), y=0.0)
     points[:, 1] = surface.height(points[:, 0]) + 0.01 + 0.1 * points[:, 0] ** 2
     _, full = attractions(pad, points, surface, 0.0)
-    bounds = full.bounds(*full.outline(points, full.visible(points)))
+    bounds = full.bounds(*full.outline(full.bare(points), full.visible(points)))
     value = full.solve(points).value
     assert bounds.lower < value < bounds.upper
     flat = certificate(
@@ -392,8 +393,7 @@ def test_harmonics_of_a_square_wave_add_up():
     surface = ev.Display(ev.TOUCHSCREEN, y=0.0)
     given = {"edges": facing(pad, points), "skin": skin, "harmonics": attraction.harmonics}
     flat = type(attraction)(*of, pad, surface, "normal", **given)
-    pulls = [forces[:, 1].sum() for forces in (flat.forces(points, 50.0, None),
-                                               flat.column_law.forces(points, 50.0, None))]  # fmt: skip
+    pulls = [one.forces(seen(flat, points, 50.0))[:, 1].sum() for one in (flat, flat.column_law)]
     assert pulls[0] == pytest.approx(pulls[1], rel=1e-3)
 
 
@@ -425,11 +425,11 @@ def test_the_stiffness_under_an_electrode_that_ends(monkeypatch):
     points[:, 1] += 0.01
     _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, 0.13, 1.0]]))
     monkeypatch.setattr(fullfield, "APART", len(points))
-    found = full.fringe_stiffness(points, 300.0, None).toarray()
+    found = full.full_stiffness(seen(full, points, 300.0)).toarray()
     node, step = len(points) // 2, 1e-6
     way = np.zeros_like(points)
     way[node, 1] = step
-    ends = [full.forces(points + sign * way, 300.0, None).ravel() for sign in (1.0, -1.0)]
+    ends = [full.forces(seen(full, points + sign * way, 300.0)).ravel() for sign in (1.0, -1.0)]
     exact = (ends[0] - ends[1]) / (2.0 * step)
     assert found[:, 2 * node + 1] == pytest.approx(exact, abs=1e-4 * np.abs(exact).max())
 
@@ -447,8 +447,8 @@ def test_traction_below_a_smooth_pad_is_smooth_and_normal(element):
     middle = order[np.abs(place[order, 0]) < 1.5]
     traction = frame.electrostatic_traction[model.pad.nodes][middle]
     np.testing.assert_allclose(traction[1:-1], 0.5 * (traction[2:] + traction[:-2]), rtol=0.006)
-    forces = model.attraction.forces(place, 300.0, np.zeros(len(place), bool))
-    weights = model.attraction.weights(place)
+    above = seen(model.attraction, place, 300.0)
+    forces, weights = model.attraction.forces(above), model.attraction.weights(above)
     np.testing.assert_allclose(np.hypot(*forces[middle].T), traction * weights[middle], rtol=1e-6)
     along = place[middle[2:]] - place[middle[:-2]]
     pulled = forces[middle[1:-1]]

@@ -5,6 +5,7 @@ jumps, the attraction along the normal.
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tools.pads import seen
 from tools.refusals import refuses
 from tools.solids import bent, sheet
 
@@ -201,10 +202,13 @@ def test_the_traction_along_the_normal_is_minus_the_derivative_of_its_energy(sur
         gaps = surface_state(surface, at).gap
         return float(pull.law.potential(gaps, 1000.0, pull.layers) @ pull.pad.tributary(at))
 
-    forces, found = pull.forces(points, 1000.0, far), pull.stiffness(points, 1000.0, far).toarray()
+    forces, found = (
+        pull.forces(seen(pull, points, 1000.0, far)),
+        pull.stiffness(seen(pull, points, 1000.0, far)).toarray(),
+    )
     for i in range(points.size):
         d = h * np.eye(points.size)[i].reshape(points.shape)
-        ends = [pull.forces(points + sign * d, 1000.0, far).ravel() for sign in (1, -1)]
+        ends = [pull.forces(seen(pull, points + sign * d, 1000.0, far)).ravel() for sign in (1, -1)]
         assert_allclose(found[:, i], (ends[0] - ends[1]) / (2 * h), atol=1e-7 * np.abs(found).max())
         if direction == "normal":
             slope = (energy(points + d) - energy(points - d)) / (2 * h)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tools.meshes import arc
+from tools.pads import seen
 
 import evfem as ev
 from evfem.contact.signorini import STICK
@@ -33,10 +34,10 @@ def test_without_an_electrode_below_no_attraction_is_gained(roughness):
     surface = ev.Display(y=0.0, electrodes=[[-20.0, 0.0, 1.0]])
     _, full = between(pad, points, surface, roughness)
     left, right = points[:, 0] < -0.8, points[:, 0] > 0.8
-    factor = full.tangent_factor(points, 300.0, None)
+    factor = full.tangent_factor(seen(full, points, 300.0))
     assert factor[left] == pytest.approx(1.0, abs=0.1)
     assert factor[right] == pytest.approx(0.0, abs=0.01)
-    weakening = full.negative_stiffness(points, 300.0, None)
+    weakening = full.weakening(seen(full, points, 300.0))
     assert weakening[right].max() < 0.01 * weakening[left].min()
 
 
@@ -51,18 +52,18 @@ def test_on_a_summit_the_attraction_gains_less_than_the_columns(curvature):
     pressing, more = np.zeros((2, len(points)))
     pressing[summit], more[summit] = 4e-3, 1e-6
 
-    forces = [full.forces(points, volts, None, pressing + k * more)[summit, 1] for k in (-1, 1)]
+    forces = [full.forces(seen(full, points, volts, None, pressing + k * more))[summit, 1] for k in (-1, 1)]
     gain = (forces[0] - forces[1]) / 2e-6
-    known = [a.gain_on_pressing(points, volts, None, pressing)[summit] for a in (columns, full)]
+    known = [a.gain_on_pressing(seen(a, points, volts, None, pressing))[summit] for a in (columns, full)]
     assert known[0] > 2.0 * gain
     assert 0.9 * gain < known[1] < gain + 0.35 * (known[0] - gain)
 
     points[:, 1] += 2e-3
     apart = np.zeros_like(points)
     apart[summit, 1] = 1e-6
-    forces = [full.forces(points + k * apart, volts, None)[summit, 1] for k in (-1, 1)]
+    forces = [full.forces(seen(full, points + k * apart, volts))[summit, 1] for k in (-1, 1)]
     weakening = (forces[1] - forces[0]) / 2e-6
-    known = [a.negative_stiffness(points, volts, None)[summit] for a in (columns, full)]
+    known = [a.weakening(seen(a, points, volts))[summit] for a in (columns, full)]
     assert abs(known[1] - weakening) < 0.7 * abs(known[0] - weakening)
 
 
@@ -91,8 +92,7 @@ def test_what_a_summit_gains_on_closing_and_loses_on_opening_is_the_fields():
     pressed = replace(closed, contact_force=force)
 
     def pulled(by, at):
-        place, pressing = linear.interface.resting(at), at.contact_force[:, 0]
-        return by(place, 380.0, linear.touching, pressing)[summit, 1]
+        return by(linear.pad_state(at))[summit, 1]
 
     field, columns = model.attraction.forces, model.attraction.column_law.forces
     for start, end, known in (

@@ -30,7 +30,7 @@ from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Folded, Limits, StepFailed
 from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.surface.surfaces import Flat
-from evfem.terms.attraction import NoAttraction
+from evfem.terms.traction import NoTraction
 
 SECONDS, PENALTIES, X = 0.5, (50.0, 20.0), MESH.points[PAD.nodes, 0]
 LAWS = {
@@ -155,7 +155,7 @@ def test_an_equilibrium_that_the_body_leaves_is_refused():
     interface, old, new = legal(FLAT)
     script = Script([new], (0.0, 0.0))
     script.left = StabilityRatio(1.5, SLOPES)
-    solver = Equilibrium(script, interface, NoAttraction(), Limits(TOLERANCE))
+    solver = Equilibrium(script, interface, NoTraction(), Limits(TOLERANCE))
     with pytest.raises(StepFailed, match=f"not stable: {SLOPES}, 1.5 times as hard") as failed:
         solver.step(old, Target.held(old.bone, 0.0))
     assert failed.value.unstable

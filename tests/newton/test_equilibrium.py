@@ -7,6 +7,7 @@ import pytest
 from tools.builders import INSULATOR, finger
 from tools.grids import rectangle
 from tools.meshes import block
+from tools.pads import seen
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek
@@ -48,7 +49,7 @@ def test_nodal_forces_of_an_accepted_state_balance(surface):
     nodal = model.body.tissue.forces(state.u)
     np.add.at(nodal, nodes, -(state.contact_force[:, 0] * normal + state.contact_force[:, 1] * tangent).T)
     touching = np.ones(nodes.size, dtype=bool)
-    np.add.at(nodal, nodes, -model.attraction.forces(position, 2000.0, touching))
+    np.add.at(nodal, nodes, -model.attraction.forces(seen(model.attraction, position, 2000.0, touching)))
     bone = model.mesh.node_sets["bone"]
     free = np.setdiff1d(np.arange(len(nodal)), bone)
     reaction = nodal[bone].sum(axis=0)

@@ -119,7 +119,7 @@ def test_fall_and_closing_are_those_of_the_law(law, surface):
         return law.traction(g, 500.0, layers) * A
 
     free = state.status == OPEN
-    fall, closing = linear.negative_stiffness(state), linear.gain_on_closing(state)
+    fall, closing = linear.weakening(state), linear.gain_on_closing(state)
     np.testing.assert_allclose(fall[free], -((pull(gap + 1e-5) - pull(gap - 1e-5)) / 2e-5)[free], rtol=1e-6)
     np.testing.assert_allclose(closing[free], (pull(0.0 * gap) - pull(gap))[free], rtol=1e-12)
     assert closing[free].max() > 10.0 * pull(gap).max()
@@ -141,11 +141,11 @@ def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_a
     pressing = 0.002 + 0.001 * np.arange(state.status.size)
     force = np.column_stack([pressing, np.zeros_like(pressing)])
     state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
-    place, surface = model.equilibrium.interface.resting(state), linear.interface.surface_at(state)
+    pad, surface = linear.pad_state(state), linear.interface.surface_at(state)
     slope = surface.slope[:, 0]
 
     def pull(pressed):
-        x, y = model.attraction.forces(place, 60.0, linear.touching, pressed).T
+        x, y = model.attraction.forces(replace(pad, pressing=pressed)).T
         along_normal, along_tangent = y - slope * x, x + slope * y
         return np.stack([along_normal, along_tangent], axis=1) / surface.stretch[:, None]
 
@@ -167,8 +167,8 @@ def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_i
     pressing = 0.002 + 0.001 * np.arange(state.status.size)
     force = np.column_stack([pressing, np.zeros_like(pressing)])
     state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
-    place, slope = linear.interface.resting(state), linear.interface.surface_at(state).slope[:, 0]
-    whole = linear.attraction.gain_on_pressing(place, 1200.0, linear.touching, pressing)
+    slope = linear.interface.surface_at(state).slope[:, 0]
+    whole = linear.attraction.gain_on_pressing(linear.pad_state(state))
     normal, tangent = linear.roughness(state).gain.T
     folded = whole > STABLE * np.hypot(1.0, slope)
     assert folded.any()
@@ -213,13 +213,13 @@ def test_in_vain_the_tangent_is_that_of_the_field(under_the_field):
     found = coupled(linear, state)
     assert linear.fringes
     unknowns = (2 * linear.candidates[:, None] + np.arange(2)).ravel()
-    attraction, place = model.equilibrium.attraction, linear.interface.resting(state)
-    field = attraction.fringe_stiffness(place, VOLTS, state.contact_force[:, 0]).toarray()
+    attraction, pad = model.equilibrium.attraction, linear.pad_state(state)
+    field = attraction.full_stiffness(pad).toarray()
     own = np.zeros_like(unknowns, dtype=float)
-    own[1::2] = linear.negative_stiffness(state)[linear.candidates]
+    own[1::2] = linear.weakening(state)[linear.candidates]
     coupling = field[np.ix_(unknowns, unknowns)] - np.diag(own)
     inner = slice(4, -4)  # nodes outside move along with the outermost candidates
     known = (linear.tangent.schur[:-2, :-2] - np.linalg.inv(found))[inner, inner]
     np.testing.assert_allclose(known, coupling[inner, inner], atol=1e-6 * np.abs(coupling).max())
-    by_columns = attraction.stiffness(place, VOLTS, linear.touching).toarray()[np.ix_(unknowns, unknowns)]
+    by_columns = attraction.stiffness(pad).toarray()[np.ix_(unknowns, unknowns)]
     assert np.abs(field[np.ix_(unknowns, unknowns)] - by_columns).max() > 0.01 * np.abs(coupling).max()

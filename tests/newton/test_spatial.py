@@ -167,7 +167,7 @@ def test_what_is_attracted_more_than_a_body_holds_is_a_candidate(stiff, many):
     linear.choose_candidates(state, 0.0)
     area = model.pad.tributary(model.equilibrium.interface.positions(state.u))
     most = 10.0 * model.scene.finger.law.shear_modulus / 2.0 * area
-    steep = np.flatnonzero(model.pad.free & (linear.negative_stiffness(state) > most))
+    steep = np.flatnonzero(model.pad.free & (linear.weakening(state) > most))
     assert set(steep) <= set(linear.candidates)
     assert (steep.size > 0.2 * model.pad.free.sum()) == many
 

@@ -8,15 +8,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tools.pads import seen
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.signals import PadState, electrode_charge, smallest_gap
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.barrier import rise
 from evfem.simulation.run import Run
 from evfem.simulation.works import SubstepWork
-from evfem.surface.pad import surface_state
+from evfem.terms.traction import smallest_gap
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
 SCREEN = ev.Display(ev.Layer(0.01, 3.0), friction=0.0)
@@ -168,23 +168,21 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
     position = rest + random.uniform(0.0, 0.05, rest.shape)
     position[0, 1] = -0.01
     charges = 1e3 * random.standard_normal((2, len(rest)))
-    attraction.charging.begin(attraction.charged(rest, 90.0, None, charges), seconds)
+    before = replace(seen(attraction, rest, 90.0), memory={"charges": charges})
+    attraction.begin(before, seconds)
 
-    def seen(place, voltage=120.0):
-        below = surface_state(attraction.surface, place)
-        return PadState(
-            attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool)
-        )
+    def pad(place, voltage=120.0):
+        return seen(attraction, place, voltage, pressing=np.zeros(len(rest)))
 
-    for measure in (electrode_charge, smallest_gap):
-        reading, step = measure(seen(position)), 1e-6
+    for measure in (attraction.electrode_charge, smallest_gap):
+        reading, step = measure(pad(position)), 1e-6
         for way in random.standard_normal((6, *rest.shape)):
-            if measure is electrode_charge:
+            if measure is not smallest_gap:
                 way[0, 1] = 0.0  # a touching node is held by contact
-            ends = [measure(seen(position + side * step * way)).value for side in (1.0, -1.0)]
+            ends = [measure(pad(position + side * step * way)).value for side in (1.0, -1.0)]
             slope = (ends[0] - ends[1]) / (2.0 * step)
             assert np.sum(reading.by_position * way) == pytest.approx(slope, rel=2e-5)
-        volts = [measure(seen(position, 120.0 + side)).value for side in (1.0, -1.0)]
+        volts = [measure(pad(position, 120.0 + side)).value for side in (1.0, -1.0)]
         assert reading.by_voltage == pytest.approx(500.0 * (volts[0] - volts[1]), rel=1e-9)
 
 

@@ -17,7 +17,7 @@ from evfem.simulation.run import simulate
 from evfem.solver.path import Halves
 from evfem.solver.stepping import Stepper
 from evfem.surface.surfaces import Flat
-from evfem.terms.attraction import NoAttraction
+from evfem.terms.traction import NoTraction
 
 
 class Unbooked:
@@ -40,7 +40,7 @@ class Steps:
     strategy: Strategy
     longest: float
     takes: int = 5
-    attraction = NoAttraction()
+    attraction = NoTraction()
     record: Record = field(default_factory=Record)
     ways: list = field(default_factory=list)
 

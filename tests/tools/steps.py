@@ -4,17 +4,18 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+from evfem.rooms import Room
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.mesh.mesh import raised
 from evfem.newton.control import Target
 from evfem.newton.equilibrium import Equilibrium
-from evfem.newton.friction import LawFriction, ProportionalFriction
 from evfem.newton.interface import Interface
 from evfem.newton.state import Balance, Limits, Record
 from evfem.newton.strategy import Strategy
-from evfem.rooms import Room
 from evfem.surface.pad import make_pad
+from evfem.terms.friction import LawFriction, ProportionalFriction
+from evfem.terms.traction import NoTraction
 from tools.meshes import block
 
 TOLERANCE, MU = 1e-6, 0.5
@@ -62,7 +63,7 @@ def legal(surface, kind=Interface):
     """
     interface = kind(PAD, MESH.points, surface, TOLERANCE)
     script = Script([], [])
-    equilibrium = Equilibrium(script, interface, NoAttraction(), Limits(TOLERANCE))
+    equilibrium = Equilibrium(script, interface, NoTraction(), Limits(TOLERANCE))
     old = equilibrium.rest(np.zeros(2), 0.0)
     status = np.resize([OPEN, STICK, FORWARD, BACKWARD], PAD.nodes.size)
     force = np.array([NODES[s] for s in status.tolist()])
@@ -95,7 +96,7 @@ def accepted(interface, old, states, residuals=(0.0, 0.0), target=None, tries=2)
     script = Script(states, residuals)
     limits = Limits(TOLERANCE, Strategy(iterations=tries))
     target = target or Target.held(old.bone, 0.0)
-    found = Equilibrium(script, interface, NoAttraction(), limits).step(old, target)
+    found = Equilibrium(script, interface, NoTraction(), limits).step(old, target)
     return next(k for k, state in enumerate(states) if state.u is found.u)
 
 
