@@ -12,24 +12,83 @@ from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
 from tools.refusals import refuses
 
+import evfem as ev
 from evfem.errors import InputError, StorageError
-from evfem.simulation.history import MEANINGS, csv_header, csv_line
+from evfem.simulation.history import MEANINGS, ROOM_COLUMNS, csv_header, csv_line, read_rows
 from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, Result, load
 
 #: the promised columns, and their order in history.csv
 CONTRACT = (
     "step, motion_index, motion, time, position, indentation, voltage, applied_force, "
     "applied_tangential_force, normal_force, tangential_force, electrostatic_force, "
-    "electrostatic_force_x, adhesive_force, adhesive_force_x, contact_width, real_contact_width, "
-    "min_gap, surface_sink, peak_contact_pressure, mean_contact_pressure, external_work, "
-    "electrostatic_work, adhesive_work, stored_energy, friction_dissipation, viscous_dissipation, "
-    "kinetic_energy, integrator_dissipation, snap_dissipation, source_work, leakage_dissipation, "
-    "stretch_work, field_energy, substeps, newton_iterations, relaxations, jumps, seconds"
+    "electrostatic_force_x, contact_width, real_contact_width, "
+    "min_gap, peak_contact_pressure, mean_contact_pressure, external_work, "
+    "electrostatic_work, stored_energy, friction_dissipation, viscous_dissipation, "
+    "kinetic_energy, integrator_dissipation, snap_dissipation, "
+    "substeps, newton_iterations, relaxations, jumps, seconds"
 )
+#: those that follow them where the scene has adhesion, an elastic surface, a voltage resolved in time
+OF_ROOMS = (
+    "adhesive_force, adhesive_force_x, adhesive_force_z, adhesive_work, surface_sink, source_work, "
+    "leakage_dissipation, stretch_work, field_energy"
+)
+PLANE_ROOMS = tuple(name for name in ROOM_COLUMNS if not name.endswith("_z"))
 
 
 def test_columns_are_those_of_the_contract_in_its_order():
     assert ", ".join(COLUMNS) == CONTRACT
+    assert ", ".join(ROOM_COLUMNS) == OF_ROOMS
+
+
+MOIST = ev.Dugdale(stress=0.002, reach=0.02)
+SOLVED = ev.Drive(resolved=True)
+SOFT = ev.Display(elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
+
+
+@pytest.mark.parametrize(
+    ("given", "further"),
+    [
+        ({}, ()),
+        ({"adhesion": MOIST}, ("adhesive_force", "adhesive_force_x", "adhesive_work")),
+        ({"surface": SOFT}, ("surface_sink",)),
+        (
+            {"law": ev.StrongTroxel(), "voltage": ev.Sine(50.0, 9.0), "drive": SOLVED},
+            ("source_work", "leakage_dissipation", "stretch_work", "field_energy"),
+        ),
+    ],
+    ids=["base", "adhesion", "elastic surface", "charges"],
+)
+def test_a_run_has_the_columns_of_the_rooms_of_its_scene(given, further):
+    """The others are 0 where they are asked for, but are no columns."""
+    finger, surface = ev.FingerPad(ridges=False, resolution="coarse"), given.pop("surface", ev.Display())
+    motion = [ev.Press(indentation=0.1, steps=1), ev.Wait(1e-3, steps=1)]
+    result = ev.simulate(ev.Scene(finger, surface, motion=motion, **given))
+    assert result.columns == (*COLUMNS, *further)
+    for name in ROOM_COLUMNS:
+        if name in further:
+            assert result[name] is result.in_rooms[name] is getattr(result, name)
+        else:
+            assert result[name].tolist() == getattr(result, name).tolist() == [0.0, 0.0]
+    named = tuple(name for name in further if name.endswith(("_force", "_sink", "_energy")))
+    assert all(result[name].any() for name in named)
+
+
+def test_columns_of_rooms_are_saved_and_a_history_of_an_older_version_has_them(tmp_path):
+    """Columns that the package has a meaning for, and one of a room of one's own."""
+    result = fake_result(rooms=(*PLANE_ROOMS, "film_force"))
+    result.save(tmp_path / "run.npz")
+    back = load(tmp_path / "run.npz")
+    assert back.rows == result.rows
+    assert back.columns == (*COLUMNS, *PLANE_ROOMS, "film_force")
+    result.to_csv(tmp_path / "history.csv")
+    text = (tmp_path / "history.csv").read_text()
+    assert text.splitlines()[0] == ",".join(back.columns)
+    assert read_rows(text) == result.rows
+    # 0.3 wrote them all, elsewhere in the line
+    head, *lines = csv.reader(io.StringIO(text))
+    moved = [head.index(name) for name in sorted(head)]
+    old = "\n".join(",".join(line[i] for i in moved) for line in (head, *lines))
+    assert [{**row} for row in read_rows(old)] == result.rows
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -62,11 +121,11 @@ def test_the_name_of_another_format_is_refused_with_what_writes_it(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_rows_with_a_missing_or_unknown_column_are_refused():
+def test_rows_with_a_missing_column_or_one_that_is_no_name_are_refused():
     row = fake_row(1)
     with pytest.raises(InputError, match="'time'"):
         Result.from_rows([{k: v for k, v in row.items() if k != "time"}], [], fake_result().mesh, {})
-    refuses("'extra'", Result.from_rows, [row | {"extra": 1}], [], fake_result().mesh, {})
+    refuses("'extra force'", Result.from_rows, [row | {"extra force": 1}], [], fake_result().mesh, {})
 
 
 @pytest.mark.parametrize("lacking", COLUMNS)
@@ -150,11 +209,12 @@ def test_the_table_has_every_column_without_pandas_and_with_it(monkeypatch):
 
 def test_every_column_has_a_unit_and_a_meaning():
     units = {"", "s", "mm", "V", "N/mm", "N", "MPa"}
-    assert tuple(UNITS) == tuple(MEANINGS) == COLUMNS
+    every = (*COLUMNS, *ROOM_COLUMNS)
+    assert tuple(UNITS) == tuple(MEANINGS) == every
     assert set(UNITS.values()) == units
     assert all(MEANINGS.values())
-    assert {UNITS[name] for name in COLUMNS if name.endswith("_force")} == {"N/mm"}
-    assert {UNITS[name] for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))} == {"N"}
+    assert {UNITS[name] for name in every if name.endswith("_force")} == {"N/mm"}
+    assert {UNITS[name] for name in every if name.endswith(("_work", "_energy", "_dissipation"))} == {"N"}
 
 
 def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
@@ -172,16 +232,16 @@ def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
 
 def with_depth(depth=10.0):
     scene = {"name": "fake", "total_steps": 4, "depth": depth}
-    return fake_result(provenance={"scene": scene})
+    return fake_result(provenance={"scene": scene}, rooms=PLANE_ROOMS)
 
 
 def test_a_total_has_the_same_names_over_the_depth(tmp_path):
     result = with_depth(8.0)
     total = result.total
-    per_depth = {name for name in COLUMNS if name.endswith(("_force", "_force_x", "_width"))}
-    per_depth |= {name for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))}
+    per_depth = {name for name in result.columns if name.endswith(("_force", "_force_x", "_width"))}
+    per_depth |= {name for name in result.columns if name.endswith(("_work", "_energy", "_dissipation"))}
     assert len(per_depth) == 23
-    for name in COLUMNS:
+    for name in result.columns:
         factor = 8.0 if name in per_depth else 1.0
         assert total.rows[2][name] == (
             factor * result.rows[2][name] if factor != 1.0 else result.rows[2][name]

@@ -35,9 +35,11 @@ def bar_of(ax):
     return bar
 
 
-def fake_row(step):
-    """Two steps of press, then slide; every number different and not representable in few digits."""
-    row = {name: (step + i) / 7.0 for i, name in enumerate(COLUMNS)}
+def fake_row(step, rooms=()):
+    """Two steps of press, then slide; every number different and not representable in few digits; with
+    further columns of these names.
+    """
+    row = {name: (step + i) / 7.0 for i, name in enumerate((*COLUMNS, *rooms))}
     pressing = step <= 2
     row |= {"step": step, "motion_index": int(not pressing), "motion": "press" if pressing else "slide"}
     return row | {
@@ -73,10 +75,10 @@ def fake_frame(mesh, step):
     )
 
 
-def fake_result(kind="quad", steps=4, provenance=None):
+def fake_result(kind="quad", steps=4, provenance=None, rooms=()):
     """Every second step has a frame."""
     mesh = square_mesh(kind)
-    rows = [fake_row(step) for step in range(1, steps + 1)]
+    rows = [fake_row(step, rooms) for step in range(1, steps + 1)]
     frames = [fake_frame(mesh, step) for step in range(2, steps + 1, 2)]
     return Result.from_rows(
         rows, frames, mesh, provenance or {"scene": {"name": "fake", "total_steps": steps}}
