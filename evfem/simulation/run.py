@@ -192,8 +192,8 @@ class Run:
         run = copy(self)
         run.model = model = linearised(self.model, self.state)
         ledger = self.ledger
-        own = {"sums": ledger.sums.copy(), "pull_off": replace(ledger.pull_off)}
-        run.ledger = replace(ledger, model=model, **own)
+        sums, pull_off = ledger.sums.copy(), replace(ledger.pull_off)
+        run.ledger = replace(ledger, model=model, sums=sums, pull_off=pull_off)
         run.stepper = replace(
             self.stepper, equilibrium=model.equilibrium, body=model.body, rise=partial(climb, model)
         )
