@@ -13,7 +13,7 @@ import sys as _sys
 from importlib import import_module as _import_module
 from typing import Any
 
-__version__ = "0.3.0"
+__version__ = "0.4.0.dev0"
 
 #: module -> the public names it gives
 _NAMES = {
