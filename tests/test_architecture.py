@@ -64,7 +64,7 @@ ROOMS = {
         {"numpy", "tomli_w"},
         "motion terms electrics keys probes options scene serialiser format schema file spatial",
     ),
-    "planning": ({"numpy"}, "resolution loaddrift parts plausibility fieldchoice core timescales plan"),
+    "planning": ({"numpy"}, "rooms resolution loaddrift parts plausibility fieldchoice core timescales plan"),
     "simulation": (
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",

@@ -24,6 +24,7 @@ from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_components
 from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
 from evfem.planning.resolution import oscillating, steps_line, too_fast, unresolved
+from evfem.planning.rooms import rooms_of
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
 from evfem.scene.file import scene_at
@@ -200,9 +201,10 @@ def _terms(closing: Closing, moduli: Mapping[str, float], element: str) -> Itera
     yield _contact(scene)
     yield _friction(scene)
     yield _electricity(closing)
-    if scene.adhesion is not None:
+    there = {one.name for one in rooms_of(scene)}
+    if "adhesion" in there:
         yield Term("adhesion", True, closing.adhesion_in_words)
-    if scene.field != "local" and scene.electrics.acts:
+    if {"full field", "electricity"} <= there:
         from evfem.planning.fieldchoice import chosen_field
 
         choice = chosen_field(scene, mesh)

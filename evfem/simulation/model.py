@@ -21,6 +21,7 @@ from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Limits, State
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
+from evfem.planning.rooms import rooms_of
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
@@ -125,9 +126,9 @@ def make_model(scene: Scene) -> Model:
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     closing = needed.closing
-    parts: list[Any] = [make_attraction(closing, pad, surface)] if needed.has("electricity") else []
-    if scene.adhesion is not None:
-        parts.append(make_adhesion(closing, pad, surface))
+    there = {one.name for one in rooms_of(scene)}
+    makers = (("electricity", make_attraction), ("adhesion", make_adhesion))
+    parts: list[Any] = [make(closing, pad, surface) for name, make in makers if name in there]
     own = [copy(room) for room in scene.rooms]  # what it keeps of a step is that of one model
     parts += [room for room in own if isinstance(room, PadTraction)]
     attraction = sum_of(parts)
@@ -137,7 +138,7 @@ def make_model(scene: Scene) -> Model:
         for term in scene.forms
     ]
     dynamics = None
-    if needed.has("time"):
+    if "time" in there:
         dynamics = make_dynamics(space, laws, scene.finger, solver.dynamics)
     body = Body(space, laws, terms, dynamics, [room for room in own if isinstance(room, BodyTerm)])
     deepest = (

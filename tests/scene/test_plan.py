@@ -1,6 +1,8 @@
 """What a scene needs: terms that are left out must not matter, and the numbers are those of the mesh."""
 
+import json
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ import evfem as ev
 from evfem.electrostatics.laws import eps_0
 from evfem.planning.plan import plan
 from evfem.planning.resolution import path_dependence
+from evfem.planning.rooms import KINDS, rooms_of
+from evfem.scene.schema import schema
 from evfem.simulation.model import make_model
 
 pytestmark = pytest.mark.solver
@@ -110,3 +114,30 @@ def test_forces_to_an_error_need_what_the_plan_says():
     cheap, exact = replace(scene, solver=ev.Solver.within(0.02)), ev.simulate(scene)
     assert "steps auto: no dependence on the step size, one substep for each step" in plan(cheap).solver
     assert ev.simulate(cheap).normal_force == pytest.approx(exact.normal_force, rel=0.02)
+
+
+def test_the_table_of_rooms_names_keys_of_scene_files_and_modules_that_exist():
+    """A key that the schema lacks, or a room that has moved, would be told nowhere else."""
+    listed = json.dumps(schema())
+    for kind in KINDS:
+        assert f'"{kind.key.rsplit(".", 1)[-1]}"' in listed
+        assert find_spec(f"evfem.{kind.module}")
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({"adhesion": ev.Dugdale(1e-3, 0.01)}, "adhesion"),
+        ({"hand": ev.Hand(0.1)}, "hand"),
+        (
+            {"surface": ev.Flat(friction=0.0, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))},
+            "elastic surface",
+        ),
+        ({"solver": ev.Solver(dynamics="viscous")}, "time"),
+    ],
+)
+def test_a_scene_has_the_rooms_of_its_keys(given, name):
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    plain = ev.Scene(pad, ev.Flat(friction=0.0), motion=ev.Press(indentation=0.1, speed=1.0))
+    assert [one.name for one in rooms_of(plain)] == []
+    assert [one.name for one in rooms_of(replace(plain, **given))] == [name]

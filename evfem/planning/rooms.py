@@ -1,0 +1,49 @@
+"""Which rooms a scene has: the one table from keys of a scene to capabilities, written by hand.
+
+Plan and model ask it; docs, Inside, shows it. A capability of the package is a row here, a branch of
+`evfem.simulation.model` that makes its room, and the file of the room. One of the user's own is in
+`Scene(rooms=...)`, and needs no row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from evfem.scene.scene import Scene
+from evfem.tissue.dynamics import DYNAMICS
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A capability: its `key` in a scene file, its `name` in a plan, the `module` of its room, and whether a
+    scene has it.
+    """
+
+    key: str
+    name: str
+    module: str
+    there: Callable[[Scene], bool]
+
+
+KINDS = (
+    Kind("surface.friction_law", "friction", "terms.friction", lambda scene: scene.has_friction),
+    Kind("surface.elastic", "elastic surface", "terms.foundation", lambda scene: bool(scene.ground.elastic)),
+    Kind("electrostatics", "electricity", "terms.attraction", lambda scene: scene.electrics.acts),
+    Kind("electrostatics.field", "full field", "terms.fullfield", lambda scene: scene.field != "local"),
+    Kind("electrostatics.drive", "charges", "terms.charging", lambda scene: scene.electrics.resolved),
+    Kind("adhesion", "adhesion", "terms.attraction", lambda scene: scene.adhesion is not None),
+    Kind("solver.dynamics", "time", "tissue.dynamics", lambda scene: bool(DYNAMICS[scene.solver.dynamics])),
+    Kind("hand", "hand", "terms.hand", lambda scene: scene.hand is not None),
+)
+
+
+def rooms_of(scene: Scene) -> tuple[Kind, ...]:
+    """The capabilities of the package that a scene has, in the order of `KINDS`.
+
+    >>> from evfem import Display, FingerPad, Kaczmarek, Press
+    >>> scene = Scene(FingerPad(), Display(friction=0.3), Kaczmarek(), 100.0, Press(force=0.1))
+    >>> [one.name for one in rooms_of(scene)]
+    ['friction', 'electricity']
+    """
+    return tuple(kind for kind in KINDS if kind.there(scene))
