@@ -51,18 +51,16 @@ from evfem.common.arrays import Floats, blas_limits
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.contact.signorini import OPEN
-from evfem.electrostatics.laws import traction_derivative
 from evfem.errors import InputError, quoted, readable, unknown
 from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
 from evfem.newton.control import Target, Unsupported
 from evfem.newton.state import State
-from evfem.planning.plan import scene_mesh
 from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
 from evfem.response.parameters import Parameter, parameter_of, scene_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
-from evfem.simulation.history import COLUMNS, EVERY, ROOM_COLUMNS
+from evfem.simulation.history import COLUMNS, ROOM_COLUMNS
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
@@ -92,8 +90,10 @@ class _Followed(Ledger):
 class _Differentiated:
     """A run that is followed, its parameters' lines, and the factorised matrix of the last part."""
 
-    def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], works: bool) -> None:
+    def __init__(self, scene: Scene, parameters: Mapping[str, Parameter], columns: Any) -> None:
         self.run = Run(scene, None)
+        self.columns = _columns(self.run.model.column_names, columns)
+        works = any(map(is_work, self.columns))
         self.ledger = self.run.ledger = _Followed(self.run.model)
         self.ledger.told = self._accepted
         self.centre = Beside.of(scene, None, 0.0)
@@ -115,18 +115,15 @@ class _Differentiated:
 
     def _lengths(self, state: State) -> Floats:
         """How far (mm) gaps of the pad nodes (P,) may change for differences: inf where they are closed."""
-        model = self.run.model
-        gap, attraction = model.equilibrium.interface.surface_at(state).gap, model.attraction
-        found, core = NEAR * np.abs(gap), model.closing.core
-        if attraction.law is not None and state.voltage != 0.0:
-            apart = np.maximum(gap, 0.0)
-            pull = np.asarray(attraction.law.traction(apart, state.voltage, attraction.layers))
-            rate = np.asarray(traction_derivative(attraction.law, apart, state.voltage, attraction.layers))
-            found = np.minimum(found, 2.0 * SMOOTH * np.abs(pull) / np.maximum(np.abs(rate), 1e-300))
-            if core is not None:
-                found = np.minimum(
-                    found, NEAR * np.abs(gap - core.law.line(state.voltage, attraction.layers).end)
-                )
+        model, interface = self.run.model, self.run.model.equilibrium.interface
+        gap, core = interface.surface_at(state).gap, model.closing.core
+        found, pad = NEAR * np.abs(gap), model.equilibrium.pad_state(state)
+        for part in model.attraction.parts:
+            if part.acts(state.voltage):
+                found = np.minimum(found, 2.0 * SMOOTH * part.varies_over(pad))
+        if core is not None and state.voltage != 0.0:
+            end = core.law.line(state.voltage, model.attraction.parts[0].layers).end
+            found = np.minimum(found, NEAR * np.abs(gap - end))
         return np.where(state.status == OPEN, found, np.inf)
 
     def advance(self, request: Request) -> None:
@@ -379,10 +376,7 @@ def sensitivities(
         raise InputError("parameters", "no keys", "dotted keys of the scene, and ShapeChange objects")
     known = {one.name: one for one in given}
     with blas_limits(), notices.shown(progress):
-        base = EVERY[scene_mesh(scene)[0].dim]
-        wanted = _columns((*base, *ROOM_COLUMNS), columns)
-        run = _Differentiated(scene, known, any(map(is_work, wanted)))
-        there = run.run.model.column_names
+        run = _Differentiated(scene, known, columns)
         bar = notices.bar(scene.total_steps, "step", 0, progress)
         try:
             for request in run.run.requests():
@@ -390,27 +384,27 @@ def sensitivities(
                 bar.update(1)
         finally:
             bar.close()
-    return _gathered(run, known, tuple(name for name in wanted if name in there))
+    return _gathered(run, known)
 
 
 def _columns(names: Sequence[str], columns: str | Sequence[str] | None) -> tuple[str, ...]:
-    """The columns asked for, of those with these names."""
+    """The columns asked for, of those with these names; one of a room that the scene has not is 0."""
     columns = [columns] if isinstance(columns, str) else columns
     numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
     for name in columns or ():
-        if name not in numbers:
+        if name not in (*numbers, *ROOM_COLUMNS):
             raise unknown("columns", str(name), numbers, readable(name))
     return numbers if columns is None else tuple(columns)
 
 
-def _gathered(
-    run: _Differentiated, known: Mapping[str, Parameter], columns: tuple[str, ...]
-) -> Sensitivities:
+def _gathered(run: _Differentiated, known: Mapping[str, Parameter]) -> Sensitivities:
     """What was found."""
+    columns, there = run.columns, run.run.model.column_names
     reasons = {name: COUNTED for name in columns if not differentiable(name)}
     reasons |= {line.name: reason for line in run.lines if (reason := line.reason or run.stopped)}
+    none = {name: 0.0 for name in columns if name not in there}
     values = {
-        (name, line.name): np.array([row.get(name, np.nan) for row in line.rows])
+        (name, line.name): np.array([(none | row if row else row).get(name, np.nan) for row in line.rows])
         for line in run.lines
         for name in columns
     }

@@ -196,6 +196,11 @@ class Attraction(PadTraction):
         facing = length > 0.0
         return np.where(facing, np.maximum(pad.pressed, 0.0) / np.where(facing, length, 1.0), 0.0)
 
+    def varies_over(self, pad: PadState) -> Floats:
+        at = pad.gap, self.load(pad), self.layers
+        pull, rate = np.abs(self.law.traction(*at)), np.abs(traction_derivative(self.law, *at))
+        return np.where(pull > 0.0, pull / np.maximum(rate, 1e-300), np.inf)
+
     def gain_on_pressing(self, pad: PadState) -> Floats:
         """Growth of a node's attraction per contact force (P,): the rough faces come closer."""
         if self.roughness is None:

@@ -227,6 +227,13 @@ class PadTraction(Room):
         """Decrease of a node's pull with its own vertical gap, not negative, (P,) in N/mm per mm."""
         return np.maximum(self.by_gap(pad), 0.0)
 
+    def varies_over(self, pad: PadState) -> Floats:
+        """Lengths (P,) in mm over which the pull changes with the gap, |f / (df/dg)|: derivatives of a run by
+        its parameters are differences over a small share of them.
+        """
+        pull, rate = np.abs(self.forces(pad)[:, 1]), np.abs(self.by_gap(pad))
+        return np.where(pull > 0.0, pull / np.maximum(rate, 1e-300), np.inf)
+
     def gain_on_pressing(self, pad: PadState) -> Floats:
         """Growth of a node's pull per contact force (P,)."""
         return np.zeros(len(pad.position))
