@@ -10,9 +10,9 @@ from tools.pads import seen
 from tools.refusals import refuses
 
 import evfem as ev
-from evfem.contact import fullfield
 from evfem.errors import Unresolved
 from evfem.simulation.model import make_model
+from evfem.terms import fullfield
 from evfem.terms.attraction import Attraction
 from evfem.terms.fullfield import STEEP, FieldAttraction, certificate, facing, in_line, in_sight
 

@@ -108,7 +108,7 @@ def test_where_friction_falls_with_the_speed_only_mass_helps():
         )
         told = advice(scene, None, StepFailed("nodes keep changing", [1.0]))
         known = next(term.reason for term in ev.plan(scene).terms if term.name == "friction")
-        return "try dynamics = inertial" in told, "dynamics = inertial follows it" in known
+        return "try dynamics = inertial" in told, "dynamics = inertial resolves it" in known
 
     falling, rising = ev.RateFriction(speed=5.0, ratio=0.5), ev.RateFriction(speed=5.0, exponent=0.5)
     assert told(falling, dynamics="viscous") == (True, True)

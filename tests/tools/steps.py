@@ -4,7 +4,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-from evfem.rooms import Room
 
 from evfem.common.rooms import Room
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
