@@ -83,7 +83,7 @@ def test_a_result_shows_how_far_it_came_and_its_end():
         "Result of 'fake': 4 of 4 steps, 2 with fields, 9 nodes",
         "  position 0.2 mm; indentation 1.286 mm; voltage 1.429 V",
         "  normal force 1.857 N/mm; tangential force 2 N/mm",
-        "  electrostatic force 2.143 N/mm; contact width 2.714 mm",
+        "  electrostatic force 2.143 N/mm; contact width 2.429 mm",
     ]
     caption, found, curves = rows(result._repr_html_())
     assert caption == "Result of 'fake': 4 of 4 steps, 2 with fields, 9 nodes"
@@ -98,13 +98,13 @@ def test_a_result_shows_how_far_it_came_and_its_end():
 def test_a_result_with_a_depth_shows_its_end_over_it_too():
     result = fake_result(provenance={"scene": {"name": "fake", "total_steps": 4, "depth": 10.0}})
     assert repr(result).splitlines()[3:] == [
-        "  electrostatic force 2.143 N/mm; contact width 2.714 mm",
+        "  electrostatic force 2.143 N/mm; contact width 2.429 mm",
         "  over 10 mm: normal force 18.57 N; tangential force 20 N",
-        "  electrostatic force 21.43 N; contact area 27.14 mm2",
+        "  electrostatic force 21.43 N; contact area 24.29 mm2",
     ]
     assert repr(result.total).splitlines()[2:] == [
         "  normal force 18.57 N; tangential force 20 N",
-        "  electrostatic force 21.43 N; contact area 27.14 mm2",
+        "  electrostatic force 21.43 N; contact area 24.29 mm2",
     ]
 
 

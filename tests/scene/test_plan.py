@@ -133,7 +133,7 @@ def test_the_table_of_rooms_names_keys_of_scene_files_and_modules_that_exist():
             {"surface": ev.Flat(friction=0.0, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))},
             "elastic surface",
         ),
-        ({"solver": ev.Solver(dynamics="viscous")}, "time"),
+        ({"solver": ev.Solver(dynamics="inertial")}, "time"),
     ],
 )
 def test_a_scene_has_the_rooms_of_its_keys(given, name):
