@@ -357,9 +357,9 @@ def solve_statuses(
     if problem.give is not None:
         matrix[pressed, pressed] += problem.give[place[pressed]]
     if attracted.size:
-        assert problem.attraction is not None
-        matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
-        right[own, 0] += problem.attraction.reference_gap[attracted]
+        pull: Any = problem.attraction
+        matrix[own, own] -= 1.0 / pull.negative_stiffness[attracted]
+        right[own, 0] += pull.reference_gap[attracted]
     names = whole.tobytes(), last.size
     if extra is None:
         x, d = problem.dense.solve(matrix, right, names)[:, 0], np.zeros(0)

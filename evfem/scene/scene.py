@@ -205,6 +205,16 @@ class Scene:
         return self.ground.has_friction or not isinstance(self.friction_law, Coulomb)
 
     @property
+    def has_voltage(self) -> bool:
+        """Whether there is a law for a voltage."""
+        return self.law is not None
+
+    @property
+    def is_pulled(self) -> bool:
+        """Whether a voltage or adhesion may pull the finger down."""
+        return self.has_voltage or self.adhesion is not None
+
+    @property
     def total_steps(self) -> int:
         """Number of requested steps, which is the number of rows of the history."""
         return sum(motion.steps for motion in self.motion)
@@ -268,7 +278,7 @@ def _check_parts(scene: Scene) -> None:
 
 def _check_electrostatics(scene: Scene) -> None:
     check_fields(scene, "electrostatics.")
-    if scene.law is None and scene.adhesion is None and scene.roughness_gap != 0.0:
+    if not scene.is_pulled and scene.roughness_gap != 0.0:
         allowed = "only with a law of attraction, or adhesion: without one it changes nothing"
         raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
     _check_field(scene)
@@ -352,7 +362,7 @@ def _check_motion(scene: Scene) -> None:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"
             )
-        if course.force == 0.0 and scene.law is None and scene.adhesion is None:
+        if course.force == 0.0 and not scene.is_pulled:
             raise InputError(f"{key}.force", 0.0, "larger than 0 when nothing else pulls the finger down")
 
 

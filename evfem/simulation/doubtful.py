@@ -19,6 +19,7 @@ from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 from evfem.simulation.model import Model
 from evfem.surface.pad import surface_state
+from evfem.terms.hand import drive_of
 
 #: share of the energy of motions that take time that their finite steps may dissipate
 DISSIPATED = 0.05
@@ -183,8 +184,7 @@ def _climbed(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
-    hand = scene.hand is not None and scene.hand.timed
-    if not scene.solver.timed and not hand:
+    if not (scene.solver.timed or drive_of(scene.hand).timed):
         return
     timed = np.diff(_column(rows, "time"), prepend=0.0) > 0.0
     own, energy = float(np.abs(_lost(rows, "integrator")[timed]).sum()), _energy(rows)

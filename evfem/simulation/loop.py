@@ -234,7 +234,7 @@ class Loop:
             raise InputError("duration", ABSENT, f"a time in s, needed with {' and '.join(needing)}")
         if asked.voltage is None:
             return
-        if scene.law is None:
+        if not scene.has_voltage:
             raise InputError("voltage", "a voltage without a law", "a scene with an electrostatic law")
         if isinstance(scene.electrics.voltage, SIGNALS):
             given = f"{asked.voltage:g} beside the {type(scene.electrics.voltage).__name__} of the scene"
@@ -243,7 +243,7 @@ class Loop:
     def _check_course(self, course: Course) -> None:
         """Raise InputError for a step that no motion of the scene could be."""
         scene, needing = self.scene, " and ".join(self.scene.time_needed_by)
-        if course.force == 0.0 and scene.law is None and scene.adhesion is None:
+        if course.force == 0.0 and not scene.is_pulled:
             raise InputError("force", 0.0, "larger than 0 when nothing else pulls the finger down")
         if course.distance and needing and not course.duration:
             raise InputError("duration", 0.0, f"larger than 0 where the finger moves along, with {needing}")
