@@ -68,6 +68,7 @@ class Equilibrium:
         )
         for room in (*self.rooms, self.attraction):
             state = state.remembering(room.memory(state))
+        self.attraction.begin(self.pad_state(state), 0.0)
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
 

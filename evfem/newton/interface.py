@@ -18,14 +18,14 @@ import numpy as np
 from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
 from evfem.common.rooms import Room
-from evfem.contact.condensed import COMPONENTS, Candidates
+from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.newton.state import State
 from evfem.surface.friction import with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 from evfem.surface.ways import Steps
-from evfem.terms.foundation import bed_of
+from evfem.terms.foundation import bed_of, in_laboratory
 from evfem.terms.friction import ProportionalFriction
 from evfem.terms.traction import PadState
 
@@ -124,7 +124,7 @@ class Interface:
             surface.friction_steps(constants.SHORT_RAMP * self.length), self.points[:, ::2]
         )
         self._least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
-        self.bed: Any = bed_of(surface, pad, self.length, self._least)
+        self.bed: Any = bed_of(surface, pad, self.points, self.length, self._least)
         self.bounds = ProportionalFriction()
         self.duration = 0.0
         self.neighbourhood = constants.NEIGHBOURS * self.length
@@ -180,8 +180,7 @@ class Interface:
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, dim)."""
-        force = np.einsum("pa,pak->pk", state.contact_force, self.surface_at(state).axes)
-        return np.asarray(force[:, COMPONENTS[: self.dim]])
+        return in_laboratory(state.contact_force, self.surface_at(state))
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes (P, dim - 1) in mm, along the surface's tangents."""

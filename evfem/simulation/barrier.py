@@ -75,8 +75,8 @@ def _pulled(part: SubstepWork, carried: Floats) -> Floats:
     begin = equilibrium.interface.resting(old) + carried
     begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
     ends = equilibrium.pulls(new)
-    paths = {one: part.path(ends[one.name], ends[one.name]) for one in attraction.parts}
-    work = sum(one.released_work(path, along, begin, FINE) for one, path in paths.items())
+    paths = [(one, part.path(ends[one.name], ends[one.name])) for one in attraction.parts]
+    work = sum(one.released_work(path, along, begin, FINE) for one, path in paths)
     return np.asarray(np.interp(PLACES, FINE, work))
 
 

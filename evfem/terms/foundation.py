@@ -24,6 +24,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.rooms import Column, Foundation, Room
 from evfem.contact.below import RIGID_BELOW, BelowCandidates, RigidBelow
+from evfem.contact.condensed import COMPONENTS
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
@@ -73,6 +74,8 @@ class Yielding:
 #: names in a state's memory: what the surface adds to the places of the pad's nodes relative to it, (P, dim)
 #: in mm, and its derivatives along x[, z] (P, d, dim)
 DISPLACEMENT, GRADIENT = "surface_displacement", "surface_gradient"
+#: of a foundation that remembers: the forces of contact and attraction on the pad's nodes (P, dim)
+FORCE = "surface_force"
 
 
 class Rigid(Room):
@@ -138,9 +141,9 @@ class Memoryless(Foundation):
 
 
 class Bed(Rigid):
-    """An elastic surface, `elastic`, below a `pad` with this `spacing` (mm); `least` is the smallest length
-    (mm), in space area, of a node; `surface` the same at rest. Below nodes without force that are high above
-    it is left out; under an attraction there are none.
+    """An elastic surface, `elastic`, below a `pad` whose nodes are at `rest` (P, dim) and `spacing` mm apart;
+    `least` is the smallest length (mm), in space area, of a node; `surface` the same at rest. Below nodes
+    without force that are high above it is left out; under an attraction there are none.
     """
 
     yields = True
@@ -148,12 +151,14 @@ class Bed(Rigid):
         Column("surface_sink", "mm", "largest displacement of an elastic surface into it"),
     )
 
-    def __init__(self, surface: Any, pad: Pad | Skin, spacing: float, least: float) -> None:
+    def __init__(self, surface: Any, pad: Pad | Skin, rest: Floats, spacing: float, least: float) -> None:
+        self.rest = rest
         self.surface, self.elastic, self.pad, self.least = surface, surface.elastic, pad, least
         self.spacing, self.reach = spacing, NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
         own = copy(self.elastic) if isinstance(self.elastic, Foundation) else None
         self.elastic, self._own = own or self.elastic, own or Memoryless()
+        self._remembers = own is not None
         self.columns = (*Bed.columns, *self._own.columns)
         self._left: tuple[Any, Any] = (0.0, 0.0)
 
@@ -164,7 +169,16 @@ class Bed(Rigid):
         self._last = None
 
     def accept(self, old: Any, new: Any) -> dict[str, Floats]:
-        return self._own.accept(old, new)
+        if not self._remembers:
+            return {}
+        own = {FORCE: self.pushing(new)}
+        return own | self._own.accept(old, new.remembering(own))
+
+    def pushing(self, state: Any) -> Floats:
+        """Forces of contact and attraction on the pad's nodes (P, dim)."""
+        place = self.places(self.rest + state.u[self.pad.nodes], state)
+        found = self.sloped(surface_state(self.surface, place), state)
+        return in_laboratory(state.contact_force, found) + np.asarray(state.attraction)
 
     def dissipation(self, old: Any, new: Any, seconds: float) -> float:
         return self._own.dissipation(old, new, seconds)
@@ -179,6 +193,8 @@ class Bed(Rigid):
     def memory(self, state: Any) -> dict[str, Floats]:
         nodes, dim = state.contact_force.shape
         own = {DISPLACEMENT: np.zeros((nodes, dim)), GRADIENT: np.zeros((nodes, dim - 1, dim))}
+        if self._remembers:
+            own[FORCE] = np.zeros((nodes, dim))
         return own | self._own.memory(state)
 
     def displacement(self, state: Any) -> Floats:
@@ -258,10 +274,15 @@ class Bed(Rigid):
         return Yielding(over, compliance, np.stack(slope), self._left)
 
 
-def bed_of(surface: Any, pad: Pad | Skin, spacing: float, least: float) -> Rigid:
+def in_laboratory(force: Floats, surface: SurfaceState) -> Floats:
+    """Contact forces (P, dim), along normal and tangents of the `surface`, along x, y[, z]."""
+    return np.asarray(np.einsum("pa,pak->pk", force, surface.axes)[:, COMPONENTS[: force.shape[1]]])
+
+
+def bed_of(surface: Any, pad: Pad | Skin, rest: Floats, spacing: float, least: float) -> Rigid:
     """What is below a pad: the surface's own elasticity, or none."""
     elastic = getattr(surface, "elastic", None)
-    return Rigid() if elastic is None else Bed(surface, pad, spacing, least)
+    return Rigid() if elastic is None else Bed(surface, pad, rest, spacing, least)
 
 
 def _kept(state: Any) -> Floats:
