@@ -8,11 +8,12 @@ from tools.builders import INSULATOR, finger
 from tools.grids import rectangle
 from tools.meshes import block
 from tools.pads import seen
+from tools.steps import balanced
 
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.newton.control import Target
-from evfem.newton.state import Balance, State, StepFailed, findings
+from evfem.newton.state import State, StepFailed, findings
 from evfem.newton.strategy import stuck
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
@@ -163,7 +164,7 @@ def test_residuals_do_not_count_while_the_bone_is_on_its_way(monkeypatch):
     """Small ones that stay would end the step earlier."""
     model, old = pressed(Display())
     solver = model.equilibrium
-    small = Balance(np.zeros(1), 0.01, old.attraction)
+    small = balanced(np.zeros(1), 0.01, old.attraction)
     monkeypatch.setattr(solver.body, "begin", lambda *_: old)
     monkeypatch.setattr(solver.body, "balance", lambda state, *_: (state, small))
     monkeypatch.setattr(solver.body, "advance", lambda old, state, *_: state)
@@ -192,7 +193,7 @@ def described(body, forces, u=None, status=(OPEN,)):
     reduced[body.bone] = 1e3
     for node, force in forces.items():
         reduced[body.unknowns[node]] = force
-    return findings(body, state, Balance(reduced, 1.0, state.attraction))
+    return findings(body, state, balanced(reduced, 1.0, state.attraction))
 
 
 def test_the_three_largest_forces_are_named_in_order_and_the_bones_are_left_out(body):

@@ -11,7 +11,8 @@ from evfem.mesh.mesh import raised
 from evfem.newton.control import Target
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.interface import Interface
-from evfem.newton.state import Balance, Limits, Record
+from evfem.newton.pressure import NO_PRESSURE
+from evfem.newton.state import Balance, Limits, MixedBalance, Record
 from evfem.newton.strategy import Strategy
 from evfem.surface.pad import make_pad
 from evfem.terms.friction import LawFriction, ProportionalFriction
@@ -24,6 +25,11 @@ PAD = make_pad(MESH)
 #: statuses of pad nodes in a row, with forces along normal and tangent (N/mm) that obey Coulomb's law
 NODES = {OPEN: (0.0, 0.0), STICK: (1.0, 0.3), FORWARD: (0.8, -MU * 0.8), BACKWARD: (0.6, MU * 0.6)}
 SLIP, GAP = 1e-3, 1e-2
+
+
+def balanced(forces, residual, attraction):
+    """The balance of compressible tissue."""
+    return Balance(forces, residual, attraction, MixedBalance(forces, residual, NO_PRESSURE))
 
 
 class Script:
@@ -39,7 +45,7 @@ class Script:
 
     def balance(self, state, attraction, target):
         residual = self.residuals[self.record.iterations]
-        return state, Balance(np.zeros(2), residual, attraction)
+        return state, balanced(np.zeros(2), residual, attraction)
 
     def advance(self, old, state, target, balance):
         return self.states[self.record.iterations + 1]
