@@ -12,18 +12,18 @@ from tools.threading_count import CAPABILITIES, CHECKOUT, HEART, count, units_of
 from evfem.newton.state import State
 
 #: conditionals of the heart (newton, solver, contact, simulation) that know an optional capability
-CONDITIONALS = 162
+CONDITIONALS = 105
 #: files of the heart that know one, beside its own ones and `simulation/model`
 FILES = {
     "hand": 3,
-    "elastic surface": 12,
-    "adhesion": 8,
-    "charges, drive, leakage": 10,
-    "viscosity, inertia, branches": 18,
-    "roughness": 12,
+    "elastic surface": 11,
+    "adhesion": 4,
+    "charges, drive, leakage": 5,
+    "viscosity, inertia, branches": 15,
+    "roughness": 8,
 }
 #: lines of heart and `response` that ask whether one of `ASKED` is None
-NONES = 8
+NONES = 0
 #: fields of `State`
 FIELDS = 9
 #: how far below its limit a count of lines may be, and one of files or fields

@@ -30,7 +30,7 @@ from evfem.response.file import SensitivityTable
 from evfem.scene import file as scenefile
 from evfem.scene import keys, schema
 from evfem.scene.motion import Motion
-from evfem.simulation.history import MEANINGS
+from evfem.simulation.history import MEANINGS, ROOM_COLUMNS
 from evfem.simulation.result import COLUMNS, UNITS
 from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
@@ -227,7 +227,10 @@ def test_the_notation_names_what_is_in_the_code():
                     checked += 1
     assert checked > 30
     columns = rows(sections(read("docs/notation.md"))["Columns of the history"])
-    assert tuple(name for cells in columns for name in re.findall(r"`(\w+)`", cells[0])) == COLUMNS
+    assert tuple(name for cells in columns for name in re.findall(r"`(\w+)`", cells[0])) == (
+        *COLUMNS,
+        *ROOM_COLUMNS,
+    )
 
 
 def test_the_page_about_the_inside_has_every_room_and_names_what_there_is():

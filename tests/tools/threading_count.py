@@ -60,7 +60,6 @@ CAPABILITIES = (
         "charges, drive, leakage",
         r"""charg|Sandwich|leak|lossless|conduct|source_work|field_energy|stretch_work|source_of|resolved
         |permittivit|alternat|harmonic|Drive\b""",
-        own="contact/charging contact/chargebooks contact/drivenfield",
     ),
     capability(
         "core (linear replacement)",
@@ -75,15 +74,14 @@ CAPABILITIES = (
         r"""\bbed\b|\bBed\b|Yielding|CandidatesBed|yielded|unyielded|tilted|untilted|surface_sink|\b_sunk\b
         |\b_kept\(|\.elastic\b|\belastic\b|(state|old|new|after|contact)\.given|\.strain\b|\bstrain\b
         |NO_BED|bed_of|_stretched""",
-        own="contact/bed",
     ),
     capability(
         "full field",
         r"""fringe|FieldAttraction|DrivenField|has_energy|column_law|tangent_factor|fullfield|\bfacing\b
         |chosen_field|beyond_trapezoidal|attraction\.rounding|Harmonic|\.field\b|no_progress""",
-        own="contact/fullfield contact/drivenfield planning/fieldchoice",
+        own="planning/fieldchoice",
     ),
-    capability("hand", r"\bhand\b|Hand\b|HandControl|NO_HAND|_driven\b|_hand\b", own="newton/hand"),
+    capability("hand", r"\bhand\b|Hand\b|HandControl|NO_HAND|_driven\b|_hand\b"),
     capability(
         "viscosity, inertia, branches",
         r"""dynamics|viscous|viscos|inertia|branch|kinetic|NO_RATES|\brates\b|velocity|\binner\b|\bpast\b
@@ -100,7 +98,6 @@ CAPABILITIES = (
         r"""friction_law|FrictionLaw|Coulomb|Slipping|\.slipping\b|Oscillating|oscillating|cohesion
         |slip_stiffness|chords|by_speed|by_slip|\bage\b|\baged\b|NO_AGE|known\.law|self\.law\b
         |interface\.law""",
-        own="contact/slipping",
     ),
     capability(
         "voltage that follows",
@@ -110,11 +107,6 @@ CAPABILITIES = (
         |last\.gap""",
     ),
     capability("jumps of friction", r"\bjumps\b|FrictionJumps|\bSteps\b|friction_steps|pinned|_strayed"),
-    capability(
-        "staggered coupling",
-        r"""stagger|\bfrozen\b|_frozen\b|\btogether\b|unsettled|self\.coupling|scene\.coupling|_settled
-        |_coupled|_charged\b""",
-    ),
     capability(
         "voltage ramp, path error",
         r"""\braised\b|FIRST_PART|VoltageProfile|TimeSignal|allowed\b|path_error|relative_difference""",
