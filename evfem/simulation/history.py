@@ -41,6 +41,15 @@ def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> d
     return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE_OF.get(unit, unit), "traits": traits}
 
 
+class Values(dict[str, Any]):
+    """One row by its columns; a column of a room of the package that the scene has not reads 0."""
+
+    def __missing__(self, name: str) -> float:
+        if name in ROOM_COLUMNS:
+            return 0.0
+        raise KeyError(name)
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """Every column of the history as an array over the steps.
@@ -99,7 +108,7 @@ class History:
     def rows(self) -> list[dict[str, Any]]:
         """The history as one dictionary per step, plain Python numbers."""
         columns = [np.asarray(self[name]).tolist() for name in self.columns]
-        return [dict(zip(self.columns, values, strict=True)) for values in zip(*columns, strict=True)]
+        return [Values(zip(self.columns, values, strict=True)) for values in zip(*columns, strict=True)]
 
     def __getitem__(self, name: str) -> Any:
         """A column by its name."""

@@ -27,6 +27,7 @@ from evfem.protocols import Observer, TimeSignal
 from evfem.scene.file import scene_at
 from evfem.scene.motion import FORCE, INDENTATION, VOLTAGE, Course, Motion
 from evfem.scene.scene import SIGNALS, Scene
+from evfem.simulation.history import ROOM_COLUMNS
 from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import Request, Run, Start
 from evfem.solver.path import Path
@@ -182,7 +183,7 @@ class Loop:
         self._reasons += reasons
         if reasons:
             raise StopRun("; ".join(reasons))
-        return SimpleNamespace(**self._run.rows[-1])
+        return SimpleNamespace(**(dict.fromkeys(ROOM_COLUMNS, 0.0) | self._run.rows[-1]))
 
     def result(self) -> Result:
         """All rows so far, with the fields of every n-th step (`Output.every`) and of the last."""

@@ -279,3 +279,13 @@ def test_the_summary_says_the_end_over_the_depth_too():
     whole = result.total.summary()
     assert whole["units"]["force"] == "N"
     assert "total" not in whole
+
+
+def test_columns_of_rooms_that_a_scene_has_not_read_nought():
+    """Scripts of 0.3 read them from rows and results; the files do not have them."""
+    result = fake_result()
+    assert result.rows[0]["adhesive_force"] == result["adhesive_force"][0] == result.adhesive_force[0] == 0.0
+    assert "adhesive_force" not in result.rows[0]
+    assert "adhesive_force" not in result.columns
+    with pytest.raises(KeyError):
+        result.rows[0]["adhesion"]
