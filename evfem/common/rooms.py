@@ -17,12 +17,13 @@ A room that keeps nothing, stores nothing and shows nothing inherits all of it f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,9 @@ class Room:
         return np.zeros_like(fractions)
 
     def takes_time(self, seconds: float) -> bool:
-        """Whether rates count in a substep of so many seconds: no stability is then asked for."""
+        """Whether rates count in a substep of so many seconds: what sets energy free then is no snap, as of
+        springs that relax while nothing moves.
+        """
         return False
 
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
@@ -116,6 +119,9 @@ class Foundation(Room):
     `compliance` is that of the present step; to what the forces on the pad displace the surface by, `left` of
     the displacement before the step is added, as of a surface that creeps: a Kelvin-Voigt solid with the
     relaxation time T has the compliance C h/(h + T) in a step of h seconds and leaves T/(h + T).
+
+    The states that `accept` and `dissipation` get remember the forces on the pad's nodes, `surface_force`
+    (P, dim), and what these add to their places relative to the surface, `surface_displacement` (P, dim).
     """
 
     def compliance(self, x: Floats, lengths: Floats) -> Floats:
@@ -130,3 +136,37 @@ class Foundation(Room):
     def energy(self, state: Any, force: Floats, displacement: Floats) -> float:
         """Stored energy (N mm) of a displacement (P, dim) under forces on the pad (P, dim)."""
         return 0.5 * float(np.sum(force * displacement))
+
+
+def unchangeable(room: Any) -> bool:
+    """Whether a room is a frozen dataclass with a `begin` of its own, which could keep nothing in it."""
+    frozen = is_dataclass(room) and type(room).__dataclass_params__.frozen
+    return bool(frozen and type(room).begin is not Room.begin)
+
+
+def shaped(room: Any, what: str, found: Any, wanted: Floats) -> Floats:
+    """What a room answered, if it has the shape of `wanted`; else InputError, which names the room."""
+    if np.shape(found) == wanted.shape:
+        return np.asarray(found)
+    given = f"{type(found).__name__} of shape {np.shape(found)}" if found is not None else "None"
+    raise InputError(f"{type(room).__name__}.{what}", given, f"an array of shape {wanted.shape}")
+
+
+def begun(room: Any, memory: Mapping[str, Any], kept: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What a room keeps at rest beside this `memory`, if the names are its own."""
+    for name in kept:
+        if name in memory:
+            given = f"{name}, which another room keeps"
+            raise InputError(f"{type(room).__name__}.memory", given, "a name of its own for all it keeps")
+    return kept
+
+
+def ended(room: Any, memory: Mapping[str, Any], kept: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What a room keeps at the end of a substep, if it kept the same, in the same shapes, before."""
+    for name, value in kept.items():
+        if name not in memory:
+            raise InputError(f"{type(room).__name__}.accept", name, "names that its `memory` has at rest")
+        if np.shape(value) != np.shape(memory[name]):
+            given = f"{name} of shape {np.shape(value)}"
+            raise InputError(f"{type(room).__name__}.accept", given, f"{np.shape(memory[name])} as at rest")
+    return kept

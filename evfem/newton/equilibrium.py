@@ -26,6 +26,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
+from evfem.common.rooms import begun, ended
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.newton.control import Force, Indentation, Target, Unsupported, sticks
 from evfem.newton.factorised import FactorisedBody
@@ -67,7 +68,7 @@ class Equilibrium:
             last_increment=still,
         )
         for room in (*self.rooms, self.attraction):
-            state = state.remembering(room.memory(state))
+            state = state.remembering(begun(room, state.memory, room.memory(state)))
         self.attraction.begin(self.pad_state(state), 0.0)
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
@@ -85,9 +86,9 @@ class Equilibrium:
         """The converged state with what every room keeps of it."""
         state = replace(state, last_increment=state.u - old.u)
         for room in self.rooms:
-            state = state.remembering(room.accept(old, state))
+            state = state.remembering(ended(room, old.memory, room.accept(old, state)))
         ends = self.pad_state(old), self.interface.pad_state(state, old.touching)
-        state = state.remembering(self.attraction.accept(*ends))
+        state = state.remembering(ended(self.attraction, old.memory, self.attraction.accept(*ends)))
         return state.remembering(target.drive.settled(state))
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:

@@ -34,6 +34,7 @@ from evfem.scene.spatial import check_space, needs
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
 from evfem.terms.hand import Hand
+from evfem.terms.traction import PadTraction
 from evfem.tissue.branches import KEPT_BYTES, branches_in
 from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.forms import Form
@@ -215,6 +216,15 @@ def _terms(closing: Closing, moduli: Mapping[str, float], element: str) -> Itera
     if scene.hand is not None:
         yield Term("hand", True, _hand(scene.hand))
     yield _forms(scene, mesh)
+    if scene.rooms:
+        yield Term("own rooms", True, ", ".join(_own_room(room) for room in scene.rooms))
+
+
+def _own_room(room: Any) -> str:
+    """A room of one's own, in words."""
+    if isinstance(room, PadTraction):
+        return f"{type(room).__name__} pulls on the pad ({room.name}_force)"
+    return f"{type(room).__name__} within the body"
 
 
 def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Protocol, cast, runtime_checkable
 
 from evfem.common.checks import GONE, Within, check_fields, number, one_of, real, set_frozen, yes_or_no
 from evfem.common.digest import digest
-from evfem.common.rooms import BodyTerm, Room
+from evfem.common.rooms import BodyTerm, Foundation, Room, unchangeable
 from evfem.common.views import called, changed, short, table
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
@@ -211,8 +211,9 @@ class Scene:
 
     @property
     def is_pulled(self) -> bool:
-        """Whether a voltage or adhesion may pull the finger down."""
-        return self.has_voltage or self.adhesion is not None
+        """Whether a voltage, adhesion or a traction of one's own may pull the finger down."""
+        own = any(isinstance(room, PadTraction) for room in self.rooms)
+        return self.has_voltage or self.adhesion is not None or own
 
     @property
     def total_steps(self) -> int:
@@ -269,6 +270,9 @@ def _check_parts(scene: Scene) -> None:
         if not isinstance(room, PadTraction | BodyTerm):
             allowed = "a PadTraction or a BodyTerm; a Foundation goes to elastic=, a hand to hand="
             raise InputError(f"rooms[{i}]", quoted(room), allowed)
+        if unchangeable(room):
+            allowed = "a class that is not frozen: `begin` keeps in it what a step needs"
+            raise InputError(f"rooms[{i}]", f"{type(room).__name__}, a frozen dataclass", allowed)
         if isinstance(room, PadTraction) and (names.count(room.name) > 1 or room.name in TAKEN):
             raise InputError(f"rooms[{i}].name", room.name, "a name that no other traction has")
     for i, motion in enumerate(scene.motion):
@@ -343,6 +347,10 @@ def _check_friction(scene: Scene) -> None:
 def _check_elastic(scene: Scene) -> None:
     if scene.ground.elastic is None:
         return
+    elastic = scene.ground.elastic
+    if isinstance(elastic, Foundation) and unchangeable(elastic):
+        allowed = "a class that is not frozen: `begin` keeps in it what a step needs"
+        raise InputError("surface.elastic", f"{type(elastic).__name__}, a frozen dataclass", allowed)
     found = isinstance(scene.voltage, (FollowForce, OpenCircuit, ChargeControl))
     if found or any(course.gap is not None for course in scene.courses):
         allowed = "a rigid surface, or a voltage that is given: it is not sought above an elastic surface"

@@ -30,6 +30,7 @@ from evfem.surface.friction import KINDS, Coulomb
 from evfem.surface.relief import Relief
 from evfem.surface.surfaces import Display, Profile
 from evfem.surface.textures import SURFACES
+from evfem.terms.hand import Hand
 
 
 def dump(scene: Scene) -> str:
@@ -40,6 +41,10 @@ def dump(scene: Scene) -> str:
     """
     if scene.forms:
         raise InputError("forms", "weak forms of your own", "a scene without them, for a file")
+    if scene.rooms:
+        raise InputError("rooms", "rooms of your own", "a scene without them, for a file")
+    if scene.hand is not None and type(scene.hand) is not Hand:
+        raise InputError("hand", type(scene.hand).__name__, "Hand, for a file")
     kinds = {**SURFACES, "flat": Display} if type(scene.surface) is Display else SURFACES
     surface = _of_kind(scene.surface, kinds, "surface")
     if isinstance(scene.surface, Profile):

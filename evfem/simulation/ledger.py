@@ -11,6 +11,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.contact.signorini import FORWARD, OPEN
+from evfem.errors import InputError
 from evfem.newton.state import State
 from evfem.simulation.history import ADDED, SUMS, WIDTHS
 from evfem.simulation.model import Model
@@ -98,7 +99,7 @@ class Ledger:
             **self.sums,
             "stored_energy": end.stored + end.springs,
             "kinetic_energy": end.kinetic,
-            **reduce(or_, (room.values(model, state) for room in model.shown), {}),
+            **reduce(or_, (_values(room, model, state) for room in model.shown), {}),
         }
 
     def _pulls(self, state: State, withheld: Floats) -> dict[str, tuple[Floats, float]]:
@@ -119,6 +120,17 @@ class Ledger:
         courses, axes = self.model.scene.courses[: motion_index + 1], self.model.mesh.dim - 1
         slides = [course.direction for course in courses if course.distance]
         return [0, 2][:axes], np.array((slides[-1] if slides else (1.0, 0.0))[:axes])
+
+
+def _values(room: Any, model: Model, state: State) -> dict[str, float]:
+    """What a room says of a state: all of its columns that are no sums."""
+    told, wanted = (
+        dict(room.values(model, state)),
+        {one.name for one in room.columns if not one.name.endswith(ADDED)},
+    )
+    if set(told) != wanted:
+        raise InputError(f"{type(room).__name__}.values", f"{sorted(told)}", f"its columns {sorted(wanted)}")
+    return {name: float(value) for name, value in told.items()}
 
 
 def _components(name: str, force: Floats) -> dict[str, float]:

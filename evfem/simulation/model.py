@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from copy import copy
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -129,7 +129,7 @@ def make_model(scene: Scene) -> Model:
     there = {one.name for one in rooms_of(scene)}
     makers = (("electricity", make_attraction), ("adhesion", make_adhesion))
     parts: list[Any] = [make(closing, pad, surface) for name, make in makers if name in there]
-    own = [copy(room) for room in scene.rooms]  # what it keeps of a step is that of one model
+    own = [deepcopy(room) for room in scene.rooms]  # what it keeps of a step is that of one model
     parts += [room for room in own if isinstance(room, PadTraction)]
     attraction = sum_of(parts)
     solver, laws = scene.solver, scene.finger.materials
@@ -150,7 +150,22 @@ def make_model(scene: Scene) -> Model:
     interface = make_interface(closing, pad, surface, attraction)
     factorised = FactorisedBody(body, interface, attraction, limits)
     equilibrium = Equilibrium(factorised, interface, attraction, limits)
-    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, closing)
+    model = Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, closing)
+    check_columns(model)
+    return model
+
+
+def check_columns(model: Model) -> None:
+    """Raise InputError for a column of a room whose name another one has, or that is no name."""
+    parts = (one for one in model.attraction.parts if one.name != ELECTROSTATIC)
+    told = [(one, column) for one in parts for column in one.named(model.mesh.dim)]
+    told += [(room, column) for room in model.shown for column in room.columns]
+    there = {*EVERY[2], *EVERY[3]}
+    for room, column in told:
+        if column.name in there or not column.name.isidentifier():
+            allowed = "letters, digits and _, and no name of another column"
+            raise InputError(f"{type(room).__name__}.columns", column.name, allowed)
+        there.add(column.name)
 
 
 def linearised(model: Model, state: State) -> Model:

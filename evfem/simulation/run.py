@@ -19,6 +19,7 @@ from evfem.common import notices
 from evfem.common.arrays import Floats, blas_limits
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
+from evfem.common.rooms import begun
 from evfem.errors import NotConverged, Unresolved
 from evfem.newton import control
 from evfem.newton.control import (
@@ -183,7 +184,9 @@ class Run:
         self.frames: list[Frame] = []
         self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.source.start)
-        self.state = self.state.remembering(self.model.drive.memory(self.state.bone.size))
+        self.state = self.state.remembering(
+            begun(self.model.drive, self.state.memory, self.model.drive.memory(self.state.bone.size))
+        )
         if resume is not None:
             self._restore(resume)
 

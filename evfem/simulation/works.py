@@ -272,7 +272,8 @@ class SubstepWork:
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
         """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
         new, old = self.new, self.old
-        if any(term.takes_time(self._seconds) for term in self.model.terms):
+        rooms = (*self.model.terms, *self.model.attraction.parts)
+        if any(room.takes_time(self._seconds) for room in rooms):
             return False
         moved = new.u - old.u
         along = moved - (new.bone - old.bone)

@@ -14,7 +14,7 @@ surface by less than the strain of the finger over the number of its nodes; no f
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from copy import copy
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -156,7 +156,7 @@ class Bed(Rigid):
         self.surface, self.elastic, self.pad, self.least = surface, surface.elastic, pad, least
         self.spacing, self.reach = spacing, NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
-        own = copy(self.elastic) if isinstance(self.elastic, Foundation) else None
+        own = deepcopy(self.elastic) if isinstance(self.elastic, Foundation) else None
         self.elastic, self._own = own or self.elastic, own or Memoryless()
         self._remembers = own is not None
         self.columns = (*Bed.columns, *self._own.columns)
@@ -180,8 +180,20 @@ class Bed(Rigid):
         found = self.sloped(surface_state(self.surface, place), state)
         return in_laboratory(state.contact_force, found) + np.asarray(state.attraction)
 
+    def stored(self, state: Any) -> float:
+        return self._own.stored(state)
+
+    def kinetic(self, state: Any) -> float:
+        return self._own.kinetic(state)
+
+    def work(self, old: Any, new: Any) -> float:
+        return self._own.work(old, new)
+
     def dissipation(self, old: Any, new: Any, seconds: float) -> float:
         return self._own.dissipation(old, new, seconds)
+
+    def takes_time(self, seconds: float) -> bool:
+        return self._own.takes_time(seconds)
 
     def values(self, model: Any, state: Any) -> dict[str, float]:
         own = {"surface_sink": max(0.0, float(self.sink(state).max(initial=0.0)))}

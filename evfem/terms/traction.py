@@ -168,8 +168,9 @@ class PadTraction(Room):
     """Forces on the pad's nodes that depend on where they are; here none.
 
     A traction of one's own has a `name` and `forces`, and `weakening` where these fall with the gap. Its
-    columns are NAME_force (N/mm, downwards), NAME_force_x and NAME_work (N). `begin`, `accept` and
-    the energies of a room get the `PadState` in the place of the state.
+    columns are NAME_force (N/mm, downwards), NAME_force_x and NAME_work (N). `begin` and `accept` get the
+    `PadState` in the place of the state. What it does to the energy is the work of its forces: `stored`,
+    `kinetic`, `work` and `dissipation` are not asked.
     """
 
     #: of its columns in the history

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.rooms import begun, ended, shaped
 from evfem.terms.traction import Entries, NoTraction, PadState, PadTraction
 
 #: a finger that does not touch has come off when what holds it has fallen below this share of the last pull
@@ -86,22 +87,27 @@ class Tractions(PadTraction):
         return np.asarray(sum(of(part) for part in self.parts if part.acts(pad.voltage)))
 
     def memory(self, state: Any) -> dict[str, Floats]:
-        own = {f"forces.{part.name}": np.zeros_like(state.attraction) for part in self.parts[1:]}
-        return own | {name: kept for part in self.parts for name, kept in part.memory(state).items()}
+        found = {f"forces.{part.name}": np.zeros_like(state.attraction) for part in self.parts[1:]}
+        for part in self.parts:
+            found |= begun(part, found, part.memory(state))
+        return found
 
     def begin(self, old: PadState, seconds: float) -> None:
         for part in self.parts:
             part.begin(old, seconds)
 
     def accept(self, old: PadState, new: PadState) -> dict[str, Floats]:
-        own = {f"forces.{part.name}": part.forces(new) for part in self.parts[1:]}
-        return own | {name: kept for part in self.parts for name, kept in part.accept(old, new).items()}
+        found = {f"forces.{part.name}": part.forces(new) for part in self.parts[1:]}
+        for part in self.parts:
+            found |= ended(part, old.memory, part.accept(old, new))
+        return found
 
     def forces(self, pad: PadState) -> Floats:
-        return np.asarray(sum(part.forces(pad) for part in self.parts))
+        return np.asarray(sum(shaped(one, "forces", one.forces(pad), pad.position) for one in self.parts))
 
     def forces_along(self, path: PadState) -> Floats:
-        return np.asarray(sum(part.forces_along(path) for part in self.parts))
+        found = ((one, one.forces_along(path)) for one in self.parts)
+        return np.asarray(sum(shaped(one, "forces_along", each, path.position) for one, each in found))
 
     def weights(self, pad: PadState) -> Floats:
         return self.parts[0].weights(pad)

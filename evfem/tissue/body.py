@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.rooms import BodyTerm
+from evfem.common.rooms import BodyTerm, shaped
 from evfem.tissue.dynamics import Dynamics, Static
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
@@ -94,8 +94,10 @@ class Body:
         """Internal nodal forces (N, dim)."""
         # without the bone's travel: its rounding would outweigh the small forces of a finger far from here
         total = self.tissue.forces(translated(u, -u[self.space.mesh.node_sets["bone"][0]]))
-        for term in (*self._acting, *self._own):
+        for term in self._acting:
             total = total + term.forces(u)
+        for room in self._own:
+            total = total + shaped(room, "forces", room.forces(u), u)
         return total
 
     @property
@@ -119,7 +121,9 @@ class Body:
         for term in self._acting:
             term.add_tangent(u, self.pattern, data)
         for room in self._own:
-            np.add.at(data, self.pattern.diagonal[self.unknowns], room.stiffness(u))
+            np.add.at(
+                data, self.pattern.diagonal[self.unknowns], shaped(room, "stiffness", room.stiffness(u), u)
+            )
         return self.pattern.finish(data)
 
     def whole(self, u: Floats) -> Floats:
