@@ -76,7 +76,7 @@ class Linearisation:
         self.stiffest = 0.0
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self._made_at: TangentPoint | None = None
-        self._begin = Beginning(np.zeros((0, 0)), NOTHING)
+        self._begin, self._seconds = Beginning(np.zeros((0, 0)), NOTHING), 0.0
         self._outdated = False
         self._lets_go = True
         self._status: Ints = np.zeros(0, dtype=np.int64)
@@ -96,7 +96,7 @@ class Linearisation:
         self._outdated |= self.body.drag_rate != self._drag_rate
         if self._made_at is not None:
             self._outdated |= dynamics.outdates(self._made_at.duration, duration)
-        self._begin = Beginning(old.u, old.memory)
+        self._begin, self._seconds = Beginning(old.u, old.memory), duration
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
@@ -174,7 +174,7 @@ class Linearisation:
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
-        self._made_at = TangentPoint(state, self.touching, self._begin, self.body.dynamics.step)
+        self._made_at = TangentPoint(state, self.touching, self._begin, self._seconds)
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
@@ -198,7 +198,7 @@ class Linearisation:
     def restore(self, at: TangentPoint) -> None:
         """Repeats the factorisation that the run that is resumed made at `at`."""
         self.touching = at.touched
-        self._begin = at.begin
+        self._begin, self._seconds = at.begin, at.duration
         self.body.begin(at.begin, at.duration)
         self.factorise(at.state)
 
