@@ -69,7 +69,8 @@ class Equilibrium:
         )
         for room in (*self.rooms, self.attraction):
             state = state.remembering(begun(room, state.memory, room.memory(state)))
-        self.attraction.begin(self.pad_state(state), 0.0)
+        for traction in self.attraction.keeping:
+            traction.begin(self.pad_state(state), 0.0)
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
 
@@ -78,7 +79,8 @@ class Equilibrium:
         self.interface.begin(old, target.duration)
         for room in self.rooms:
             room.begin(old, target.duration)
-        self.attraction.begin(self.pad_state(old), target.duration)
+        for traction in self.attraction.keeping:
+            traction.begin(self.pad_state(old), target.duration)
         target.voltage.begin(old)
         return target.begun(old)
 
@@ -87,8 +89,9 @@ class Equilibrium:
         state = replace(state, last_increment=state.u - old.u)
         for room in self.rooms:
             state = state.remembering(ended(room, old.memory, room.accept(old, state)))
-        ends = self.pad_state(old), self.interface.pad_state(state, old.touching)
-        state = state.remembering(ended(self.attraction, old.memory, self.attraction.accept(*ends)))
+        for traction in self.attraction.keeping:
+            ends = self.pad_state(old), self.interface.pad_state(state, old.touching)
+            state = state.remembering(ended(traction, old.memory, traction.accept(*ends)))
         return state.remembering(target.drive.settled(state))
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:

@@ -109,6 +109,7 @@ class Interface:
     dense compliance is large, the candidates follow the contact: those that are far by now are dropped.
     """
 
+    _pad_state: tuple[tuple[Any, ...], Any] = ((None,) * 4, None)
     _surfaces: tuple[tuple[Floats, Any, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
@@ -173,10 +174,19 @@ class Interface:
         return position
 
     def pad_state(self, state: State, touching: Any) -> PadState:
-        """The pad in a state as tractions see it, in a step that began with these nodes `touching` (P,)."""
+        """The pad in a state as tractions see it, in a step that began with these nodes `touching` (P,); the
+        last one is kept, as several ask for it.
+        """
+        made_of = state.u, state.status, state.contact_force, state.memory
+        last, found = self._pad_state
+        same = all(one is other for one, other in zip(made_of, last, strict=True))
+        if same and found.voltage == state.voltage and np.array_equal(found.touching, touching):
+            return found
         place, pressing = self.resting(state), state.contact_force[:, 0]
         memory, below = state.memory, self.surface_at(state)
-        return PadState(self.pad, self.surface, place, state.voltage, pressing, touching, memory, below)
+        found = PadState(self.pad, self.surface, place, state.voltage, pressing, touching, memory, below)
+        self._pad_state = made_of, found
+        return found
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, dim)."""

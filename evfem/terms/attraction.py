@@ -77,7 +77,11 @@ class Attraction(PadTraction):
 
     @property
     def flows(self) -> bool:  # type: ignore[override]
-        return self.charging.flows
+        return bool(self.charging.flows)
+
+    @property
+    def keeping(self) -> tuple[Any, ...]:
+        return (self,) if self.flows else ()
 
     def load(self, pad: PadState) -> Any:
         """What its law takes as a voltage (V)."""
@@ -101,7 +105,7 @@ class Attraction(PadTraction):
 
     def charged(self, pad: PadState, *, at_end: bool = False) -> Charged:
         """The electric state of a pad: with its charges, or those `at_end` of the step."""
-        gap, length = self.gaps(pad), self.pad.tributary(pad.position)
+        gap, length = self.gaps(pad), self._lengths(pad)
         charges = self.charging.after(gap, pad.voltage, length) if at_end else pad.memory["charges"]
         return Charged(charges, pad.voltage, gap, length)
 
@@ -132,7 +136,11 @@ class Attraction(PadTraction):
 
     def _voltages(self, gap: Any, pad: PadState) -> Any:
         """Effective voltage at gaps (P,), with that of the charges."""
-        return self.charging.effective(gap, self.load(pad), self.pad.tributary(pad.position))
+        return self.charging.effective(gap, self.load(pad), self._lengths(pad))
+
+    def _lengths(self, pad: PadState) -> Floats:
+        """Tributary lengths (..., P) in mm of the nodes on its own edges."""
+        return pad.lengths if pad.pad is self.pad else self.pad.tributary(pad.position)
 
     def _on(self, pad: PadState) -> Any:
         """1 of nodes that carry force, 0 of others."""
@@ -142,7 +150,7 @@ class Attraction(PadTraction):
         return self.forces_along(pad.path)[0]
 
     def weights(self, pad: PadState) -> Floats:
-        return self.pad.tributary(pad.position)
+        return self._lengths(pad)
 
     def forces_along(self, path: PadState) -> Floats:
         positions = path.position
@@ -150,7 +158,7 @@ class Attraction(PadTraction):
             return np.zeros_like(positions)
         gaps, on = self.gaps(path), self._on(path)
         pressure = self._of_law(self.law.traction, gaps, path)
-        weight = on * pressure * self.pad.tributary(positions)
+        weight = on * pressure * self._lengths(path)
         if self.direction == "vertical":
             forces = np.zeros_like(positions)
             forces[..., 1] = -weight
@@ -192,7 +200,7 @@ class Attraction(PadTraction):
 
     def _contact_pressure(self, pad: PadState) -> Floats:
         """Contact pressure (..., P) in MPa."""
-        length = self.pad.tributary(pad.position)
+        length = self._lengths(pad)
         facing = length > 0.0
         return np.where(facing, np.maximum(pad.pressed, 0.0) / np.where(facing, length, 1.0), 0.0)
 
@@ -214,7 +222,7 @@ class Attraction(PadTraction):
         grow with the gap, which stabilises.
         """
         rate = self._rate(self.gaps(pad), pad)
-        weakening = -self._on(pad) * rate * self.pad.tributary(pad.position)
+        weakening = -self._on(pad) * rate * self._lengths(pad)
         return np.where((pad.frame.gap > TOUCHING) & (weakening > 0.0), weakening, 0.0)
 
     def _rate(self, apart: Floats, pad: PadState) -> Any:

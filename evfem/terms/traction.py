@@ -190,6 +190,11 @@ class PadTraction(Room):
         """The tractions of which this is the sum."""
         return (self,)
 
+    @property
+    def keeping(self) -> tuple[Any, ...]:
+        """Itself if it counts from where a step begins or keeps anything from it."""
+        return (self,)
+
     #: what it is in the columns' meanings, its name if empty
     label = ""
 
@@ -303,6 +308,10 @@ class NoTraction(PadTraction):
 
     @property
     def parts(self) -> tuple[Any, ...]:
+        return ()
+
+    @property
+    def keeping(self) -> tuple[Any, ...]:
         return ()
 
     def acts(self, voltage: float) -> bool:
