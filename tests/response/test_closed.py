@@ -116,7 +116,7 @@ class Columns:
         return 0.5 * sum(k * e * e for k, e in zip(moduli, strains, strict=True))
 
 
-@pytest.mark.filterwarnings("ignore:bar and link hardly")
+@pytest.mark.filterwarnings("ignore:bar and link is almost incompressible")
 def test_a_bar_that_is_dragged_back_and_to_full_slip():
     """EA = 0.5 N, 6 mm long, pressed by p = 2e-4 MPa, mu = 0.3, drawn at one end by d: F = sqrt(2 EA mu p d)
     where it slips over F / (mu p) < L; by D less F - 2 sqrt(EA mu p D) (Masing); mu p L from d = 2.16e-3 on.
