@@ -24,7 +24,7 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
 from evfem.newton.state import State
 
-#: what of a state is combined, beside the squared voltage and what iterations change of its memory
+#: fields of a state that are combined, beside the squared voltage and the memory that iterations change
 MIXED = ("u", "contact_force", "bone")
 
 
@@ -56,21 +56,21 @@ class Anderson:
 
 
 def mixed(before: State, after: State) -> tuple[str, ...]:
-    """Names among a state's parts that iterations change."""
+    """Names of the fields of a state that iterations change."""
     kept = (name for name, one in after.memory.items() if one is not before.memory[name])
     return (*MIXED, *(f"memory.{name}" for name in kept))
 
 
 def _vector(state: State, names: tuple[str, ...]) -> Floats:
-    squared, parts = np.copysign((state.voltage / KILOVOLT) ** 2, state.voltage), state.parts
-    return np.concatenate([*(parts[name].ravel() for name in names), [squared]])
+    squared, values = np.copysign((state.voltage / KILOVOLT) ** 2, state.voltage), state.parts
+    return np.concatenate([*(values[name].ravel() for name in names), [squared]])
 
 
 def _state(state: State, vector: Floats, names: tuple[str, ...]) -> State:
-    parts = [state.parts[name] for name in names]
-    *combined, (signed,) = np.split(vector, np.cumsum([part.size for part in parts]))
+    values = [state.parts[name] for name in names]
+    *combined, (signed,) = np.split(vector, np.cumsum([value.size for value in values]))
     changed: dict[str, Any] = {
-        n: one.reshape(part.shape) for n, one, part in zip(names, combined, parts, strict=True)
+        n: one.reshape(value.shape) for n, one, value in zip(names, combined, values, strict=True)
     }
     squared = max(np.copysign(1.0, state.voltage) * signed, 0.0)
     voltage = float(np.copysign(KILOVOLT * np.sqrt(squared), state.voltage))

@@ -27,7 +27,7 @@ from evfem.common.arrays import Floats, Ints, linalg, mkl
 from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
 
-#: place of PARDISO's count of perturbed pivots among its parameters
+#: index of PARDISO's count of perturbed pivots among its parameters
 PERTURBED = 13
 
 
@@ -42,7 +42,7 @@ def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> Floats:
 
 class Pardiso:
     """Condensation by MKL PARDISO: one symbolic analysis, many factorisations. Factors
-    of `single` precision give way to double ones where they fail or are not accurate.
+    of `single` precision are replaced by double ones where they fail or are not accurate.
     """
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
@@ -75,8 +75,8 @@ class Pardiso:
     def _call(self, phase: int, b: Any, x: Any) -> int:
         self._phase.value = phase
         handle, before, after = self._fixed
-        # addresses, not `array.ctypes`: ctypes would ask that in Python, and turns a Ctrl-C that comes just
-        # then into an error of its own
+        # addresses, not `array.ctypes`: ctypes would evaluate that in Python, and turn a Ctrl-C that comes
+        # just then into another error
         values, b, x = self._values.ctypes.data, b.ctypes.data, x.ctypes.data
         # all phases with as many threads, whatever limit holds: with fewer than the analysis had, one crashes
         others = self._limit(self._threads)
@@ -85,7 +85,7 @@ class Pardiso:
         return self._error.value
 
     def _arguments(self) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
-        """What every call has in common, made once: the handle, what is before and behind the values."""
+        """Arguments that all calls share: the handle, those before and those behind the values."""
 
         def number(value: int) -> Any:
             return ctypes.byref(ctypes.c_int32(value))
@@ -113,8 +113,8 @@ class Pardiso:
             error = error or self._call(22, b, S)
             self._analysed = error == 0
             if error == 0 and self._iparm[PERTURBED] == 0 and np.isfinite(S).all() and self._accurate():
-                place = np.argsort(self._order)
-                self.schur = S[np.ix_(place, place)]
+                rank = np.argsort(self._order)
+                self.schur = S[np.ix_(rank, rank)]
                 self.schur[np.diag_indices_from(S)] -= shift
                 return
         raise Singular(f"PARDISO error {error}, {self._iparm[PERTURBED]} perturbed pivots")
@@ -150,9 +150,9 @@ class Pardiso:
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
         """Solution (n,) once the kept unknowns (m,) are known."""
-        given = state.astype(self.real)
-        given[self.kept] = kept
-        x = self._solve(333, given).astype(float, copy=False)
+        known = state.astype(self.real)
+        known[self.kept] = kept
+        x = self._solve(333, known).astype(float, copy=False)
         x[self.kept] = kept
         return x
 
@@ -162,9 +162,9 @@ class Pardiso:
         return x
 
     def close(self) -> None:
-        """Give the library's memory back.
+        """Free the library's memory.
 
-        No ufunc is asked: garbage may be collected within the end of an `np.errstate`, and CPython's context
+        No ufunc is used: garbage may be collected within the end of an `np.errstate`, and CPython's context
         variable that holds numpy's error state, read just then, goes on to point to what is freed next.
         """
         if self._open:
@@ -240,7 +240,7 @@ _OTHER = ContextVar("_OTHER", default=False)
 
 @contextmanager
 def other_solver() -> Iterator[str]:
-    """Within, SuperLU is taken in PARDISO's place; its name, "" where it is the only one."""
+    """Within, SuperLU instead of PARDISO; yields its name, "" where it is the only one."""
     token = _OTHER.set(True)
     try:
         yield "SuperLU" if mkl() else ""

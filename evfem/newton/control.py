@@ -16,7 +16,7 @@ control             known                        unknown                       e
 ==================  ===========================  ============================  ====================
 
 Without charges between the layers attraction is proportional to the squared voltage, so that this unknown
-enters linearly. `docs/howto/extend.md` builds a control of one's own.
+enters linearly. `docs/howto/extend.md` shows a user-defined control.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from evfem.terms.traction import PadState, Reading, smallest_gap
 
 #: a voltage (V) that is none
 TINY = 1e-300
-#: a given speed that changes by this fraction of the larger one jumps
+#: a prescribed speed jumps if it changes by more than this fraction of the larger one
 JUMP = 0.25
 #: why no voltage makes a gap (mm)
 TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
-#: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
+#: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown found from the friction force
 AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
 
@@ -55,7 +55,7 @@ class HeightControl:
         return height
 
     def missing(self, height: float, reaction: Floats) -> float:
-        """Upward force (N/mm) on the bone that the equation lacks at a height and reactions (2,)."""
+        """Force residual (N/mm) of the equation at a height and reactions (2,): upward force still needed."""
         return 0.0
 
     def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
@@ -88,8 +88,8 @@ class Force(HeightControl):
 
 
 class Unsupported(Indentation):
-    """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
-    begins; touched on the way, by a crest or by tissue that recovers, it gives way (`Equilibrium.step`).
+    """Unloaded finger: without contact it stays at `height`, where it is when a step begins; touched during
+    the step, by a crest or by tissue that recovers, it moves away without force (`Equilibrium.step`).
     """
 
 
@@ -123,7 +123,7 @@ class VoltageControl:
     """Control of the voltage: `voltage` (V), prescribed or the largest; `free`: it is an unknown."""
 
     free: Any = False
-    #: whether it is found from what the pad does
+    #: whether it is found from the state of the pad
     sought = False
     voltage: float = 0.0
 
@@ -132,7 +132,7 @@ class VoltageControl:
         return self
 
     def held(self, state: State) -> VoltageControl:
-        """The control while a released body goes its way."""
+        """The control during pseudo-transient continuation (`evfem.solver.relaxation`)."""
         return self
 
     def begin(self, old: State) -> None:
@@ -143,15 +143,15 @@ class VoltageControl:
         return voltage
 
     def missing(self, reaction: Floats) -> float:
-        """Force on the bone (N/mm) that the control's equation lacks at these reactions (dim,)."""
+        """Force residual (N/mm) of the control's equation at these reactions (dim,)."""
         return 0.0
 
     def lacking(self, attraction: Any, pad: PadState) -> float:
-        """Relative residual of an equation that is no balance of forces."""
+        """Relative residual of the control's equation where that is no balance of forces."""
         return 0.0
 
     def after(self, voltage: float, change: float) -> float:
-        """The voltage (V), its sign kept, after a change of its unknown, here its square in kV^2."""
+        """The updated voltage (V), its sign kept, after a change of its unknown, here its square (kV^2)."""
         squared = (voltage / KILOVOLT) ** 2 + change
         return float(np.copysign(KILOVOLT * np.sqrt(max(squared, 0.0)), voltage))
 
@@ -160,7 +160,7 @@ class VoltageControl:
         return VoltageStep(problem.solve(step))
 
     def unknowns(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, ...]:
-        """The voltage where it follows what the pad does, or nothing."""
+        """The voltage as an extra unknown where the state of the pad determines it, or nothing."""
         return ()
 
     def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
@@ -168,7 +168,7 @@ class VoltageControl:
         return True
 
     def fallback(self, old: State, found: State | None) -> VoltageControl | None:
-        """Another control where the step with this one failed (None) or has no sensible answer."""
+        """Another control where the step with this one failed (None) or has no meaningful solution."""
         return None
 
 
@@ -201,7 +201,7 @@ class ConstrainedVoltage(VoltageControl):
         raise NotImplementedError
 
     def unknown(self, step: LinearContactStep, problem: VoltageProblem) -> tuple[ExtraUnknown, Floats]:
-        """The unknown, and the part of the backward solve that a unit of it adds."""
+        """The unknown, and the state for the backward solve of a unit of it."""
         reading, prescribed = self.read(problem.attraction, problem.pad)
         saved, push = problem.pushed(self.unit(problem.attraction, problem.pad))
         row, still, own = problem.measured(reading.by_position, saved)
@@ -295,9 +295,9 @@ class FollowFriction(VoltageControl):
         self._mode = AT_ZERO if old.voltage == 0.0 else UNKNOWN
 
     def missing(self, reaction: Floats) -> float:
-        return self._lacks(reaction) if self.free else 0.0
+        return self._force_residual(reaction) if self.free else 0.0
 
-    def _lacks(self, reaction: Floats) -> float:
+    def _force_residual(self, reaction: Floats) -> float:
         return float(self.force - reaction[::2] @ np.array(self.direction))
 
     def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
@@ -320,7 +320,7 @@ class FollowFriction(VoltageControl):
         if self.free:
             return True
         forward = float(np.sign(travel @ np.array(self.direction))) or 1.0
-        lacking = forward * self._lacks(reaction)
+        lacking = forward * self._force_residual(reaction)
         if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
             self._mode = UNKNOWN
             return False
@@ -339,8 +339,8 @@ def sticks(state: State) -> bool:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: x of the bone (mm), controls of its height and of the voltage, its seconds, in space
-    (z,) (mm); x and z are those of the `drive`, behind a hand others than the bone's.
+    """Target of a step: x of the bone (mm), controls of its height and of the voltage, duration (s), in space
+    (z,) (mm); with a hand x and z are those of the `drive`, not of the bone.
     """
 
     x: float
@@ -352,7 +352,7 @@ class Target:
 
     @classmethod
     def held(cls, bone: Floats, voltage: float) -> Target:
-        """The bone at a given translation (dim,), under a given voltage.
+        """The bone at a prescribed translation (dim,), under a prescribed voltage.
 
         >>> Target.held(np.array([0.5, -0.1, 2.0]), 100.0).bone(np.zeros(3)).tolist()
         [0.5, -0.1, 2.0]
@@ -361,7 +361,7 @@ class Target:
         return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage), z=z)
 
     def bone(self, present: Floats) -> Floats:
-        """Translation of the bone (dim,) as far as it is known; the `present` one where it is not."""
+        """Prescribed translation of the bone (dim,); the `present` one in unknown components."""
         bone = np.array(present, dtype=float)
         bone[1] = self.height.known(float(present[1]))
         bone[::2] = self.drive.known(self.place, bone[::2])
@@ -390,7 +390,7 @@ class Target:
         return (*self.height.unknowns(tangent, float(bone[1])), *self.drive.unknowns(tangent, bone))
 
     def at_once(self, bone: Floats) -> Target:
-        """The target while no time passes: the bone (dim,) stays where it is along the display."""
+        """The target without time: the bone (dim,) keeps its position along the display."""
         return replace(self, x=float(bone[0]), z=tuple(bone[2:].tolist()), duration=0.0, drive=RIGID)
 
     def begun(self, old: State) -> Target:
@@ -398,11 +398,11 @@ class Target:
         return replace(self, drive=self.drive.begun(old, self.place, self.duration))
 
     def reached(self, bone: Floats) -> bool:
-        """Whether the bone's translation is, to the last digit, what is known of it."""
+        """Whether the bone's translation is the prescribed one, to the last digit."""
         return bool((self.bone(bone) == bone).all())
 
-    def going_on(self, old: State, bone: int) -> State:
-        """`old` as the next part counts it: anew where the given speed of node `bone` or drive jumps."""
+    def restart_if_speed_jumps(self, old: State, bone: int) -> State:
+        """`old`, without its time history where the prescribed speed of node `bone` or of the drive jumps."""
         if not old.memory.get("seconds", 0.0) or self.duration == 0.0:
             return old
         before, now = (

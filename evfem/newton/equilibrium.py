@@ -3,16 +3,16 @@ r"""One equilibrium step: iterations from one accepted state to the next.
 At the iterate u with contact forces :math:`\lambda` and attraction f the out-of-balance forces are
 :math:`R = f_{int}(u) - f(u) - \lambda`. Algorithm (`Equilibrium.step`)::
 
-    state <- the body's first guess for the target
+    state <- the predictor for the target
     repeat
         f <- attraction at the iterate
-        R, residual <- balance of the body, with the shares of the controls (`evfem.newton.control`)
-        accept if the bone is where it should be, the residual is below the tolerance, no open node has
-            penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
-        give up if what would be accepted has an outline that crosses itself, or is not stable
-        give up if the residual is not finite or stagnates, or after the strategy's iterations
+        R, residual <- balance of the body, with the equations of the controls (`evfem.newton.control`)
+        accept if the bone is at its prescribed position, the residual is below the tolerance, no open node
+            has penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
+        fail if a converged state has an outline that crosses itself, or is not stable
+        fail if the residual is not finite or stagnates, or after the strategy's iterations
         state <- the body's next iterate: linearise, solve contact exactly, move
-        nodes that keep crossing a jump of friction are pinned to it
+        nodes that keep crossing a discontinuity of friction are pinned to it
 
 The body is `evfem.newton.factorised.FactorisedBody`. Friction is counted from the last accepted
 state; nothing is committed before acceptance.
@@ -35,9 +35,9 @@ from evfem.newton.state import Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
 from evfem.terms.traction import TOUCHING, PadState, PadTraction
 
-#: why an equilibrium is refused that the body leaves
+#: why an unstable equilibrium is refused
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
-#: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
+#: why an equilibrium is refused whose outline crosses itself; at x in mm
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
 
 
@@ -75,7 +75,9 @@ class Equilibrium:
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
 
     def begin(self, old: State, target: Target) -> Target:
-        """A trial from `old` begins: every room counts from there. Returns the target as it then is."""
+        """Start a trial step from `old`, from which every room takes its increments. Returns the target with
+        the state of its drive.
+        """
         self.interface.begin(old, target.duration)
         for room in self.rooms:
             room.begin(old, target.duration)
@@ -85,7 +87,7 @@ class Equilibrium:
         return target.begun(old)
 
     def accept(self, old: State, state: State, target: Target) -> State:
-        """The converged state with what every room keeps of it."""
+        """The converged state with the memory of every room."""
         state = replace(state, last_increment=state.u - old.u)
         for room in self.rooms:
             state = state.remembering(ended(room, old.memory, room.accept(old, state)))
@@ -95,7 +97,7 @@ class Equilibrium:
         return state.remembering(target.drive.settled(state))
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
-        """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
+        """Attraction on the pad nodes (P, 2) in `state`; touching nodes are those of `old`, accepted last."""
         pad = replace(self.interface.pad_state(state, old.touching), voltage=voltage)
         return self.interface.tilted(state, self.attraction.forces(pad))
 
@@ -104,41 +106,43 @@ class Equilibrium:
         return self.interface.pad_state(state, state.touching)
 
     def pulls(self, state: State) -> dict[str, Floats]:
-        """Forces (P, dim) of every traction by name in an accepted state, as above a rigid surface."""
+        """Forces (P, dim) of every traction by name in an accepted state, not tilted by surface strain."""
         rest, found = self.interface.bed.untilted(state, state.attraction), {}
-        for part in self.attraction.parts[:0:-1]:
-            found[part.name] = state.memory[f"forces.{part.name}"]
-            rest = rest - found[part.name]
+        for traction in self.attraction.parts[:0:-1]:
+            found[traction.name] = state.memory[f"forces.{traction.name}"]
+            rest = rest - found[traction.name]
         first = self.attraction.parts[:1]
         return found | {one.name: rest if one.acts(state.voltage) else 0.0 * rest for one in first}
 
     def step(self, old: State, target: Target, start: State | None = None) -> State:
         """Equilibrium at `target`, friction counted from `old`; iterations begin at `start` (default `old`).
-        A loose finger that is touched gives way. Raises `StepFailed`.
+        An unloaded finger that is touched moves away without force. Raises `StepFailed`.
         """
         if not isinstance(target.height, Unsupported):
-            return self._followed(old, target, start)
-        held = replace(target, height=Indentation(float(old.bone[1])))
-        found = self._followed(old, held, start)
-        return self._given_way(old, held, found) if found.touching.any() else found
+            return self._solve_with_voltage_control(old, target, start)
+        at_fixed_height = replace(target, height=Indentation(float(old.bone[1])))
+        found = self._solve_with_voltage_control(old, at_fixed_height, start)
+        return self._find_first_touch(old, at_fixed_height, found) if found.touching.any() else found
 
-    def _given_way(self, old: State, target: Target, touched: State) -> State:
-        """The equilibrium without a force of a finger touched at `target`, from the iterate `touched`: of all
-        heights above, which are equilibria too, the one where its lowest node just does not touch.
+    def _find_first_touch(self, old: State, target: Target, touched: State) -> State:
+        """The equilibrium of an unloaded finger that was touched at `target`, found from the iterate
+        `touched`: of all heights without contact the one where the lowest node just does not touch.
         """
-        lifted = self._followed(old, replace(target, height=Force(0.0)), touched)
+        lifted = self._solve_with_voltage_control(old, replace(target, height=Force(0.0)), touched)
         gap = float(self.interface.surface_at(lifted).gap.min())
         if gap <= TOUCHING:
             return lifted
         height = Indentation(float(lifted.bone[1]) - gap + TOUCHING)
-        lowered = self._followed(old, replace(target, height=height), lifted)
+        lowered = self._solve_with_voltage_control(old, replace(target, height=height), lifted)
         return lowered if abs(lowered.reaction[1]) < SMALLEST_FORCE else lifted
 
-    def _followed(self, old: State, target: Target, start: State | None) -> State:
-        """The equilibrium at `target`, with the voltage as its control wants it."""
+    def _solve_with_voltage_control(self, old: State, target: Target, start: State | None) -> State:
+        """Solve the step with the target's voltage control; if the control cannot be satisfied, solve once
+        more at constant voltage and require that some node sticks. Raises `StepFailed`.
+        """
         found = None
         try:
-            found = self._try(old, target, start)
+            found = self._attempt(old, target, start)
         except StepFailed:
             if target.voltage.fallback(old, None) is None:
                 raise
@@ -146,14 +150,14 @@ class Equilibrium:
         if found is not None and other is None:
             return found
         assert other is not None
-        held = self._try(old, replace(target, voltage=other), start)
-        if not sticks(held):
+        at_fixed_voltage = self._attempt(old, replace(target, voltage=other), start)
+        if not sticks(at_fixed_voltage):
             raise StepFailed("the prescribed friction force was not found", self.record.residuals)
-        return held
+        return at_fixed_voltage
 
-    def _try(self, old: State, target: Target, start: State | None) -> State:
+    def _attempt(self, old: State, target: Target, start: State | None) -> State:
         try:
-            return self._find(old, target, start or old)
+            return self._newton_iterations(old, target, start or old)
         except (ContactNotSolved, StepFailed) as error:
             self.body.discard()
             reason = error.reason if isinstance(error, StepFailed) else f"contact: {error}"
@@ -163,8 +167,8 @@ class Equilibrium:
             failed.findings = "" if self._iterate is None else self.body.findings(*self._iterate)
             raise failed from error
 
-    def _find(self, old: State, target: Target, start: State) -> State:
-        """The iterations at the head of this file."""
+    def _newton_iterations(self, old: State, target: Target, start: State) -> State:
+        """Newton iterations (algorithm at the head of this file)."""
         target = self.begin(old, target)
         state = self.body.begin(old, target, start)
         residuals: list[float] = []
@@ -180,7 +184,7 @@ class Equilibrium:
             if reached and balance.residual <= self.tolerance:
                 if self._accepts(old, state, target):
                     return self._accepted(old, state, target)
-                if iteration > changed:  # other nodes are held or candidates: another problem begins
+                if iteration > changed:  # pins or candidates have changed: another problem begins
                     changed = iteration + 1
             if stuck(residuals[changed:]):
                 break
@@ -190,10 +194,10 @@ class Equilibrium:
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 
     def _accepted(self, old: State, state: State, target: Target) -> State:
-        """The balanced state with memories of body, friction, hand; raises where crossed or not stable."""
-        place = self.interface.fold(state)
-        if place is not None:
-            raise Folded(FOLDED.format(place), self.record.residuals)
+        """The converged state with its memory; raises `Folded` or `Unstable`."""
+        crossing = self.interface.fold(state)
+        if crossing is not None:
+            raise Folded(FOLDED.format(crossing), self.record.residuals)
         if (margin := self.body.leaves(old, state, target)) is not None:
             raise Unstable(NOT_STABLE.format(margin.cause, margin.ratio))
         return self.accept(old, state, target)

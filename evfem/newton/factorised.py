@@ -1,16 +1,15 @@
-r"""The finger's finite elements in an equilibrium step (`evfem.newton.equilibrium`): factorise, solve
-contact, move.
+r"""The linearised body in an equilibrium step (`evfem.newton.equilibrium`): factorise, solve contact, update.
 
 Algorithm (`FactorisedBody.advance`), one outer iteration::
 
-    factorise at the iterate if the factorisation at hand has become too old
+    factorise at the iterate if the present factorisation is outdated
     g <- forward elimination of -R
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
     next iterate <- Anderson's combination with those before (`evfem.newton.anderson`), unless it goes
-        too far, or the attraction's negative stiffness had to be scaled down; a new tangent after an
-        older one begins anew
+        too far, or the attraction's negative stiffness had to be scaled down; restarted with a new
+        tangent after an older one
 
 If contact has no solution with an older tangent, the iteration is done again with a new one.
 """
@@ -46,7 +45,9 @@ from evfem.tissue.body import Body
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """A linear step's changes: contact, bone (2,), displacements (N, 2) in mm, voltage; the usable part."""
+    """Increments of a linear step: contact, bone (2,), displacements (N, 2) in mm, voltage; the `fraction`
+    of them that is applied.
+    """
 
     contact: StepSolution
     bone: Floats
@@ -56,7 +57,7 @@ class Update:
 
 
 class FactorisedBody:
-    """The finger's finite elements: contact is solved on their condensed tangent."""
+    """The linearised body: contact is solved on the condensed tangent of the finite elements."""
 
     def __init__(self, body: Body, interface: Interface, attraction: PadTraction, limits: Limits) -> None:
         self.body, self.interface, self.limits = body, interface, limits
@@ -73,7 +74,7 @@ class FactorisedBody:
     # -- a step begins
 
     def begin(self, old: State, target: Target, start: State) -> State:
-        """Prepare everything for a step, and say where its iterations start."""
+        """Prepare a step; returns the first iterate."""
         self.linearisation.begin(old)
         state = self._first_guess(start, target).remembering(self.pressure.first(start.u))
         travel = abs(target.bone(old.bone)[1] - old.bone[1])
@@ -84,7 +85,7 @@ class FactorisedBody:
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
-        """Start of the iterations: the last increment once more, or the bone's if nothing touches."""
+        """Predictor: the last increment once more, or the bone's translation if nothing touches."""
         state = replace(state, voltage=target.voltage.guess(state.voltage))
         if state.touching.any():
             return self._extrapolated(state, target)
@@ -92,11 +93,13 @@ class FactorisedBody:
         return replace(state, u=state.u + (bone - state.bone), bone=bone)
 
     def _extrapolated(self, state: State, target: Target) -> State:
-        """As far along the last increment of the displacements as the bone's next one is along its last."""
+        """Predictor: repeat the last displacement increment, scaled so that the bone moves by its prescribed
+        increment (at most `reach` times); none if the bone reverses or a cell would collapse.
+        """
         node = self.body.space.mesh.node_sets["bone"][0]
         last, ahead = state.last_increment[node], target.increment(state.bone)
         axis = int(np.argmax(np.abs(ahead)))
-        # where the bone turns off, its last increment along the new way is rounding of either sign
+        # where the bone turns, its last increment along the new direction is rounding of either sign
         if ahead[axis] * last[axis] <= constants.TURNED * ahead[axis] ** 2:
             return state
         fraction = min(float(ahead[axis] / last[axis]), self.limits.strategy.reach)
@@ -146,7 +149,7 @@ class FactorisedBody:
     # -- one outer iteration
 
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
-        """The next iterate, with the factorisation at hand if that does and a new one if not."""
+        """The next iterate, with the present factorisation or, where that is outdated, a new one."""
         again = self._renewed
         self._renewed = self.linearisation.refactorise_if_needed(state, self.record.residuals)
         if self._renewed and not again:
@@ -154,23 +157,25 @@ class FactorisedBody:
         try:
             after = self._linear_step(old, state, target, balance)
         except ContactNotSolved:
-            if self.linearisation.made_at(state):
+            if self.linearisation.is_tangent_of(state):
                 raise
             self.linearisation.factorise(state)
             self._anderson.reset()
             after = self._linear_step(old, state, target, balance)
-        after = self._grown(old, state, target, balance, after)
-        if self._scaled_down:  # a part of the way to where it leads: no image of the map that is mixed
+        after = self._with_new_candidates(old, state, target, balance, after)
+        if self._scaled_down:  # a fraction of the update: no image of the fixed-point map
             self._anderson.reset()
             return after
-        return self._combined(state, after, target)
+        return self._accelerated(state, after, target)
 
-    def _combined(self, state: State, after: State, target: Target) -> State:
-        """Anderson's combination of `after` with iterates before; `after` if too far. Prescribed: exact."""
+    def _accelerated(self, state: State, after: State, target: Target) -> State:
+        """Anderson's combination of `after` with earlier iterates; `after` itself if that is too far.
+        Prescribed quantities keep their exact values.
+        """
         combined = self._anderson.next_iterate(state, after)
         if combined is not after:
             travel = abs(float(combined.bone[1] - state.bone[1])) if target.height.free else 0.0
-            # it may turn cells inside out, or take away a bone that nothing holds
+            # it may invert cells, or move a free bone too far
             if (
                 travel > self.travel.longest
                 or not self.body.tissue.smallest_J(combined.u) > constants.SMALLEST_J
@@ -180,8 +185,10 @@ class FactorisedBody:
         voltage = combined.voltage if target.voltage.free else after.voltage
         return replace(combined, bone=np.where(target.free, combined.bone, after.bone), voltage=voltage)
 
-    def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
-        """The next iterate; nodes that sank in become candidates, many of them start the way again."""
+    def _with_new_candidates(
+        self, old: State, state: State, target: Target, balance: Balance, after: State
+    ) -> State:
+        """The next iterate; penetrating nodes become candidates, and many new ones repeat the linear step."""
         if not self.interface.follows:
             return after
         for _ in range(constants.CANDIDATE_ROUNDS):
@@ -198,9 +205,9 @@ class FactorisedBody:
         return after
 
     def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
-        """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
+        """Solve the contact problem of the linearised body and update; halved where cells would collapse."""
         factor = self.linearisation.factor
-        saved, residual = factor.forward(-balance.of_tangent(self.linearisation.made_at(state)))
+        saved, residual = factor.forward(-balance.of_tangent(self.linearisation.is_tangent_of(state)))
         step = self._contact_step(old, state, target, residual)
         driven = target.voltage.solve(step, self._problem(saved, state))
         found, bone = self.travel.limited(step, driven.solution, state, target, self._solve)
@@ -208,7 +215,7 @@ class FactorisedBody:
             saved = saved + driven.change * driven.unit
         delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))
         update = Update(found, bone, delta, driven.change, self._largest_fraction(state.u, delta))
-        moved = self._moved(state, target, update)
+        moved = self._updated(state, target, update)
         return moved.remembering(self.pressure.after(state, balance.mixed.misfit, delta, update.fraction))
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
@@ -218,7 +225,7 @@ class FactorisedBody:
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
         known = known if rough is None else replace(known, roughness=rough[c])
-        # as exact as the iterate is worth, where contact takes many solves
+        # inexact where contact takes many solves: a fraction of the residual
         inner = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
         return LinearContactStep(
             body=tangent,
@@ -255,7 +262,7 @@ class FactorisedBody:
         unit = lambda: pushed(self.attraction.parts[0].unit(pad))  # noqa: E731
         return VoltageProblem(squared, self._solve, unit, pushed, measured, pad, self.attraction)
 
-    def _moved(self, state: State, target: Target, update: Update) -> State:
+    def _updated(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""
         c, fraction = self.linearisation.candidates, update.fraction
         force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
@@ -272,8 +279,8 @@ class FactorisedBody:
             bone=target.bone(state.bone) if whole else state.bone + fraction * update.bone,
             voltage=voltage,
         )
-        # below the candidates an elastic surface gives way as the linear step found, which knows how the
-        # attraction changed
+        # below the candidates an elastic surface moves as the linear step found, which includes the change
+        # of the attraction
         push = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
         found = c, update.contact.given, fraction
         return after.remembering(
@@ -299,9 +306,9 @@ class FactorisedBody:
         self.linearisation.factorise(state)
         still = np.zeros(len(self.linearisation.tangent.schur))
         none, found = np.zeros(self.body.reduce(state.u).size), []
-        for place in (state, ahead):
-            step = self._contact_step(state, place, target, still)
-            also = target.voltage.unknowns(step, self._problem(none, place))
+        for point in (state, ahead):
+            step = self._contact_step(state, point, target, still)
+            also = target.voltage.unknowns(step, self._problem(none, point))
             found.append(stability_ratio(replace(step, unknowns=(*step.unknowns, *also))))
         return max(found, key=lambda one: one.ratio)
 
@@ -309,23 +316,25 @@ class FactorisedBody:
 
     def leaves(self, old: State, state: State, target: Target) -> StabilityRatio | None:
         """The stability ratio of the equilibrium `state` if contact forces on crests make it unstable, by the
-        tangent at hand and by the one there, else None: iterations may come to such a state from afar. Not
+        present tangent and by the one there, else None: iterations may come to such a state from afar. Not
         tested in time, in three dimensions, and for the attraction, whose instability the iterations show.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
         if dynamics.step > 0.0 or state.bone.size == 3 or not crests.any():
             return None
-        if linearisation.refused:
+        if linearisation.outdated:
             linearisation.factorise(state)
-        found = self._pushed_out(old, state, target)
-        if found is not None and not linearisation.made_at(state):
+        found = self._crest_instability(old, state, target)
+        if found is not None and not linearisation.is_tangent_of(state):
             linearisation.factorise(state)
-            found = self._pushed_out(old, state, target)
+            found = self._crest_instability(old, state, target)
         return found
 
-    def _pushed_out(self, old: State, state: State, target: Target) -> StabilityRatio | None:
-        """Stability ratio by the present tangent without attraction, if slopes exceed 1; else None."""
+    def _crest_instability(self, old: State, state: State, target: Target) -> StabilityRatio | None:
+        """Stability ratio by the present tangent without attraction, if it is above 1 because of contact
+        forces on crests; else None.
+        """
         step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
         unattracted = replace(step.candidates, negative_stiffness=np.zeros(step.candidates.status.size))
         try:
@@ -347,12 +356,12 @@ class FactorisedBody:
         return findings(self.body, state, balance)
 
     def reusable(self) -> Reusable:
-        """Candidates, where the factorisation was made, and the last time step."""
+        """Candidates, the point of the factorisation, and the last time step."""
         linearisation = self.linearisation
         return Reusable(linearisation.candidates, linearisation.reusable, self.body.dynamics.step)
 
     def resume(self, carried: Reusable) -> None:
-        """Make the factorisation again that the interrupted run had at hand."""
+        """Repeat the factorisation that the interrupted run had."""
         self.linearisation.candidates = carried.candidates
         if (at := carried.tangent_point) is not None:
             self.pressure.check(at.state.memory.get("pressure", np.zeros((0, 0))))

@@ -1,11 +1,14 @@
-r"""The interface of pad and surface: gaps, slips and friction of the pad nodes, and the laws of contact.
+r"""Contact kinematics and conditions: gaps, slips and friction bounds of the pad nodes relative to the
+surface; the nodal data of the linear contact problem; the test that a converged state satisfies Signorini
+and Coulomb.
 
-Contact forces of a state are along the surface's normal and tangents at the node's place
-(`evfem.surface.pad.SurfaceState`). Slip is counted along the tangents, in the plane :math:`r\,\Delta x` with
-the profile's stretch r, from the last accepted place, or from the jump of friction that holds the node
-(`FrictionJumps`). A slipping node's shear force opposes its slip. With penalties the interface has a
-compliance of its own, g + lam_n / (p_n A) = 0
-and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
+Signs: gap > 0 open, :math:`\lambda_n > 0` compression, shear opposes slip. Contact forces of a state are
+along the surface's normal and tangents at the node's position (`evfem.surface.pad.SurfaceState`). Slip is
+counted along the tangents, in the plane :math:`r\,\Delta x` with the profile's stretch r, from the last
+accepted position, or from the discontinuity of friction at which the node is pinned (`FrictionJumps`). With
+penalties the interface has a compliance, g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t A) = 0
+instead of g = 0 and s = 0. General friction laws and elastic foundations enter through `bounds`
+(`evfem.terms.friction`) and `bed` (`evfem.terms.foundation`).
 """
 
 from __future__ import annotations
@@ -31,13 +34,15 @@ from evfem.terms.traction import PadState
 
 
 class FrictionJumps:
-    """Nodes that a jump of the friction coefficient, along x and in space along z, holds during a step from
-    the places `begin` (P, d); `place` (P, d) is nan for free ones.
+    """Discontinuities of the friction coefficient, along x and in space along z, and the nodes pinned to them
+    in a step that begins at the positions `begin` (P, d); `place`: positions of the pins (P, d), nan of nodes
+    without.
 
     A node slides up to a jump to higher friction and stays there while its shear force grows from the lower
-    to the higher limit; iterates alternate between its two sides. Such a node is fixed where its way crosses
-    the jump, `PIN_OFFSET` inside the rougher side, where it sticks with the higher coefficient, and is
-    released below the lower limit. A node that began the step on the rougher side is not held.
+    to the higher limit; iterates alternate between its two sides. Such a node is pinned where its path
+    crosses the discontinuity, `PIN_OFFSET` inside the rougher side, where it sticks with the higher
+    coefficient, and is unpinned below the lower limit. A node that began the step on the rougher side is not
+    pinned.
     """
 
     def __init__(self, steps: Sequence[Steps], begin: Floats) -> None:
@@ -45,7 +50,7 @@ class FrictionJumps:
         self.begin(begin)
 
     def begin(self, place: Floats) -> None:
-        """Starts a step with the nodes at these places (P, d) in mm, none held."""
+        """Starts a step with the nodes at these positions (P, d) in mm, none pinned."""
         self.place, self.lower, self._begin = np.full(place.shape, np.nan), np.zeros(len(place)), place
         self._side = [self._sides(steps, place) for steps in self.steps]
         self._changes = np.zeros((len(self.steps), len(place)), dtype=np.int64)
@@ -53,20 +58,20 @@ class FrictionJumps:
 
     @staticmethod
     def _sides(steps: Steps, place: Floats) -> Ints:
-        """How many jumps along their axis the nodes at these places have behind them (P,)."""
+        """Number of discontinuities (P,) at smaller coordinates than a node, along the axis of `steps`."""
         return np.asarray(np.searchsorted(steps.place, place[:, steps.axis], side="right"))
 
     @property
     def held(self) -> Any:
-        """Nodes at a jump, (P,) bool."""
+        """Nodes pinned to a discontinuity, (P,) bool."""
         return np.isfinite(self.place[:, 0])
 
     def at(self, place: Floats) -> Floats:
-        """Where the nodes count as being (P, d): held ones at their jump, others at `place`."""
+        """Positions for friction (P, d): pinned nodes at their pin, others at `place`."""
         return np.where(np.isfinite(self.place), self.place, place)
 
     def watch(self, place: Floats, touching: Any) -> None:
-        """Counts changes of side at the next iterate; holds a node after `CHANGES` of them."""
+        """Counts changes of side at the next iterate; pins a node after `CHANGES` of them."""
         for number, steps in enumerate(self.steps):
             side = self._sides(steps, place)
             moved = touching & (side != self._side[number]) & ~self._released
@@ -76,7 +81,7 @@ class FrictionJumps:
             self._side[number] = side
 
     def _hold(self, steps: Steps, new: Ints, which: Ints, place: Floats) -> None:
-        """Holds nodes `new` (k,) that come to the jumps `which` (k,) from their smoother side."""
+        """Pins nodes `new` (k,) that reach the discontinuities `which` (k,) from their smoother side."""
         begin, axis = self._begin[new], steps.axis
         moved = place[new] - begin
         whole = np.where(moved[:, axis] == 0.0, 1.0, moved[:, axis])
@@ -91,22 +96,22 @@ class FrictionJumps:
         self.lower[new] = np.minimum(before, behind)[from_smoother]
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
-        """Releases nodes whose shear force is below the lower `limit` (P,); returns if there were any."""
+        """Unpins nodes whose shear force is below the lower `limit` (P,); returns whether there were any."""
         return self.let_go(self.held & (np.abs(shear) < limit - weak))
 
     def let_go(self, loose: Any) -> bool:
-        """Releases these nodes (P,) bool for the rest of the step; returns whether there were any."""
+        """Unpins these nodes (P,) bool for the rest of the step; returns whether there were any."""
         self.place[loose] = np.nan
         self._released |= loose
         return bool(loose.any())
 
 
 class Interface:
-    """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh; `restored`, from
-    a voltage (V) to `PadTraction.restored`.
+    """Contact of the pad of a body with the surface; `points` (N, dim) of the undeformed mesh; `restored`:
+    the traction that a regularised law removes and keeps at a voltage (V), `PadTraction.restored`.
 
     Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where the
-    dense compliance is large, the candidates follow the contact: those that are far by now are dropped.
+    dense compliance is large, the candidates follow the contact: nodes far from it are dropped.
     """
 
     _pad_state: tuple[tuple[Any, ...], Any] = ((None,) * 4, None)
@@ -137,7 +142,7 @@ class Interface:
 
     @property
     def rooms(self) -> tuple[Room, ...]:
-        """Bounds of friction and what is below the pad."""
+        """Bounds of friction, and the elastic foundation."""
         return self.bounds, self.bed
 
     def positions(self, u: Floats) -> Floats:
@@ -145,7 +150,7 @@ class Interface:
         return self.points + u[self.pad.nodes]
 
     def places(self, state: State) -> Floats:
-        """Current positions of the pad nodes (P, dim) relative to the surface, as if it were rigid."""
+        """Relative positions r of the pad nodes (P, dim), as above a rigid surface."""
         return self.bed.places(self.positions(state.u), state)
 
     def on_display(self, state: State) -> Floats:
@@ -153,7 +158,7 @@ class Interface:
         return self.places(state)[:, ::2]
 
     def surface_at(self, state: State) -> SurfaceState:
-        """The surface below the pad nodes, kept for the last two states."""
+        """The surface below the pad nodes, cached for the last two states."""
         sunk = self.bed.displacement(state)
         for u, before, found in self._surfaces:
             if u is state.u and before is sunk:
@@ -201,17 +206,17 @@ class Interface:
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
         """Data of the contact problem at candidates c, from the attraction's changes of all pad nodes."""
-        place, surface = self.on_display(state), self.surface_at(state)[c]
+        position, surface = self.on_display(state), self.surface_at(state)[c]
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
-        friction = self.friction(old, c, self.jumps.at(place)[c])
+        friction = self.friction(old, c, self.jumps.at(position)[c])
         known = Candidates(
             surface=surface,
             slip=slip,
             force=state.contact_force[c],
             status=state.status[c],
             friction=friction,
-            friction_slope=self.surface.friction_gradient(place[c]),
+            friction_slope=self.surface.friction_gradient(position[c]),
             interface_compliance=compliance,
             negative_stiffness=negative_stiffness[c],
             gain_on_closing=gain_on_closing[c],
@@ -219,13 +224,15 @@ class Interface:
         return self.bounds.linearised(self, known, old, state, c)
 
     def withheld(self, state: State) -> Floats:
-        """Part of attraction and pressing force of closed nodes (P,) that a core takes away, N/mm."""
+        """Attraction, and as much of the pressing force, that a regularised law removes at closed nodes (P,),
+        N/mm.
+        """
         length = self.tributary(state)
         pressure = np.maximum(state.contact_force[:, 0], 0.0) / length
         return np.where(state.touching, with_core(pressure, *self.core(state)) * length, 0.0)
 
     def core(self, state: State) -> tuple[Floats, Floats]:
-        """Of closed nodes' attraction (P,) in MPa what a regularised law takes away, and leaves (above 0)."""
+        """Traction of closed nodes (P,) in MPa that a regularised law removes, and keeps (above 0)."""
         withheld, left = self.restored(state.voltage)
         return withheld, np.where(withheld > 0.0, left, 1.0)
 
@@ -237,19 +244,19 @@ class Interface:
         """Tributary lengths or areas (P,) in a state."""
         return self.tributary_of(self.places(state))
 
-    def tributary_at(self, part: tuple[State, State], place: Floats) -> Floats:
-        """Tributary lengths or areas (P,) at places (P, d) between two states; in space the mean of both."""
+    def tributary_at(self, ends: tuple[State, State], position: Floats) -> Floats:
+        """Tributary lengths or areas (P,) at positions (P, d) in a substep; in space the mean of its ends."""
         if self.dim == 2:
-            return self.tributary_of(place)
-        return np.asarray(0.5 * sum(map(self.tributary, part)))
+            return self.tributary_of(position)
+        return np.asarray(0.5 * sum(map(self.tributary, ends)))
 
-    def resistance(self, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats) -> Floats:
-        """Largest shear forces of the pad nodes (P,) at places (P, d), pressed and slipping by (P,)."""
-        return self.bounds.resistance(self, part, place, normal, slip)
+    def resistance(self, ends: tuple[State, State], position: Floats, normal: Floats, slip: Floats) -> Floats:
+        """Friction bounds (P,) at positions (P, d), with pressing forces and slips (P,), within a substep."""
+        return self.bounds.resistance(self, ends, position, normal, slip)
 
-    def limit(self, old: State, state: State, place: Floats, slip: Floats) -> Floats:
-        """Bounds of friction (P,) in N/mm of the pad nodes at places (P, d), slipping by (P,)."""
-        mu = self.friction(old, nodes := np.arange(len(place)), place)
+    def limit(self, old: State, state: State, position: Floats, slip: Floats) -> Floats:
+        """Bounds of friction (P,) in N/mm of the pad nodes at positions (P, d), slipping by (P,)."""
+        mu = self.friction(old, nodes := np.arange(len(position)), position)
         return self._bound(old, state, nodes, mu, slip)
 
     def _bound(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
@@ -260,52 +267,56 @@ class Interface:
         """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
         return np.zeros_like(old.contact_force)
 
-    def friction(self, old: State, nodes: Ints, place: Floats) -> Floats:
-        """Friction coefficient of these pad nodes (k,) at the places (k, d) in mm after the state `old`: the
-        one that contact problem and acceptance ask for.
+    def friction(self, old: State, nodes: Ints, position: Floats) -> Floats:
+        """Friction coefficient of these pad nodes (k,) at the positions (k, d) in mm after the state `old`,
+        used by the contact problem and by acceptance.
         """
-        return np.broadcast_to(np.asarray(self.surface.friction_at(place), dtype=float), len(place))
+        return np.broadcast_to(np.asarray(self.surface.friction_at(position), dtype=float), len(position))
 
     def fold(self, state: State) -> float | None:
         """x (mm) where the pad has folded, or None."""
         return self.pad.fold(self.positions(state.u), state.touching, self._down)
 
     def shallowest_penetration(self, state: State) -> float | None:
-        """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
+        """Gap (mm) of the open node that penetrates least, or None if none penetrates."""
         gap = self.surface_at(state).gap
-        sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
-        return float(gap[sunk].max()) if sunk.any() else None
+        penetrating = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
+        return float(gap[penetrating].max()) if penetrating.any() else None
 
-    def _strayed(self, old: State, state: State, place: Floats) -> Any:
-        """Pinned nodes (P,) that slipped to another coefficient, or whose interface no longer holds them."""
-        nodes = np.arange(len(place))
-        pinned = self.friction(old, nodes, self.jumps.at(place))
-        here, slips = self.friction(old, nodes, place), state.status >= FORWARD
-        yielded = sizes(place - self.jumps.at(place)) > self.tolerance * self.length
+    def _strayed(self, old: State, state: State, position: Floats) -> Any:
+        """Pinned nodes (P,) that left their discontinuity: they slip where the coefficient is another one, or
+        yield in the interface under more than its bound.
+        """
+        nodes = np.arange(len(position))
+        pinned = self.friction(old, nodes, self.jumps.at(position))
+        here, slips = self.friction(old, nodes, position), state.status >= FORWARD
+        yielded = sizes(position - self.jumps.at(position)) > self.tolerance * self.length
         resting = self._bound(old, state, nodes, here, np.zeros(nodes.size))
-        beyond = sizes(state.contact_force[:, 1:]) > resting + self._weak(state)
+        beyond = sizes(state.contact_force[:, 1:]) > resting + self._force_tolerance(state)
         return self.jumps.held & (pinned != here) & (slips | (yielded & beyond))
 
-    def _weak(self, state: State) -> float:
-        """Forces (N/mm) below which a law of contact or friction holds."""
+    def _force_tolerance(self, state: State) -> float:
+        """Tolerance (N/mm) of the conditions of contact and friction."""
         return self.tolerance * max(float(np.abs(state.contact_force).max()), constants.SMALLEST_FORCE)
 
     def obeyed(self, old: State, state: State) -> bool:
-        """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
-        place, surface = self.on_display(state), self.surface_at(state)
-        short, weak, active = self.tolerance * self.length, self._weak(state), state.status != OPEN
-        every, resting = np.arange(len(place)), np.zeros(len(place))
+        """Whether Signorini and Coulomb hold at the present positions: closed gaps, stick, slip directions
+        and friction cones. Unpins nodes that left their discontinuity of friction.
+        """
+        position, surface = self.on_display(state), self.surface_at(state)
+        short, weak, active = self.tolerance * self.length, self._force_tolerance(state), state.status != OPEN
+        every, resting = np.arange(len(position)), np.zeros(len(position))
         lower = self._bound(old, state, every, self.jumps.lower, resting)
         if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
-        if self.jumps.let_go(self._strayed(old, state, place)):
+        if self.jumps.let_go(self._strayed(old, state, position)):
             return False
         normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         compliance = self.compliance(old)[active]
         slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
         status, nodes = state.status[active], np.flatnonzero(active)
         slid, size = sizes(slip), sizes(shear)
-        mu = self.friction(old, nodes, self.jumps.at(place)[active])
+        mu = self.friction(old, nodes, self.jumps.at(position)[active])
         limit = self._bound(old, state, nodes, mu, np.where(status == STICK, 0.0, slid))
         sticks = (slid <= short) & (size <= limit + weak)
         # a slip is known to `short`, and its direction accordingly
@@ -318,7 +329,7 @@ class Interface:
 
 
 class PenaltyInterface(Interface):
-    """An interface that yields by 1 / (penalty x tributary length) per node; N/mm3, normal and tangent."""
+    """Penalty contact: compliance 1 / (penalty x tributary length) per node; N/mm3, normal and tangent."""
 
     penalties: tuple[float, float] = (np.inf, np.inf)
 
@@ -328,7 +339,7 @@ class PenaltyInterface(Interface):
 
 
 def slipped(interface: Interface, old: State, new: State) -> Floats:
-    """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left;
+    """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they opened;
     along the mean of the surface's tangents.
     """
     moved = interface.on_display(new) - interface.on_display(old)

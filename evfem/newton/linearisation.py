@@ -1,5 +1,4 @@
-r"""The body's tangent as a step uses it: which nodes may touch, where it was factorised, and for
-how long that serves.
+r"""The tangent of a step: contact candidates, factorisation, and the decision when to factorise again.
 
 A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_needed`)::
 
@@ -9,8 +8,9 @@ A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_
         the residual has stalled, or falls so slowly that more iterations than `patience` would be left
     S <- Schur complement on (candidates, bone),  C <- (S_cc - coupling)^-1
 
-The coupling is the stiffness that the attraction's tributary lengths add between neighbouring
-nodes; under the full field, once iterations gain nothing, that of the field itself.
+The coupling is the stiffness that the attraction's tributary lengths add between neighbouring nodes;
+under the full field, once iterations stagnate, also that of the fringe field: the electric field beyond
+that of parallel plates, at edges and ridges.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from evfem.tissue.body import Body
 
 def no_progress(residuals: list[float], same: bool) -> bool:
     """Whether iterations stagnate: over the last two with the `same` nodes in contact, or over the last four
-    with the bone in its place.
+    with the bone at its prescribed position.
 
     >>> no_progress([1e-2, 2e-2, 5e-2], True), no_progress([1e-2, 2e-2, 5e-2], False)
     (True, False)
@@ -48,8 +48,8 @@ def limited_gain(gain: Floats) -> Floats:
     """Gains of the attraction per contact force (P,), limited for the tangent.
 
     At a gain of 1 the node's equilibrium has a fold; above, the force grows by itself until the rough faces
-    are close. Iterations shall leave such a point, and converge to one below 1 with its own tangent: above
-    `STABLE` the tangent has abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
+    are close. Iterations shall leave such a point, and converge to one with a gain below 1 by its exact
+    tangent: above `STABLE` the tangent has abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
 
     >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
     [0.5, 0.95, 0.99, 0.95, 0.9]
@@ -70,7 +70,7 @@ class Linearisation:
         self.softest = min(law.shear_modulus for law, _ in body.tissue.groups) / depth
         self.steep = constants.STEEP * self.softest
         height = self.interface.points[:, 1]
-        self._deep = height - height.min() <= constants.FAR * limits.deepest
+        self._reachable = height - height.min() <= constants.FAR * limits.deepest
         self.factor: Any = None
         self.tangent: Any = None
         self.stiffest = 0.0
@@ -78,7 +78,7 @@ class Linearisation:
         self._made_at: TangentPoint | None = None
         self._begin, self._seconds = Beginning(np.zeros((0, 0)), NOTHING), 0.0
         self._outdated = False
-        self._lets_go = True
+        self._may_drop_candidates = True
         self._status: Ints = np.zeros(0, dtype=np.int64)
         self._drag_rate = 0.0
         self.fringes = False
@@ -86,12 +86,12 @@ class Linearisation:
     def begin(self, old: State) -> None:
         """Start a step from `old`."""
         self.touching = old.status != OPEN
-        self._lets_go, self._outdated = True, self.fringes
+        self._may_drop_candidates, self._outdated = True, self.fringes
         if self.fringes:
             self.fringes, self._made_at = False, None
 
     def start_clock(self, old: State, duration: float) -> None:
-        """A factorisation for a much different duration than that of the step from `old` is outdated."""
+        """Start the time of a step from `old`; a factorisation for a much different duration is outdated."""
         dynamics = self.body.dynamics
         self._outdated |= self.body.drag_rate != self._drag_rate
         if self._made_at is not None:
@@ -116,41 +116,45 @@ class Linearisation:
         # gap below which `SPARE` times as many nodes lie: a new choice costs an analysis of the matrix
         enough = np.sort(gap)[min(int(constants.SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
         wider = (gap <= max(enough, self.interface.neighbourhood)) | (constants.SPARE * weakening > steep)
-        wider = self.pad.free & (wider | self._deep) | needed
+        wider = self.pad.free & (wider | self._reachable) | needed
         self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
         self.factor = None
 
     def _follow(self, state: State, gap: Floats, steep: Any) -> None:
-        """Candidates are nodes in contact and half as many others; those far away are dropped once a step."""
+        """Candidates in three dimensions: nodes in contact and half as many others; distant ones are dropped
+        once a step.
+        """
         needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
         if self.candidates.size and needed[self.candidates].sum() == needed.sum():
             return
         count = max(constants.SPARE * needed.sum(), constants.FIRST_CANDIDATES * self.pad.free.sum())
         enough = np.sort(gap)[min(int(count), int(self.pad.free.sum()) - 1)]
         chosen = np.flatnonzero(self.pad.free & (gap <= enough) | needed)
-        self.candidates = chosen if self._lets_go else np.union1d(self.candidates, chosen)
-        self.factor, self._lets_go = None, False
+        self.candidates = chosen if self._may_drop_candidates else np.union1d(self.candidates, chosen)
+        self.factor, self._may_drop_candidates = None, False
 
     # -- factorisation
 
     def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
-        """Factorises if there is none, iterations stall, or a new one saves time; returns whether it did."""
+        """Factorise where there is no factorisation, iterations stall, or a new one saves time; returns
+        whether it did.
+        """
         same, self._status = np.array_equal(self._status, state.status), state.status
         if self._has_fringes(state) and no_progress(history, same):
             self._outdated |= not self.fringes
             self.fringes = True
-        if not self.refused and not self._too_old(history):
+        if not self.outdated and not self._too_old(history):
             return False
         self.factorise(state)
         return True
 
     @property
-    def refused(self) -> bool:
-        """No factorisation, or one of other candidates, another drag or time step."""
+    def outdated(self) -> bool:
+        """Whether there is no factorisation, or one of other candidates, another drag or time step."""
         return self.factor is None or self._outdated
 
     def _has_fringes(self, state: State) -> bool:
-        """Whether the attraction at `state` has a stiffness of its own beside that of columns."""
+        """Whether the attraction at `state` has a fringe field, with a stiffness beside that of columns."""
         return bool(self.attraction.has_fringes and state.voltage != 0.0)
 
     def factorise(self, state: State) -> None:
@@ -166,7 +170,7 @@ class Linearisation:
         pressure = state.memory.get("pressure")
         upper = self.body.tangent(state.u, pressure)
         if self.interface.follows:
-            self._weaken(upper, state)
+            self._subtract_softening(upper, state)
         try:
             self.factor.factorise(upper)
         except Singular as error:
@@ -177,8 +181,10 @@ class Linearisation:
         self._made_at = TangentPoint(state, self.touching, self._begin, self._seconds)
         self.record.factorisations += 1
 
-    def _weaken(self, upper: Floats, state: State) -> None:
-        """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
+    def _subtract_softening(self, upper: Floats, state: State) -> None:
+        """Subtract the electrostatic softening (negative stiffness of the attraction) of open nodes that are
+        no candidates from the matrix, bounded so that it stays positive definite.
+        """
         most = constants.SUBTRACTED * self.softest * self.pad.tributary(self.interface.places(state))
         weakening = np.minimum(self.weakening(state), most)
         weakening[self.candidates] = 0.0
@@ -186,17 +192,17 @@ class Linearisation:
         unknowns = self.body.unknowns[self.pad.nodes[weakened]][:, 1]
         upper[self.body.pattern.diagonal[unknowns]] -= weakening[weakened]
 
-    def made_at(self, state: State) -> bool:
-        """Whether the factorisation is that of `state`."""
+    def is_tangent_of(self, state: State) -> bool:
+        """Whether the factorisation was made at `state`."""
         return self._made_at is not None and self._made_at.state.u is state.u
 
     @property
     def reusable(self) -> TangentPoint | None:
-        """Point of the factorisation that the next step may use; none with the field's own stiffness."""
+        """Point of the factorisation that the next step may use; None with the stiffness of fringe fields."""
         return None if self.factor is None or self.fringes else self._made_at
 
     def restore(self, at: TangentPoint) -> None:
-        """Repeats the factorisation that the run that is resumed made at `at`."""
+        """Repeat the factorisation that the resumed run had made at `at`."""
         self.touching = at.touched
         self._begin, self._seconds = at.begin, at.duration
         self.body.begin(at.begin, at.duration)
@@ -214,14 +220,14 @@ class Linearisation:
             return False
         return bool(np.log(tolerance / now) / np.log(now / before) > self.limits.strategy.patience)
 
-    # -- the attraction's part
+    # -- the attraction
 
     def pad_state(self, state: State) -> PadState:
         """The pad at an iterate of the present step."""
         return self.interface.pad_state(state, self.touching)
 
     def weakening(self, state: State) -> Floats:
-        """Negative stiffness of the attraction of every pad node, (P,) in N/mm per mm."""
+        """Electrostatic softening: decrease of every pad node's attraction with its gap, (P,) N/mm per mm."""
         if not self.attraction.acts(state.voltage):
             return np.zeros(self.pad.nodes.size)
         return np.asarray(self.attraction.weakening(self.pad_state(state)))
@@ -238,7 +244,7 @@ class Linearisation:
 
     def roughness(self, state: State) -> Roughness | None:
         """Derivatives of the attraction of every pad node by its contact force, along normal and tangent,
-        where rough faces come closer under it; None for smooth faces.
+        where contact pressure closes the roughness gap; None for smooth faces.
         """
         attraction = self.attraction
         if not (attraction.rough and attraction.acts(state.voltage)):
@@ -260,9 +266,10 @@ class Linearisation:
         return Roughness(gain, lost[:, None] * along, pressing)
 
     def _coupling(self, state: State) -> Floats | None:
-        """The attraction's stiffness on the candidates but for the weakening with a node's own gap: what is
-        left are changes of tributary lengths. None where they are faint, as a symmetric compliance takes a
-        third of the time, and with charges, so that a factorisation does not depend on the step.
+        """Off-diagonal stiffness of the attraction between neighbouring candidates, from the change of
+        tributary lengths, (dim C, dim C) in N/mm per mm. None if below `SMALLEST_STIFFENING` of the tissue
+        stiffness, which keeps the compliance symmetric (a third of the time), and with charge transport, so
+        that a factorisation does not depend on the step.
         """
         attraction = self.attraction
         if attraction.flows or not attraction.acts(state.voltage):
@@ -275,12 +282,12 @@ class Linearisation:
         row, column, axis = number[whole.row], number[whole.column], whole.column % dim
         # nodes beyond the candidates move along with their neighbours, so that sliding changes nothing
         along = np.where((column < 0) & (axis != 1), row - row % dim + axis, column)
-        seen = (row >= 0) & (along >= 0)
-        inner = Entries(unknowns.size, row[seen], along[seen], whole.value[seen]).toarray()
+        inside = (row >= 0) & (along >= 0)
+        inner = Entries(unknowns.size, row[inside], along[inside], whole.value[inside]).toarray()
         normal = surface_state(self.interface.surface, pad.position[c]).axes[:, 0, COMPONENTS[:dim]]
-        own = self.weakening(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
-        # that belongs to the contact problem: not twice
+        softening = self.weakening(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        # softening with the node's own gap is in the contact problem already
         blocks = inner.reshape(c.size, dim, c.size, dim)
-        blocks[np.arange(c.size), :, np.arange(c.size)] -= own
+        blocks[np.arange(c.size), :, np.arange(c.size)] -= softening
         stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
         return inner if stiffened.max() > constants.SMALLEST_STIFFENING else None

@@ -35,8 +35,8 @@ NO_PRESSURE: Floats = np.zeros((0, 0))
 
 @dataclass(frozen=True, eq=False)
 class Unbalanced:
-    """Out-of-balance forces (n,) and their residual; what the residual of other forces is, and how nodal
-    forces (N, dim) are reduced.
+    """Out-of-balance forces (n,) and their residual; functions for the residual of other forces, and for the
+    reduction of nodal forces (N, dim).
     """
 
     forces: Floats
@@ -46,22 +46,22 @@ class Unbalanced:
 
 
 class NoPressure(Room):
-    """Compressible tissue, whose pressure is no unknown. Answers what `Pressure` does."""
+    """Compressible tissue, whose pressure is no unknown; the same methods as `Pressure`."""
 
     shape: tuple[int, ...] = NO_PRESSURE.shape
 
     def check(self, q: Floats) -> None:
-        """Refuse a pressure from a checkpoint that has not one value for each point."""
+        """Raise `InputError` for a pressure from a checkpoint that has not one value per sample point."""
         if q.shape != self.shape:
-            given = "no usable factor_memory.pressure"
-            raise InputError("checkpoint", given, f"numbers of the shape {self.shape}")
+            found = "no usable factor_memory.pressure"
+            raise InputError("checkpoint", found, f"numbers of the shape {self.shape}")
 
     def first(self, u: Floats) -> dict[str, Floats]:
         """The first iterate of a step from an equilibrium at u (N, 2)."""
         return {}
 
     def balance(self, state: State, found: Unbalanced) -> MixedBalance:
-        """The balance that the iterations follow."""
+        """The residual on which the iterations converge."""
         return MixedBalance(found.forces, found.residual, NO_PRESSURE)
 
     def after(self, state: State, misfit: Floats, du: Floats, fraction: float) -> dict[str, Floats]:
@@ -90,7 +90,7 @@ class Pressure(NoPressure):
         return {"pressure": self.tissue.pressure(u)}
 
     def balance(self, state: State, found: Unbalanced) -> MixedBalance:
-        """With the misfit q(u) - q, and the forces as the older tangent takes them."""
+        """With the misfit q(u) - q, and the forces with the volumetric terms of the older tangent."""
         misfit = self.tissue.pressure(state.u) - state.memory["pressure"]
         forces, at = found.forces, self.linearisation.reusable
         if at is not None and at.state.u is not state.u:

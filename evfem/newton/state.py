@@ -1,4 +1,4 @@
-"""Configurations of a body and what is asked of a step: the nouns of the equilibrium solver."""
+"""Data of the equilibrium solver: the state of a body, what the next step reuses, residuals, failures."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 class StepFailed(ArithmeticError):
     """An equilibrium was not found: its `residuals`, the `reason`, `findings` of the last iterate;
-    `unstable`: the tangent was not positive definite. Of a step given up: its first state and target, `last`,
-    `released`.
+    `unstable`: the tangent was not positive definite. Of a step that failed: its first state and target,
+    `last`; whether pseudo-transient continuation was tried from there, `released`.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
@@ -33,11 +33,15 @@ class StepFailed(ArithmeticError):
 
 
 class Folded(StepFailed):
-    """The outline of what was found crosses itself; no smaller part and no release helps that."""
+    """The outline of the state found crosses itself: neither a smaller substep nor pseudo-transient
+    continuation (`evfem.solver.relaxation`) helps.
+    """
 
 
 class LiftedOff(StepFailed):
-    """A released finger that is pulled harder than the attraction holds has lost the surface."""
+    """The finger came off the surface during pseudo-transient continuation: the pull is larger than the
+    attraction.
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +70,7 @@ class State:
 
     @property
     def parts(self) -> dict[str, Any]:
-        """All of it by name, what rooms keep as `memory.name`."""
+        """All fields by name, what rooms keep as `memory.name`."""
         own = {spec.name: getattr(self, spec.name) for spec in fields(self) if spec.name != "memory"}
         return own | {f"memory.{name}": kept for name, kept in self.memory.items()}
 
@@ -89,7 +93,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """Of the state that a step began with what the body's terms count from: u (N, dim) and memory."""
+    """The state at the begin of a step, from which the body's terms take increments: u (N, dim), memory."""
 
     u: Floats
     memory: Mapping[str, Any]
@@ -97,8 +101,8 @@ class Beginning:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was made: at an iterate, with the pad nodes that `touched` (P,) when the step began,
-    where it began, and its seconds.
+    """Where a tangent was evaluated: the iterate, the pad nodes that `touched` (P,) when the step began, the
+    begin of that step, and its duration (s).
     """
 
     state: State
@@ -139,8 +143,9 @@ class Record:
 
 @dataclass(frozen=True)
 class MixedBalance:
-    """Residual of the mixed problem (`evfem.newton.pressure`): the forces (n,) as the older tangent takes
-    them, the largest relative to the reaction, and the pressure of the laws less the iterate's (E, Q) in MPa.
+    """Residual of the mixed problem (`evfem.newton.pressure`): the forces (n,) with the volumetric terms of
+    the older tangent, the largest relative to the reaction, and the pressure of the material laws minus that
+    of the iterate (E, Q) in MPa.
     """
 
     forces: Floats
@@ -170,16 +175,16 @@ class Balance:
 
 
 def findings(body: Body, state: State, balance: Balance) -> str:
-    """Largest out-of-balance forces and their current places, the contact, the smallest volume ratio."""
+    """Largest out-of-balance forces and their positions, contact statuses, and smallest volume ratio."""
     free = balance.forces.copy()
     free[body.bone] = 0.0  # its motion balances these
     forces = body.expand(free)
     nodal = np.linalg.norm(np.where(np.isnan(forces), np.inf, forces), axis=1)
     worst = np.argsort(nodal)[::-1][:NAMED]
-    places = (body.space.mesh.points + state.u)[worst]
-    at = [", ".join(f"{coordinate:.4g}" for coordinate in place) for place in places]
+    positions = (body.space.mesh.points + state.u)[worst]
+    at = [", ".join(f"{coordinate:.4g}" for coordinate in position) for position in positions]
     named = ", ".join(
-        f"{nodal[node]:.1e} {state.unit} at ({place})" for node, place in zip(worst, at, strict=True)
+        f"{nodal[node]:.1e} {state.unit} at ({position})" for node, position in zip(worst, at, strict=True)
     )
     opened, sticking = int((state.status == OPEN).sum()), int((state.status == STICK).sum())
     slipping = state.status.size - opened - sticking

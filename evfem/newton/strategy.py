@@ -1,8 +1,9 @@
-"""Limits of the step control: lengths of parts and numbers of their iterations.
+"""Limits of the step control: lengths of substeps and numbers of their iterations.
 
-A step leads from one accepted state to the next. It is tried whole first; a part that fails is halved, and
-after easy ones parts grow again. If short parts fail too, the finger is released (`evfem.solver.relaxation`).
-With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
+A step is first tried as one substep; a substep that fails is halved, and after easy ones substeps grow again.
+If short substeps fail too, the next equilibrium is sought by pseudo-transient continuation, called release
+(`evfem.solver.relaxation`). With steps "auto" the error of step doubling controls the length of substeps
+(`evfem.solver.path`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Travel of the bone in one iteration: that of the contact problem, limited to a linear step."""
+"""Travel of the bone in one iteration, limited to the range where the linearised problem holds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Solve = Callable[[LinearContactStep], StepSolution]
 
 @dataclass(frozen=True)
 class Travel:
-    """The bone's increment (dim,) and its contact solution; `longest` (mm) of a linear step."""
+    """Limits the increment of the bone; `longest` (mm): the largest one of a linear step."""
 
     interface: Interface
     longest: float
@@ -28,8 +28,8 @@ class Travel:
     def limited(
         self, step: LinearContactStep, found: StepSolution, state: State, target: Target, solve: Solve
     ) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (dim,), shortened where it is too long for a linear step, and
-        contact solved again by `solve`.
+        """The contact solution and the increment of the bone (dim,); one that leaves the linear range is
+        shortened, and contact solved again by `solve`.
         """
         if not step.unknowns:
             return found, step.bone
@@ -39,20 +39,22 @@ class Travel:
         if not target.height.free:
             return found, bone
         missing = target.height.missing(float(state.bone[1]), state.reaction)
-        flies = not found.status.any() and bone[1] * missing < 0.0 and self._drawn(step, bone[1])
-        if abs(bone[1]) > self.longest or flies:
-            # a long way may rest on a single node, and a body whose attraction wins flies off: go
-            # part of the way, the way the missing force pushes
+        leaves_linear_range = (
+            not found.status.any() and bone[1] * missing < 0.0 and self._pulled_against_force(step, bone[1])
+        )
+        if abs(bone[1]) > self.longest or leaves_linear_range:
+            # a long increment may rest on a single node, and a body whose attraction exceeds its stiffness
+            # flies off: take a fraction of it, in the direction of the force residual
             longest = self.longest
-            if flies:  # twice the gap, or a little
+            if leaves_linear_range:  # twice the gap, or a little
                 gap = float(self.interface.surface_at(state).gap.min())
                 longest = float(np.clip(2.0 * gap, SHORTEST_FLIGHT * longest, longest))
-            bone[1] = np.copysign(longest, missing if flies else bone[1])
+            bone[1] = np.copysign(longest, missing if leaves_linear_range else bone[1])
             found = solve(replace(step, bone=bone, unknowns=()))
         return found, bone
 
-    def _drawn(self, step: LinearContactStep, travel: float) -> bool:
-        """Whether this travel goes against the force that the bone lacks at rest, or has no solution."""
+    def _pulled_against_force(self, step: LinearContactStep, travel: float) -> bool:
+        """Whether this travel is opposite to the force residual without travel, or has no solution."""
         try:
             found = replace(step, unknowns=()).solve()
         except ContactNotSolved:

@@ -297,7 +297,9 @@ class Run:
         """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         released, snapped = self.stepper.relaxations, self.stepper.snaps
-        self.state = request.path(0.0, 1.0).going_on(self.state, self.model.mesh.node_sets["bone"][0])
+        self.state = request.path(0.0, 1.0).restart_if_speed_jumps(
+            self.state, self.model.mesh.node_sets["bone"][0]
+        )
         try:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
         except StepFailed as error:

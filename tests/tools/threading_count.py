@@ -85,7 +85,8 @@ CAPABILITIES = (
     capability(
         "viscosity, inertia, branches",
         r"""dynamics|viscous|viscos|inertia|branch|kinetic|NO_RATES|\brates\b|velocity|\binner\b|\bpast\b
-        |\bPast\b|\btimed\b|\bmass\b|going_on|start_clock|scheme""",
+        |\bPast\b|\btimed\b|\bmass\b|restart_if_speed|start_clock
+        |scheme""",
         own="planning/timescales",
     ),
     capability(
