@@ -1,7 +1,7 @@
 r"""Equilibrium steps of a body in contact: the algorithm from the outside in, on one page.
 
 **Problem.** A body with nodal displacements u, its bone translated by b, touches a rigid profile.
-A step goes from an accepted state to a target: a place of the bone or a force on it, a voltage or a
+A step goes from an accepted state to a target: a position of the bone or a force on it, a voltage or a
 friction force (`evfem.newton.control`). With the gap g of a pad node, its slip s since the accepted
 state, and contact forces :math:`\lambda` along the profile's normal and tangent, the state sought obeys
 
@@ -10,8 +10,8 @@ state, and contact forces :math:`\lambda` along the profile's normal and tangent
           |\lambda_t| \le \mu\lambda_n,\; \lambda_t = -\mu\lambda_n\,s/|s| \text{ if } s \ne 0 .
 
 With viscosity or inertia :math:`f_{int}` has their forces by backward differences
-(`evfem.tissue.dynamics`); another law of friction takes the place of :math:`\mu\lambda_n`. A step that
-fails leaves the accepted state as it was.
+(`evfem.tissue.dynamics`); another law of friction replaces :math:`\mu\lambda_n`. A step that fails leaves
+the accepted state as it was.
 
 **Which of several states.** Under a strong attraction several states obey these laws. The answer is
 the limit of vanishing drag [5]_ [6]_: with a drag of rate :math:`\epsilon`
@@ -19,37 +19,37 @@ the limit of vanishing drag [5]_ [6]_: with a drag of rate :math:`\epsilon`
 .. math:: \epsilon\,\dot u + R(u, \lambda;\, t) = 0, \qquad \epsilon \to 0 ,
 
 the body follows the branch of stable states that begins at the last one. Where that branch ends it snaps:
-it is released under the loads that it has there, and rests at the state that drag leads to. All that
-follows are ways to find that state; none decides which it is. A state that iterations found elsewhere
-is refused where the potential with the loads of the part's end,
+under the loads at that point it moves to the state that drag leads to, and rests there. All that follows
+are algorithms to find that state; none decides which it is. A state that iterations found elsewhere is
+refused where the potential with the loads of the end of the substep,
 
 .. math:: \Phi(u) = \psi(u) - W_{el}(u) - W_{bone}(u) + D_{friction}(u) ,
 
-rises on the straight way to it (`evfem.simulation.barrier`): the body would have to climb. That is
+rises on the straight path to it (`evfem.simulation.barrier`): the body would have to climb. That is
 necessary, not sufficient: where several states lie downhill, the nearest branch is not told from others.
 
-**1. A step is cut into parts** (`stepping`; the user's numbers: `evfem.newton.strategy`)::
+**1. A step is divided into substeps** (`stepping`; the user's numbers: `evfem.newton.strategy`)::
 
-    part <- the length that worked last
+    length <- that of the last successful substep
     repeat until the step's end is reached
-        find the equilibrium at the end of the part (2)
-        found behind a barrier: find it held, by drag from the old state that is taken away (`hold`)
-        found: accept it; after few iterations the next part is longer
-        not found: halve the part; from 1/32 of the step on, release the body (5); where it does not
-            come to rest, halve on, and fail at the smallest part
+        find the equilibrium at the end of the substep (2)
+        found behind a barrier: find it by drag continuation from the old state (`hold`)
+        found: accept it; after few iterations the next substep is longer
+        not found: halve the substep; from 1/32 of the step on, pseudo-transient continuation (5); where
+            that does not come to rest, halve on, and fail at the smallest substep
 
-With `steps = "auto"` the length follows the difference of one part and two halves (`path`).
+With `steps = "auto"` the length follows the difference of one substep and two halves (`path`).
 
 **2. One equilibrium** (`evfem.newton.equilibrium`)::
 
-    u <- extrapolated along the increment of the last part
+    u <- extrapolated along the increment of the last substep
     repeat
         R <- balance; its residual is the largest free force over the largest reaction
         residual <= tolerance: accept if the state passes (4)
         fail if the residual is not finite or stagnates, or after the strategy's iterations
         u, lambda <- the linear contact step (3)
 
-**3. A linear contact step** (`evfem.newton.factorised`, beside it what 2 to 4 name). The tangent K of the
+**3. A linear contact step** (`evfem.newton.factorised`; 2 to 4 name its neighbours). The tangent K of the
 tissue, often that of an earlier iterate, is condensed onto the nodes c that may touch and the bone
 (`linearisation`, `condensation`; PARDISO or SuperLU), and :math:`C = S_{cc}^{-1}`:
 
@@ -58,8 +58,8 @@ tissue, often that of an earlier iterate, is condensed onto the nodes c that may
 
 Gaps and slips are then linear in the new forces :math:`\lambda^+`, and the laws of contact are
 solved exactly by an active set, Newton's method on projections [1]_ [2]_
-(`evfem.contact.condensed`). Unknown travel of the bone, and a voltage that a friction force, a charge
-or a gap asks for (`control`), are solved along::
+(`evfem.contact.condensed`). Unknown travel of the bone, and a voltage determined by a prescribed friction
+force, charge or gap (`control`), are extra unknowns of the same problem::
 
     factorise K at u if there is no factorisation, it was made for other candidates or another time
         step, or more than `patience` iterations would be left with it
@@ -72,11 +72,11 @@ Nearly incompressible tissue has its pressure as an unknown beside u (`pressure`
 
 **4. Acceptance** (`equilibrium`, `interface`). No open node has penetrated, closed gaps, stick, the
 directions of slip and the bounds of friction hold at the present positions, and the controls agree.
-A state is refused whose outline crosses itself, or whose slipping nodes on crests are pushed aside
-harder than the tissue holds them (`evfem.contact.stability`).
+A state is refused whose outline crosses itself, or that is unstable because contact forces on crests
+push slipping nodes aside harder than the tissue holds them (`evfem.contact.stability`).
 
-**5. Release** (`relaxation`). Where a quasi-static path loses stability, the body goes on under drag
-of a rate s in pseudo-time steps (pseudo-transient continuation [4]_): each is an equilibrium (2) of
+**5. Pseudo-transient continuation** [4]_, called release (`relaxation`). Where a quasi-static path loses
+stability, the body moves on under drag of a rate s in pseudo-time steps: each is an equilibrium (2) of
 
 .. math:: R(u, \lambda) + f_{drag}(u - u_k;\, s) = 0 .
 
@@ -89,14 +89,14 @@ over the scenes in which it acts):
 =====================================  ======  =======================================================
 safeguard                              scenes  without it
 =====================================  ======  =======================================================
-friction's growth in the compliance    8       iterations x12.6, factorisations x51
+slope of friction in the compliance    8       iterations x12.6, factorisations x51
 turning contact forces (`follower`)    23      iterations x2.2, factorisations x4.6
-attraction scaled to what is held      8       iterations x1.9, factorisations x3.8
+softening scaled below critical        8       iterations x1.9, factorisations x3.8
 gain between rough faces limited       49      4 scenes do not end (`linearisation.limited_gain`)
-bracketed friction (contact.slipping)   12      iterations x1.2, factorisations x1.5
+bracketed friction (`terms.slipping`)  12      iterations x1.2, factorisations x1.5
 pins at jumps of friction              1       1 scene does not end (`interface.FrictionJumps`)
 release (`relaxation`)                 2       1 scene does not end
-longer parts after a release           4       iterations x2.2 (`stepping`)
+longer substeps after a release        4       iterations x2.2 (`stepping`)
 bone's travel limited (`travel`)       9       factorisations x1.3; of bodies in the air x1.3
 factorisations kept (`linearisation`)  173     factorisations x5.2, CPU time x1.65
 worst node first (active set)          73      iterations x1.27

@@ -1,19 +1,20 @@
-r"""The branch of equilibria that begins at the last state, where iterations have jumped off it.
+r"""Drag continuation: follow the branch of equilibria that begins at the last state, where iterations have
+jumped off it.
 
-Iterations of the static problem may come to an equilibrium behind a barrier (`evfem.solver`, which of
-several states). Then the part is solved again, held by drag that counts from the old state, as does
-friction, and is taken away bit by bit (`held`)::
+Iterations of the static problem may converge to an equilibrium behind a barrier (`evfem.solver`, which of
+several states). Then the substep is solved again with artificial drag, proportional to the displacements
+from the old state, whose rate is lowered until it vanishes (`held`)::
 
     rate <- the strategy's `hold`; last <- none; iterations begin at the old state, without extrapolation
-    until the rate is below `LEAST`:
+    until the rate is below `SMALLEST_RATE`:
         new <- the equilibrium at the target with drag of this rate from the old state, found from `last`
         not found, or behind a barrier from `last`:
-            no last: rate <- `FALL` rate; else the geometric mean with the last rate, and no further if
-            that is within `STUCK` of it: the branch ends, the part fails
-        else: last <- new, rate <- rate / `FALL`
-    new <- the equilibrium without drag, found from `last`; behind a barrier, the part fails
+            no last: rate <- `RATE_FACTOR` rate; else the geometric mean with the last rate; if that is
+            within `SMALLEST_RATIO` of it, the branch ends and the substep fails
+        else: last <- new, rate <- rate / `RATE_FACTOR`
+    new <- the equilibrium without drag, found from `last`; behind a barrier, the substep fails
 
-Only the drag's rate over the part enters, no time.
+Friction is counted from the old state too. Only the drag's rate over the substep enters, no time.
 """
 
 from __future__ import annotations
@@ -27,29 +28,29 @@ from evfem.newton.control import Target
 from evfem.newton.state import State, StepFailed
 from evfem.tissue.body import Body
 
-#: the largest rate of drag and the least, by how much it falls, and when it falls no further
-MOST, LEAST, FALL, STUCK = 1e4, 1e-3, 4.0, 1.05
+#: largest and smallest rate of drag, the factor by which it changes, smallest ratio of two rates tried
+LARGEST_RATE, SMALLEST_RATE, RATE_FACTOR, SMALLEST_RATIO = 1e4, 1e-3, 4.0, 1.05
 
 
 def held(
     body: Body, reach: Callable[[State, Target, State], State], rate: float, state: State, target: Target
 ) -> State:
-    """The equilibrium of `body` at `target` on the branch that begins at `state`, held at first by drag of
-    this `rate`; `reach(old, target, start)` raises `StepFailed` behind a barrier, as this does where the
-    branch ends.
+    """The equilibrium of `body` at `target` on the branch that begins at `state`, by drag continuation from
+    this `rate`; `reach(old, target, start)` raises `StepFailed` behind a barrier, as does this function where
+    the branch ends.
     """
-    last, before = replace(state, last_increment=np.zeros_like(state.last_increment)), 0.0
+    last, last_rate = replace(state, last_increment=np.zeros_like(state.last_increment)), 0.0
     try:
-        while not 0.0 < before <= LEAST:
+        while not 0.0 < last_rate <= SMALLEST_RATE:
             body.release(state.u, rate)
             try:
                 last = reach(state, target, last)
             except StepFailed:
-                rate = FALL * rate if before == 0.0 else float(np.sqrt(before * rate))
-                if rate > MOST or (before > 0.0 and before < STUCK * rate):
+                rate = RATE_FACTOR * rate if last_rate == 0.0 else float(np.sqrt(last_rate * rate))
+                if rate > LARGEST_RATE or (last_rate > 0.0 and last_rate < SMALLEST_RATIO * rate):
                     raise
                 continue
-            before, rate = rate, rate / FALL
+            last_rate, rate = rate, rate / RATE_FACTOR
     finally:
         body.release(state.u, 0.0)
     return reach(state, target, last)

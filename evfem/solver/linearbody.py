@@ -7,9 +7,9 @@ bone's, and :math:`x = u_p - b` the displacements relative to the bone,
           f_b = -\textstyle\sum f_p, \qquad
           \psi = \psi_0 + f_{p0}\cdot(x - x_0) + \tfrac12 (x - x_0)\cdot S\,(x - x_0) .
 
-It answers what a `Body` answers, so that contact, friction and attraction on it are as exact as ever, and the
-books of a run close. Displacements are those of the pad and the bone alone, until `whole` finds the others.
-The drag of a release is condensed alike.
+It has the methods of a `Body`, so that contact, friction and attraction on it are exact, and the energy
+balance of a run closes. Displacements are those of pad and bone alone, until `whole` computes the others.
+The drag of pseudo-transient continuation is condensed likewise.
 
 Source: R. J. Guyan, AIAA J. 3 (1965) 380, doi:10.2514/3.2874.
 """
@@ -29,7 +29,7 @@ from evfem.tissue.pattern import Pattern
 
 
 class LinearTissue:
-    """Tissue that is linear: no cell collapses, the pressure is no unknown; stresses are those of `whole`."""
+    """Linear tissue: no cell collapses, the pressure is no unknown; stresses are those of `whole`."""
 
     nearly_incompressible = False
 
@@ -37,11 +37,11 @@ class LinearTissue:
         self.groups, self._body = body.full.tissue.groups, body
 
     def smallest_J(self, u: Floats) -> float:
-        """Whatever u (N, dim) is."""
+        """1, for any u (N, dim)."""
         return 1.0
 
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
-        """Stresses and volume ratios of the body's own law where the pad and the bone are those of u."""
+        """Stresses and volume ratios of the full body's law, with the displacements u on pad and bone."""
         return self._body.full.tissue.cell_stress(self._body.whole(u))
 
 
@@ -65,7 +65,7 @@ class LinearBody(Body):
         self._relative = (u[pad] - u[self._bone]).ravel()
         self.size = own.size + dim
         self.bone = np.arange(own.size, self.size)
-        # nodes within move with the bone until they are asked for
+        # inner nodes move with the bone until `whole` computes them
         self.unknowns = np.broadcast_to(self.bone, full.unknowns.shape).copy()
         self.unknowns[pad] = np.arange(own.size).reshape(-1, dim)
 
@@ -82,18 +82,18 @@ class LinearBody(Body):
         pulled = self._at_base + (self.matrix @ self._strain(u)).reshape(-1, self.space.dim)
         total = np.zeros_like(u)
         total[self._bone] = -pulled.sum(axis=0)
-        total[self.pad] = pulled if self.drag_rate == 0.0 else pulled + self._held(u)
+        total[self.pad] = pulled if self.drag_rate == 0.0 else pulled + self._drag_forces(u)
         return total
 
-    def _held(self, u: Floats) -> Floats:
-        """Drag (P, dim) on the pad since the release."""
+    def _drag_forces(self, u: Floats) -> Floats:
+        """Drag (P, dim) on the pad."""
         return (self.drag_rate * self._drag @ self._since(u)).reshape(-1, self.space.dim)
 
     def _since(self, u: Floats) -> Floats:
         return u[self.pad].ravel() - self._released
 
     def release(self, u: Floats, rate: float) -> None:
-        """From now on drag of this rate holds the body back at u (N, dim); none if it is 0."""
+        """Drag of this rate against displacements from u (N, dim) from now on; none if it is 0."""
         self.drag_rate, self._released = rate, u[self.pad].ravel()
 
     def drag_dissipation(self, u: Floats) -> float:
@@ -124,10 +124,10 @@ class LinearBody(Body):
         mean = self._at_base.ravel() + 0.5 * self.matrix @ strain
         return self.energy_at_base + float(mean @ strain)
 
-    def energies(self, u: Floats, way: Floats, places: Floats) -> Floats:
-        strain, more = self._strain(u), (way[self.pad] - way[self._bone]).ravel()
+    def energies(self, u: Floats, increment: Floats, fractions: Floats) -> Floats:
+        strain, more = self._strain(u), (increment[self.pad] - increment[self._bone]).ravel()
         pulled = self._at_base.ravel() + self.matrix @ strain
-        return self.energy(u) + places * (pulled @ more) + 0.5 * places**2 * (more @ self.matrix @ more)
+        return self.energy(u) + fractions * (pulled @ more) + 0.5 * fractions**2 * (more @ self.matrix @ more)
 
     @cached_property
     def _drag(self) -> Floats:
@@ -138,7 +138,7 @@ class LinearBody(Body):
         full.drag.add_tangent(self.base, full.pattern, data)
         full.release(self.base, 0.0)
         sparse = full.pattern.full(full.pattern.finish(data))
-        shapes = np.stack([self._reached(np.eye(1, self.size, k)[0]) for k in range(self.size - dim)], axis=1)
+        shapes = np.stack([self._solve(np.eye(1, self.size, k)[0]) for k in range(self.size - dim)], axis=1)
         return np.asarray(shapes.T @ (sparse @ shapes))
 
     @cached_property
@@ -146,11 +146,11 @@ class LinearBody(Body):
         """The state of the factorisation's backward solve without forces within."""
         return self._factor.forward(np.zeros(self.full.size))[0]
 
-    def _reached(self, kept: Floats) -> Floats:
-        """Reduced displacements (n,) of the full body with these of the pad and the bone (m,)."""
+    def _solve(self, kept: Floats) -> Floats:
+        """Reduced displacements (n,) of the full body for displacements of the pad and the bone (m,)."""
         return self._factor.backward(self._still, kept)
 
     def whole(self, u: Floats) -> Floats:
-        """Displacements (N, dim) of all nodes where the pad and the bone are those of u (N, dim)."""
+        """Displacements (N, dim) of all nodes for the displacements u (N, dim) of pad and bone."""
         moved = np.concatenate([(u - self.base)[self.pad].ravel(), (u - self.base)[self._bone]])
-        return self.base + self.full.expand(self._reached(moved))
+        return self.base + self.full.expand(self._solve(moved))

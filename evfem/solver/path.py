@@ -1,15 +1,15 @@
-r"""The error of a path: how much the steps decide where friction and time make it matter.
+r"""Time (load) step error by step doubling, where the result depends on the path: with friction and time.
 
-Friction is counted from the last accepted state and viscosity goes by backward Euler, so a step of length h
-errs by :math:`c h^2` locally: one part from a to b ends elsewhere than two halves do, and their difference
-:math:`c h^2 - 2 c (h/2)^2 = c h^2 / 2` is the error of the two halves, which are kept. With inertia, of
-second order in time, that is more than the error. The part that would just be allowed is
-:math:`\sqrt{e_{allowed} / e}` times as long. Iterations of the one part begin at the end of the two, so that
-asking costs little. The first part of a scene is a short one: from nothing, one part and two end alike where
-in both every node slips, and neither sees the nodes that stick on a finer way.
+Friction is counted from the last accepted state and viscosity is integrated by backward Euler, so a step of
+length h has the local error :math:`c h^2`: one substep from a to b ends at another state than two halves, and
+their difference :math:`c h^2 - 2 c (h/2)^2 = c h^2 / 2` is the error of the two halves, which are accepted.
+With inertia, of second order in time, that overestimates the error. The largest admissible substep is
+:math:`\sqrt{e_{allowed} / e}` times as long. Iterations of the one substep begin at the end of the two, so
+that the estimate costs little. The first substep of a scene is short: from the undeformed state, one substep
+and two halves agree where every node slips in both, and neither has the nodes that stick with finer steps.
 
-The error is that of the forces on the bone, as a share of the largest, and of where the bone is,
-as a share of how far it is from its rest. Errors of earlier parts fade where all slips.
+The error is that of the forces on the bone, relative to the largest, and of the bone's translation, relative
+to its largest component. Errors of earlier substeps fade where all nodes slip.
 
 Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, 2nd ed., section II.4.
 """
@@ -48,27 +48,31 @@ class Whole:
         target = path(*span)
         return [(target, solve(state, target, None))], 0.0
 
-    def refused(self, error: float, length: float, strategy: Strategy) -> float | None:
-        """The length to be tried in the place of one with this error, None if that is accepted."""
+    def shorter_length(self, error: float, length: float, strategy: Strategy) -> float | None:
+        """A shorter length to be tried instead of one with this error, None if that is accepted."""
         return None
 
-    def following(self, substep: float, length: float, error: float, easy: bool, strategy: Strategy) -> float:
+    def next_substep(
+        self, substep: float, length: float, error: float, easy: bool, strategy: Strategy
+    ) -> float:
         """The next substep after one of this length and error; `easy`: it took few iterations."""
         return min(1.0, strategy.growth * substep) if easy else substep
 
     def spans(self, calls: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        """Spans of the equilibria accepted last, of those that were asked for."""
+        """Spans of the equilibria accepted last, of all that were computed."""
         return calls[-1:]
 
     @property
     def told(self) -> dict[str, float]:
-        """What the provenance of a run says of it."""
+        """Entries of the provenance of a run."""
         return {}
 
 
 @dataclass
 class Halves(Whole):
-    """A substep is two halves that differ from one whole by at most `allowed`; the `largest` so far."""
+    """A substep is two halves whose end differs from that of one whole by at most `allowed`; the `largest`
+    difference so far.
+    """
 
     allowed: float
     largest: float = 0.0
@@ -85,13 +89,15 @@ class Halves(Whole):
         end = solve(half, second, None)
         return [(first, half), (second, end)], relative_difference(solve(state, whole, end), end)
 
-    def refused(self, error: float, length: float, strategy: Strategy) -> float | None:
+    def shorter_length(self, error: float, length: float, strategy: Strategy) -> float | None:
         if error <= self.allowed or length <= strategy.smallest_part + 1e-12:
             self.largest = max(self.largest, error)
             return None
         return max(length_factor(error / self.allowed) * length, strategy.smallest_part)
 
-    def following(self, substep: float, length: float, error: float, easy: bool, strategy: Strategy) -> float:
+    def next_substep(
+        self, substep: float, length: float, error: float, easy: bool, strategy: Strategy
+    ) -> float:
         """One that was shortened to hit the end of a step does not shorten the next."""
         cut = length < (1.0 - 1e-9) * substep
         wanted = max(length_factor(error / self.allowed) * length, strategy.smallest_part)
@@ -108,14 +114,14 @@ class Halves(Whole):
 def relative_difference(once: State, twice: State) -> float:
     """Relative difference between the ends of one substep and of its two halves."""
     forces = np.abs(once.reaction - twice.reaction).max()
-    places = np.abs(once.bone - twice.bone).max()
+    positions = np.abs(once.bone - twice.bone).max()
     moved = np.abs(twice.bone).max()
     relative = forces / max(np.abs(twice.reaction).max(), SMALLEST_FORCE)
-    return float(max(relative, places / moved if places > 0.0 else 0.0))
+    return float(max(relative, positions / moved if positions > 0.0 else 0.0))
 
 
 def length_factor(error: float) -> float:
-    """Length of the next part relative to one whose error is this fraction of the allowed one.
+    """Length of the next substep relative to one whose error is this fraction of the allowed one.
 
     >>> length_factor(0.0), round(length_factor(1.0), 3), length_factor(1e6)
     (4.0, 0.9, 0.25)

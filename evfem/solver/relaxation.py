@@ -1,34 +1,33 @@
-r"""From a lost equilibrium to the next one: the body is released from where it is, and held back only
-by drag.
+r"""Pseudo-transient continuation, called release: from a lost equilibrium the body moves to the next one,
+held back only by artificial drag.
 
-Algorithm (`Relaxation.follow`), pseudo-transient continuation ([4] of `evfem.solver`) with the loads of the
-part held::
+Algorithm (`Relaxation.follow`; [4] of `evfem.solver`) at constant loads, those of the substep's end::
 
     rate <- 1
     repeat, at most `DRAG_STEPS` times
         solve one equilibrium with drag of this rate (`evfem.tissue.body`) from the last state
-        if it failed: raise the rate, by twice the last factor; give up beyond `DRAG_MOST`
-        else: accept; give up if a finger that is pulled has lost the surface
+        if it failed: raise the rate, by twice the last factor; fail beyond `DRAG_MOST`
+        else: accept; fail if a finger that is pulled has lost the surface
             if the body slows down and the rate is small: solve the equilibrium without drag; if it is
                 found, it is the end
-            lower the rate, or raise it if the speed grows; give up below `DRAG_LEAST`
+            lower the rate, or raise it if the speed grows; fail below `DRAG_LEAST`
 
 Drag, not inertia: with it the stored energy, less the work of the loads, can only fall, and the path depends
 on no density. Viscosity damps relative motion, a mass at rest at the beginning of each step rigid motion.
 Only the ratio s of relaxation time and pseudo-time step enters, chosen as steps succeed. Each step is an
 equilibrium of contact, friction and attraction to the scene's tolerance.
 
-In the first step of a release a hand with a mass or a damper moves on in its time, and charge flows in
-its own. Then the bone stays at that x, and each node keeps its charge, while the tissue comes to rest.
+In the first step of a release time passes for a hand with a mass or a damper, and for charge transport. Then
+the bone keeps its x, and each node its charge, while the tissue comes to rest.
 
-A symmetric finger on the middle of a crest has an equilibrium there which the least push makes it leave.
-The first step of a release therefore begins `IMPERFECTION` aside.
+A symmetric finger on the middle of a crest has an unstable equilibrium there. The first step of a release
+therefore begins with an imperfection, `IMPERFECTION`.
 
-An attraction with an energy lets the body come to rest. The paper's vertical one has none: a finger without
-friction on slopes may go round in circles until the steps are used up.
+Under an attraction with an energy the body comes to rest. The paper's vertical one has none: a finger without
+friction on slopes may move in circles until the steps are used up.
 
-A prescribed friction force is not followed during a release, where drag would be part of it: the
-voltage stays as it is until the end.
+A prescribed friction force is not followed during a release, where it would contain drag: the voltage is
+constant until the end.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ from evfem.newton.control import Target
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
 from evfem.tissue.body import Body
 
-#: a speed (mm) that is none
+#: a speed (mm) that counts as zero
 TINY = 1e-300
 #: why a release ends in the air
 LIFTED = (
@@ -64,19 +63,21 @@ LIFTED = (
 
 @dataclass
 class Relaxation:
-    """Releases `body`; `solve` finds an equilibrium with drag from a state; `charged`: charge flows."""
+    """Pseudo-transient continuation of `body`; `solve` finds an equilibrium with drag from a state;
+    `charged`: with charge transport.
+    """
 
     body: Body
     solve: Callable[[State, Target], State]
     charged: bool = False
 
     def applies(self, target: Target) -> bool:
-        """Whether the tissue takes no time on its way to `target`: only an equilibrium is asked for."""
+        """Whether the step to `target` is quasi-static: neither viscosity nor inertia act."""
         return self.body.dynamics.still(target.duration)
 
     def follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
-        """The equilibrium at `target` where the body comes to rest when released at `state`;
-        `accept(old, new)` sees every step on the way.
+        """The equilibrium at `target` where the body comes to rest from `state`; `accept(old, new)` is called
+        after every pseudo-time step.
 
         Raises `StepFailed` where it does not come to rest.
         """
@@ -86,16 +87,16 @@ class Relaxation:
             self.body.release(state.u, 0.0)
 
     def _follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
-        end, held = target, self._held(state, target)
+        end, loads = target, self._held_loads(state, target)
         drag, begin = DragSchedule(), state.u + self._imperfection
         for _ in range(DRAG_STEPS):
-            new = self._dragged(state, held, begin, drag)
+            new = self._dragged(state, loads, begin, drag)
             if new is None:
                 continue
             accept(state, new)
-            if held.duration > 0.0:
-                held, end = (each.at_once(new.bone) for each in (held, end))
-            _refuse_flight(new, held)
+            if loads.duration > 0.0:
+                loads, end = (each.at_once(new.bone) for each in (loads, end))
+            _raise_if_pulled_off(new, loads)
             drag.moved(float(np.abs(new.u - state.u).max()))
             state, begin = new, new.u
             if drag.calm:
@@ -103,19 +104,19 @@ class Relaxation:
                 if rest is not None:
                     accept(state, rest)
                     return rest
-                drag.not_at_rest()
+                drag.lower_test_rate()
             drag.choose()
             if drag.rate < DRAG_LEAST:
                 break
         raise StepFailed("the released finger does not come to rest", [])
 
-    def _held(self, state: State, target: Target) -> Target:
-        """The loads of the steps with drag: a snap takes no time, but where hand or charge have their own."""
+    def _held_loads(self, state: State, target: Target) -> Target:
+        """The loads of the steps with drag: without time, unless hand or charge transport depend on it."""
         target = replace(target, voltage=target.voltage.held(state))
         return target if self.charged or target.drive.timed else replace(target, duration=0.0)
 
     def _dragged(self, state: State, target: Target, begin: Floats, drag: DragSchedule) -> State | None:
-        """The equilibrium with drag that holds the body at `begin` (N, dim); None, and slower, if failed."""
+        """The equilibrium with drag from `begin` (N, dim); None, and a larger rate, if it is not found."""
         self.body.release(begin, drag.rate)
         try:
             return self.solve(state, target)
@@ -129,7 +130,7 @@ class Relaxation:
 
     @property
     def _imperfection(self) -> Floats:
-        """A shear (N, dim) by `IMPERFECTION` along x, fixed on top, larger on the right: without symmetry."""
+        """Imperfection that breaks symmetry: shear (N, dim) along x, fixed on top, larger on the right."""
         points = self.body.space.mesh.points
         height, shear = float(np.ptp(points[:, 1])), np.zeros_like(points)
         depth = (points[:, 1].max() - points[:, 1]) / height
@@ -145,7 +146,7 @@ class Relaxation:
             return None
 
 
-def _refuse_flight(state: State, target: Target) -> None:
+def _raise_if_pulled_off(state: State, target: Target) -> None:
     """Raise `LiftedOff` if contact is lost and the attraction is smaller than the pull."""
     held, force = -float(state.attraction[:, 1].sum()), pull(state, target)
     if force > max(held, 0.0) and not state.touching.any():
@@ -153,15 +154,15 @@ def _refuse_flight(state: State, target: Target) -> None:
 
 
 def pull(state: State, target: Target) -> float:
-    """Force (N/mm) upwards on the bone at `target`, negative where it is pressed, 0 where it is held."""
+    """Upward force (N/mm) on the bone at `target`, negative for a load, 0 at a prescribed height."""
     return target.height.missing(float(state.bone[1]), np.zeros(2)) if target.height.free else 0.0
 
 
 @dataclass
 class DragSchedule:
-    """Drag of a release: the `rate` of the next step, the factor `slower` by which it rises if that fails,
-    the last step's `speed` (mm) and its `growth` over the step before. At rates below `quiet` an equilibrium
-    without drag is sought.
+    """Drag of a release: the `rate` of the next step, the `rate_factor` by which it rises if that fails, the
+    last step's `speed` (mm) and its `growth` over the step before. At rates below `rate_to_test_rest` an
+    equilibrium without drag is sought.
 
     >>> drag = DragSchedule()
     >>> drag.moved(0.5), drag.choose(), drag.moved(0.25), drag.rate, drag.growth
@@ -171,30 +172,30 @@ class DragSchedule:
     """
 
     rate: float = 1.0
-    slower: float = DRAG_CHANGE
+    rate_factor: float = DRAG_CHANGE
     speed: float = np.inf
     growth: float = 0.0
-    quiet: float = DRAG_REST
+    rate_to_test_rest: float = DRAG_REST
 
     def failed(self) -> None:
-        """A step failed: the next one is slower."""
-        self.rate, self.slower = self.slower * self.rate, DRAG_CHANGE * self.slower
+        """A step failed: raise the rate."""
+        self.rate, self.rate_factor = self.rate_factor * self.rate, DRAG_CHANGE * self.rate_factor
 
     def moved(self, distance: float) -> None:
         """A step moved the body by a distance (mm)."""
-        before, self.speed, self.slower = self.speed, self.rate * distance, DRAG_CHANGE
+        before, self.speed, self.rate_factor = self.speed, self.rate * distance, DRAG_CHANGE
         self.growth = self.speed / max(before, TINY)
         if self.growth > 1.0:
-            self.quiet = DRAG_REST
+            self.rate_to_test_rest = DRAG_REST
 
     @property
     def calm(self) -> bool:
-        """Whether the body slows down with hardly any drag: it may be at rest."""
-        return self.growth <= 1.0 and self.rate < self.quiet
+        """Whether the body is nearly static: it slows down, and the drag is small."""
+        return self.growth <= 1.0 and self.rate < self.rate_to_test_rest
 
-    def not_at_rest(self) -> None:
-        """Without drag no equilibrium was found: ask again at a lower rate."""
-        self.quiet = DRAG_CALMER * self.rate
+    def lower_test_rate(self) -> None:
+        """Without drag no equilibrium was found: try again at a lower rate."""
+        self.rate_to_test_rest = DRAG_CALMER * self.rate
 
     def choose(self) -> None:
         """The rate after a step that succeeded: while an instability grows, drag stays above its rate."""

@@ -1,13 +1,13 @@
-"""Adaptive steps: a requested step is reached exactly, in as many parts as its equilibria need (1. of
-`evfem.solver`).
+"""Adaptive steps: the target of a requested step is reached exactly, in as many substeps as its equilibria
+need (1. of `evfem.solver`).
 
-A body that is released from the begin of a long part lags the loads of its end by all of it, and its edge
-peels on the way: so the part is halved first. After a release the step goes on with the part that worked
-before; its next release comes at a part `COARSER` times as long, so that a step in which the finger snaps
-again and again comes to its end.
+With pseudo-transient continuation (release) from the begin of a long substep the body starts far from
+equilibrium with the loads of the end, and the edge of contact peels meanwhile: so the substep is halved
+first. After a release the step goes on with the length that worked before; the next release comes at a
+substep `COARSER` times as long, so that a step with repeated snaps comes to its end.
 
-Where the error of the path is limited, a part is solved as two halves and accepted if one whole part
-ends close enough to them; its length follows that error (`evfem.solver.path`).
+Where the step error is limited, a substep is solved as two halves and accepted if one whole substep ends
+close enough to them; its length follows that error (`evfem.solver.path`).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from evfem.tissue.body import Body
 
 #: why an equilibrium is refused that lies behind a barrier
 BARRIER = "the equilibrium that was found lies behind a barrier, which the finger would not climb"
-#: a climb that is rounding, as a share of the stored energy
-CLIMB = 1e-3
+#: energy barriers below this fraction of the stored energy are rounding
+SMALLEST_BARRIER = 1e-3
 
 
 class Accounts(Protocol):
@@ -46,21 +46,22 @@ class Accounts(Protocol):
 
 @dataclass
 class Release:
-    """`least`: substep length below which the body is released; `trusted`: length that worked last;
-    `unstable`: a substep from the present state failed because the tangent was not positive definite.
+    """Decision on pseudo-transient continuation. `least`: substep length below which it is tried;
+    `last_successful`: length of the last accepted substep; `unstable`: a substep from the present state
+    failed because the tangent was not positive definite.
     """
 
     least: float
-    trusted: float
+    last_successful: float
     unstable: bool = False
 
 
 @dataclass
 class Stepper:
-    """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step, that worked
-    last. `body` is what is released where no equilibrium is near; without it such a step fails. `snaps`:
-    parts in which stability was lost without a release. The
-    `scheme` says what a part is made of (`evfem.solver.path`).
+    """Follows load paths with an equilibrium solver; keeps the length of the next substep, as a fraction of a
+    step. Without a `body` there is no pseudo-transient continuation, and a step without an equilibrium nearby
+    fails. `snaps`: substeps in which stability was lost without it. `scheme`: a substep is one equilibrium,
+    or two halves (`evfem.solver.path`).
     """
 
     equilibrium: Equilibrium
@@ -80,8 +81,8 @@ class Stepper:
         self.substep = self.scheme.first(self.substep)
 
     def follow(self, state: State, path: Path, accounts: Accounts) -> tuple[State, int]:
-        """From `state` to the end of `path`; the accounts see every converged substep. Returns the end
-        and the number of substeps.
+        """From `state` to the end of `path`; every converged substep is added to the accounts. Returns the
+        last state and the number of substeps.
 
         Raises `StepFailed` when the smallest substep fails; what was accepted before stays accepted.
         """
@@ -91,55 +92,57 @@ class Stepper:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
             try:
-                parts, error = self.scheme.solve(self.solve, state, path, (done, fraction))
+                solved, error = self.scheme.solve(self.solve, state, path, (done, fraction))
             except StepFailed as failed:
                 left, target = 1.0 - done, path(done, fraction)
                 self.substep = 0.5 * (fraction - done)
-                rest = self._shortened(state, target, left, accounts, failed)
+                rest = self._halve_or_release(state, target, left, accounts, failed)
                 if rest is not None:
                     state, done, substeps = rest, fraction, substeps + 1
                 continue
-            shorter = self.scheme.refused(error, fraction - done, strategy)
+            shorter = self.scheme.shorter_length(error, fraction - done, strategy)
             if shorter is not None:
                 self.substep = shorter
                 continue
-            self._release = replace(self._release, trusted=self.substep, unstable=False)
-            for target, new in parts:
-                if len(parts) > 1:
-                    # others were tried since: works are those of the trial that began last
+            self._release = replace(self._release, last_successful=self.substep, unstable=False)
+            for target, new in solved:
+                if len(solved) > 1:
+                    # other trials were begun since: rooms compute works of the trial that began last
                     self.equilibrium.begin(state, target)
                 self.snaps += bool(accounts.accept(state, new))
                 state, substeps = new, substeps + 1
             easy = self.equilibrium.record.iterations - before <= strategy.easy
-            self.substep = self.scheme.following(self.substep, fraction - done, error, easy, strategy)
+            self.substep = self.scheme.next_substep(self.substep, fraction - done, error, easy, strategy)
             done = fraction
         return state, substeps
 
-    def _shortened(
+    def _halve_or_release(
         self, state: State, target: Target, left: float, accounts: Accounts, failed: StepFailed
     ) -> State | None:
-        """Go on with half of the part that failed, or release the body where that is short enough: its rest
-        is returned, and the part that worked before is tried next. Raises `failed` at the smallest part of
-        what was `left` of the step, or `LiftedOff`.
+        """Halve the substep that failed, or, where that is short enough, try pseudo-transient continuation:
+        the state at rest is returned, and the length that worked before is tried next. Raises `failed` at the
+        smallest fraction of what was `left` of the step, or `LiftedOff`.
         """
-        release, half, least = self._release, self.substep, self._least(target) * left
+        release, half, smallest = self._release, self.substep, self._smallest_substep(target) * left
         self.cuts += 1
         release.unstable = failed.unstable = release.unstable or failed.unstable
         if half >= release.least:
             return None
-        rest = self._released(state, target, accounts, failed)
+        rest = self._relaxed(state, target, accounts, failed)
         if rest is None:
-            if half < least:
-                self._refuse_flight(state, target, failed)
+            if half < smallest:
+                self._raise_if_pulled_off(state, target, failed)
                 raise failed
-            self.substep, release.least = half, least
+            self.substep, release.least = half, smallest
             return None
-        self.substep, release.unstable = min(1.0, max(release.trusted, release.least)), False
+        self.substep, release.unstable = min(1.0, max(release.last_successful, release.least)), False
         release.least *= COARSER
         return rest
 
-    def _least(self, target: Target) -> float:
-        """The smallest part of what is left of a step: larger where it takes time, which stiffens tissue."""
+    def _smallest_substep(self, target: Target) -> float:
+        """Smallest admissible substep, as a fraction of what is left of the step. Its square in
+        time-dependent runs, where a shorter step stiffens the tissue and therefore helps.
+        """
         least = self.equilibrium.strategy.smallest_part
         timed = self.body is not None and not self._relaxation(self.body).applies(target)
         return least**2 if timed else least
@@ -147,8 +150,8 @@ class Stepper:
     def _relaxation(self, body: Body) -> Relaxation:
         return Relaxation(body, self.solve, self.equilibrium.attraction.flows)
 
-    def _released(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
-        """Equilibrium that the body snaps to from `state`, or None; `Folded` or `LiftedOff` if impossible."""
+    def _relaxed(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
+        """Equilibrium by pseudo-transient continuation from `state`, or None; raises `LiftedOff`."""
         self.substep, failed.last = 1.0, (state, target)
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return None
@@ -171,8 +174,8 @@ class Stepper:
         self.relaxations += 1
         return rest
 
-    def _refuse_flight(self, state: State, target: Target, failed: StepFailed) -> None:
-        """Raise `LiftedOff` where viscous tissue without mass was pulled off: in the air nothing slows it."""
+    def _raise_if_pulled_off(self, state: State, target: Target, failed: StepFailed) -> None:
+        """Raise `LiftedOff` if viscous tissue without mass was pulled off: nothing resists rigid motion."""
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return
         relaxation = self._relaxation(self.body)
@@ -189,12 +192,12 @@ class Stepper:
             return
 
     def solve(self, state: State, target: Target, start: State | None = None) -> State:
-        """One equilibrium that the body can reach from `state` without climbing, found from `start` (default
-        `state`). Where iterations come to one behind a barrier the body is held (`evfem.solver.hold`); in a
-        release the part fails; in time it fails down to `RELEASED` of a step, and then counts as a snap.
+        """An equilibrium without an energy barrier from `state`, found from `start` (default `state`). If
+        there is a barrier: drag continuation (`evfem.solver.hold`); in a release the substep fails; in time
+        it fails down to `RELEASED` of a step, and then counts as a snap.
         """
-        new = self._found(state, target, start)
-        if not self._climbs(target, state, new):
+        new = self._find_equilibrium(state, target, start)
+        if not self._crosses_barrier(target, state, new):
             return new
         self.barriers += 1
         timed = self.body is None or not self._relaxation(self.body).applies(target)
@@ -203,23 +206,25 @@ class Stepper:
             return new
         if self.body is None or timed or self.releasing:
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
-        new = held(self.body, self._reached, self.equilibrium.strategy.hold, state, target)
+        new = held(self.body, self._reach_without_barrier, self.equilibrium.strategy.hold, state, target)
         self.held += 1
         return new
 
-    def _reached(self, old: State, target: Target, start: State) -> State:
-        """The equilibrium found from `start`, which the body must reach from there without climbing."""
-        new = self._found(old, target, start)
-        if self._climbs(target, start, new):
+    def _reach_without_barrier(self, old: State, target: Target, start: State) -> State:
+        """The equilibrium found from `start`; raises `StepFailed` if a barrier lies between them."""
+        new = self._find_equilibrium(old, target, start)
+        if self._crosses_barrier(target, start, new):
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
         return new
 
-    def _climbs(self, target: Target, old: State, new: State) -> bool:
-        """Whether a barrier lies between two states; none without attraction, or with a sought voltage."""
+    def _crosses_barrier(self, target: Target, old: State, new: State) -> bool:
+        """Whether an energy barrier lies between two states; not tested without attraction, or with an
+        unknown voltage.
+        """
         attraction = self.equilibrium.attraction
         if self.rise is None or not attraction.acts(new.voltage):
             return False
-        return not target.voltage.sought and self.rise(old, new, target) > CLIMB
+        return not target.voltage.sought and self.rise(old, new, target) > SMALLEST_BARRIER
 
-    def _found(self, state: State, target: Target, start: State | None = None) -> State:
+    def _find_equilibrium(self, state: State, target: Target, start: State | None = None) -> State:
         return self.equilibrium.step(state, target, start)
