@@ -1,4 +1,4 @@
-"""What is below the candidates of a linear contact step: rigid, or in series with the body."""
+"""The surface below the candidates of a linear contact step: rigid, or a compliance in series."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ class RigidBelow:
     """A rigid surface below the candidates of a linear step."""
 
     def relative(self, compliance: Floats) -> Floats:
-        """Compliance of the candidates' places relative to the surface."""
+        """Compliance of the candidates' positions relative to the surface."""
         return compliance
 
     def among(self, among: Floats, rows: Ints) -> Floats:
         """The same of some rows."""
         return among
 
-    def freed(self, free: Floats) -> Floats:
-        """Motion (dim C, 1 + p) relative to the surface, without contact forces."""
+    def unloaded(self, free: Floats) -> Floats:
+        """Unloaded motion (dim C, 1 + p), without contact forces, relative to the surface."""
         return free
 
-    def gives(self, whole: Floats) -> Any:
-        """By how much more it gives way (dim C,) under contact forces `whole` (dim C,)."""
+    def displacement(self, whole: Floats) -> Any:
+        """Increment of the surface displacement (dim C,) under contact forces `whole` (dim C,)."""
         return 0.0
 
 
@@ -36,7 +36,8 @@ RIGID_BELOW = RigidBelow()
 @dataclass(frozen=True, eq=False)
 class BelowCandidates(RigidBelow):
     """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
-    what it lacks without contact forces of what the present attraction asks for, `pulled` (2 c,) in mm.
+    its increment without contact forces towards its displacement under the present attraction, `pulled`
+    (2 c,) in mm.
     """
 
     compliance: Floats
@@ -48,8 +49,8 @@ class BelowCandidates(RigidBelow):
     def among(self, among: Floats, rows: Ints) -> Floats:
         return among + block(self.compliance, rows, rows)
 
-    def freed(self, free: Floats) -> Floats:
+    def unloaded(self, free: Floats) -> Floats:
         return free + np.pad(self.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
 
-    def gives(self, whole: Floats) -> Any:
+    def displacement(self, whole: Floats) -> Any:
         return self.pulled + self.compliance @ whole

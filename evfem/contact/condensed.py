@@ -1,19 +1,19 @@
 r"""The linearised body condensed onto its contact candidates, and the contact problem on that compliance.
 
-The compliance :math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved surface contact forces turn
-with the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`. That
-changes in every iteration, and is put into the small block of the nodes near contact alone
+The compliance :math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved surface contact forces
+rotate with the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`. This
+follower-load stiffness changes in every iteration, and enters only the small block of the active nodes
 (`evfem.contact.follower`).
 
 Algorithm (`LinearContactStep.solve`)::
 
-    free <- candidates' displacements without contact forces, and per unit of each extra unknown
-    near <- nodes that touch, would penetrate under the present forces, or are strongly attracted
+    unloaded motion <- candidates' displacements without contact forces, and per unit of each extra unknown
+    active <- nodes that touch, would penetrate under the present forces, or are strongly attracted
     repeat
-        solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included
-        displacements <- free + C (forces on `near`)
+        solve Signorini-Coulomb on `active` (`evfem.contact.signorini`), follower stiffness included
+        displacements <- unloaded motion + C (forces on `active`)
         penetrated <- other candidates that have penetrated; stop if there are none
-        near <- near and penetrated
+        active <- active and penetrated
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from evfem.contact.signorini import (
 from evfem.contact.solve import solve_with_attraction
 from evfem.tissue.kernels.blocks import contact_loop
 
-#: y, x and z of a vector (x, y, z), and the other way round
+#: y, x and z of a vector (x, y, z), and conversely
 COMPONENTS = np.array([1, 0, 2])
 #: why there is no solution where the compliance is not positive
 LOST_STABILITY = "the body gives way the more, the more it is loaded"
@@ -48,13 +48,13 @@ LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 #: displacements, forces on the body (dim c,), contact forces (c, dim), statuses (c,), extra unknowns (p,),
 #: linear systems solved, whether the attraction was scaled down
-Settled = tuple[Floats, Floats, Floats, Ints, Floats, int, bool]
+ContactOfCandidates = tuple[Floats, Floats, Floats, Ints, Floats, int, bool]
 
 
 @dataclass(frozen=True, eq=False)
 class StepSolution:
-    """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns; by how
-    much more an elastic surface has `given` way (dim c,), 0 of a rigid one.
+    """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns; the
+    increment of the `surface_displacement` of an elastic surface (dim c,), 0 of a rigid one.
     """
 
     moved: Floats
@@ -63,7 +63,7 @@ class StepSolution:
     extra: Floats
     solves: int
     reduced: bool
-    given: Any = 0.0
+    surface_displacement: Any = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,15 +82,15 @@ class CondensedTangent:
         inner = schur[:-dim, :-dim] if coupling is None else schur[:-dim, :-dim] - coupling
         return cls(schur, inverse(inner, symmetric=coupling is None), dim)
 
-    def rows(self, near: Ints) -> Ints:
+    def rows(self, nodes: Ints) -> Ints:
         """Rows of these candidates, (y, x[, z]) node by node."""
-        return np.asarray((self.dim * near[:, None] + COMPONENTS[: self.dim]).ravel())
+        return np.asarray((self.dim * nodes[:, None] + COMPONENTS[: self.dim]).ravel())
 
-    def among(self, near: Ints) -> Floats:
+    def among(self, nodes: Ints) -> Floats:
         """Compliance among these candidates, in the order of `rows`; often those of the last call."""
-        key = near.tobytes()
+        key = nodes.tobytes()
         if key not in self._last:
-            rows = self.rows(near)
+            rows = self.rows(nodes)
             self._last.clear()
             self._last[key] = block(self.compliance, rows, rows)
         return self._last[key]
@@ -114,8 +114,8 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class ExtraUnknown:
-    """A number that a step has to find beside the displacements, and the force on the bone that
-    settles it, or another `condition`.
+    """A scalar unknown of a step beside the displacements, and its equation: a prescribed force on the bone,
+    or another `condition`.
 
     `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y, 2 z) whose
     force shall be `force` (N/mm), or that `along` a unit vector (dim,).
@@ -127,8 +127,8 @@ class ExtraUnknown:
     condition: Condition | None = None
     along: Floats | None = None
 
-    def part(self, components: Floats) -> Floats:
-        """What of the bone's components (dim, ...), which come last, is that of its force (...)."""
+    def component(self, components: Floats) -> Floats:
+        """Component along the prescribed force (...) of quantities (dim, ...) of the bone, here last."""
         if self.along is None:
             return np.asarray(components[self.axis - len(components)])
         return np.asarray(np.tensordot(self.along, components, axes=1))
@@ -149,44 +149,59 @@ class LinearContactStep:
     tolerance: float = ROUNDING
 
     @cached_property
-    def seen(self) -> Floats:
-        """Compliance of the candidates' places relative to the surface."""
+    def relative_compliance(self) -> Floats:
+        """Compliance of the candidates' positions relative to the surface."""
         return self.bed.relative(self.body.compliance)
 
     def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
-        alone = self._free_motion()
-        free = self.bed.freed(alone)
+        body_motion = self._free_motion()
+        unloaded_motion = self.bed.unloaded(body_motion)
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
-        gap = normal_gap + self._along_normal(free[:, 0] + self.seen @ self._present)
+        gap = normal_gap + self._along_normal(
+            unloaded_motion[:, 0] + self.relative_compliance @ self._present
+        )
         status = self.candidates.status
-        own = np.diagonal(self.seen)[1 :: self.body.dim]
+        own = np.diagonal(self.relative_compliance)[1 :: self.body.dim]
         # in contact, in the surface, or attracted with a feedback on the node itself
-        near = (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
-        if not near.any():  # the dense problem has at least one node: the one with the smallest gap
-            near[np.argmin(gap)] = True
-        found = self._compiled(near, free, alone) if self.body.dim == 2 else None
-        moved, whole, force, status, extra, solves, reduced = found or self._settled(near, free, alone)
-        # the shear of closed nodes also follows its place within the step, by the slope of their friction
+        active = (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
+        if not active.any():  # the dense problem has at least one node: the one with the smallest gap
+            active[np.argmin(gap)] = True
+        found = self._compiled(active, unloaded_motion, body_motion) if self.body.dim == 2 else None
+        moved, whole, force, status, extra, solves, reduced = found or self._settled(
+            active, unloaded_motion, body_motion
+        )
+        # the shear of closed nodes also changes with their position within the step, by the slope of friction
         horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
-        given = self.bed.gives(whole)
-        return StepSolution(moved - given, force, status, extra, solves, reduced, given)
+        surface_displacement = self.bed.displacement(whole)
+        return StepSolution(
+            moved - surface_displacement, force, status, extra, solves, reduced, surface_displacement
+        )
 
-    def _settled(self, near: Any, free: Floats, alone: Floats) -> Settled:
-        """Contact of the `near` nodes (c,) bool, which others join that sink in, until none does."""
-        known, status, solves, nodes = self.candidates, self.candidates.status.copy(), 0, np.flatnonzero(near)
+    def _settled(self, active: Any, unloaded_motion: Floats, body_motion: Floats) -> ContactOfCandidates:
+        """Contact of the `active` nodes (c,) bool, to which penetrating ones are added until none is left."""
+        known, status, solves, nodes = (
+            self.candidates,
+            self.candidates.status.copy(),
+            0,
+            np.flatnonzero(active),
+        )
         while True:
-            found, pushed = self._solve_near(nodes, free, alone, status[nodes])
+            found, pushed = self._solve_active(nodes, unloaded_motion, body_motion, status[nodes])
             solves += found.solves
             status[nodes] = found.status
-            whole = np.zeros(free.shape[0])
+            whole = np.zeros(unloaded_motion.shape[0])
             whole[self.body.rows(nodes)] = pushed
-            moved = free[:, 0] + free[:, 1:] @ found.extra + self.seen @ whole
+            moved = (
+                unloaded_motion[:, 0]
+                + unloaded_motion[:, 1:] @ found.extra
+                + self.relative_compliance @ whole
+            )
             gap = known.surface.normal_gap + self._along_normal(moved)
-            gap[nodes] = 0.0  # the dense problem has settled theirs
+            gap[nodes] = 0.0  # solved in the dense problem
             penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(known.surface.gap)))
             if not penetrated.size:
                 break
@@ -195,15 +210,17 @@ class LinearContactStep:
         force[nodes] = found.force.reshape(-1, self.body.dim)
         return moved, whole, force, status, found.extra, solves, found.reduced
 
-    def _compiled(self, near: Any, free: Floats, alone: Floats) -> Settled | None:
-        """The same in the plane in compiled code; None without it, where large systems are solved sooner than
-        there, where statuses go round in a circle, and where a pad may snap.
+    def _compiled(
+        self, active: Any, unloaded_motion: Floats, body_motion: Floats
+    ) -> ContactOfCandidates | None:
+        """The same in the plane in compiled code; None without it, for large systems, which are solved faster
+        otherwise, where statuses cycle, and where a pad may snap.
         """
-        if (settle := contact_loop()) is None or near.sum() > LARGE_SYSTEM:
+        if (settle := contact_loop()) is None or active.sum() > LARGE_SYSTEM:
             return None
-        known, c, p = self.candidates, len(near), len(self.unknowns)
+        known, c, p = self.candidates, len(active), len(self.unknowns)
         none, rough = np.zeros((c, 2)), known.roughness
-        parts = (
+        columns = (
             known.surface.normal_gap,
             known.slip,
             known.friction,
@@ -220,20 +237,27 @@ class LinearContactStep:
             ),
             -ROUNDING * (1.0 + np.abs(known.surface.gap)),
         )
-        equations = np.column_stack(self._far_balance(alone)) if p else np.zeros((0, 2 * c + 2))
-        marks, found = np.stack([known.status, near]).astype(np.int32), np.empty(8 * c + p)
-        arrays = (self.seen, free, np.column_stack(parts), equations, marks, found)
+        equations = np.column_stack(self._far_balance(body_motion)) if p else np.zeros((0, 2 * c + 2))
+        marks, found = np.stack([known.status, active]).astype(np.int32), np.empty(8 * c + p)
+        arrays = (
+            self.relative_compliance,
+            unloaded_motion,
+            np.column_stack(columns),
+            equations,
+            marks,
+            found,
+        )
         solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, arrays)
         moved, whole, acts, extra = np.split(found, [2 * c, 4 * c, 8 * c])
         status = marks[0].astype(np.int64)
         return None if solves < 0 else (moved, whole, acts.reshape(c, 4)[:, :2], status, extra, solves, False)
 
-    def among(self, near: Ints) -> Floats:
-        """`seen` among these candidates, in the order of `CondensedTangent.rows`."""
-        return self.bed.among(self.body.among(near), self.body.rows(near))
+    def among(self, nodes: Ints) -> Floats:
+        """`relative_compliance` among these candidates, in the order of `CondensedTangent.rows`."""
+        return self.bed.among(self.body.among(nodes), self.body.rows(nodes))
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
-        """Force (N/mm) that the bone lacks along the first unknown's axis, were its `travel` given."""
+        """Force residual (N/mm) of the bone along the first unknown's axis for a prescribed `travel`."""
         unknown = self.unknowns[0]
         bone = self.bone.copy()
         bone[unknown.axis] += travel
@@ -245,8 +269,8 @@ class LinearContactStep:
 
     @cached_property
     def _own(self) -> Floats:
-        """Each candidate's own compliance along x[, z], (c, d)."""
-        return np.diagonal(self.seen).reshape(-1, self.body.dim)[:, ::2]
+        """Diagonal compliance of each candidate along x[, z], (c, d)."""
+        return np.diagonal(self.relative_compliance).reshape(-1, self.body.dim)[:, ::2]
 
     def _along_normal(self, moved: Floats) -> Floats:
         normal, dim = self.candidates.surface.axes[:, 0], self.body.dim
@@ -265,22 +289,23 @@ class LinearContactStep:
         force = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.surface.axes)
         return force[:, COMPONENTS[: self.body.dim]].ravel()
 
-    def _solve_near(
-        self, near: Ints, free: Floats, alone: Floats, status: Ints
+    def _solve_active(
+        self, active_nodes: Ints, unloaded_motion: Floats, body_motion: Floats, status: Ints
     ) -> tuple[ContactSolution, Floats]:
-        """Contact among the `near` nodes, by how they move `free` of contact forces, and the body `alone`:
-        solution in their frames, and the forces (dim k,) on the body, those of the follower stiffness too.
+        """Contact among the `active_nodes`, from their `unloaded_motion` relative to the surface and that of
+        the body alone: solution in their frames, and the forces (dim k,) on the body, with those of the
+        follower stiffness.
 
-        That stiffness may be steep: it multiplies what moves beyond the present forces `held`, which is small
-        near the equilibrium, and not the whole free motion.
+        That stiffness may be large: it multiplies the motion beyond that under the `present` forces, which is
+        small near the equilibrium, and not the whole unloaded motion.
         """
-        known, rows, dim = self.candidates[near], self.body.rows(near), self.body.dim
-        follower = FollowerStiffness.of(known.follower_rate(self._own[near]))
-        among, own, held = self.among(near), free[rows], self._present[rows]
-        own[:, 0] += among @ held
-        C, W = follower.apply(among, own)
-        W[:, 0] -= C @ held  # the unknowns are whole forces again, not increments
-        problem = self._problem(known, (C, W), self._bone_balance(rows, alone, (C, W), follower))
+        known, rows, dim = self.candidates[active_nodes], self.body.rows(active_nodes), self.body.dim
+        follower = FollowerStiffness.of(known.follower_rate(self._own[active_nodes]))
+        among, motion, present = self.among(active_nodes), unloaded_motion[rows], self._present[rows]
+        motion[:, 0] += among @ present
+        C, W = follower.apply(among, motion)
+        W[:, 0] -= C @ present  # the unknowns are whole forces again, not increments
+        problem = self._problem(known, (C, W), self._bone_balance(rows, body_motion, (C, W), follower))
         attraction = AttractionStiffness(
             known.negative_stiffness, known.surface.normal_gap, known.gain_on_closing, known.roughness
         )
@@ -300,7 +325,7 @@ class LinearContactStep:
     def _problem(
         self, known: Candidates, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
     ) -> ContactProblem:
-        """Compliance of these nodes in their frames, which other forces have `moved`."""
+        """The contact problem of these nodes in their frames: compliance, and the motion by other forces."""
         (C, W), extra, axes = moved, None, known.surface.axes
         at_rest = np.column_stack([known.surface.normal_gap, known.slip])
         if balance is not None:
@@ -313,48 +338,54 @@ class LinearContactStep:
             compliance,
             known.friction,
             extra,
-            chords=known.by_chords(compliance),
+            secants=known.secant_coefficients(compliance),
             cohesion=known.cohesion,
             give=known.interface_compliance.ravel() if known.interface_compliance.any() else None,
             tolerance=self.tolerance,
             dense=self.body.dense,
         )
 
-    def _far_balance(self, alone: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    def _far_balance(self, body_motion: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """The unknowns' equations without follower forces: by forces on candidates (p, dim c), by unknowns
-        (p, p), what lacks (p,), and the least pivots (p,): a body that nothing holds is to fall, not to rise.
+        (p, p), right-hand sides (p,), and the least pivots (p,): a body without contact must move with its
+        load, not against it.
         """
         (S, by_unknowns, wanted, carried), dim = self.equations, self.body.dim
-        pivot = S[:, :-dim] @ alone[:, 1:] + by_unknowns
-        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ alone[:, 0]
+        pivot = S[:, :-dim] @ body_motion[:, 1:] + by_unknowns
+        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ body_motion[:, 0]
         bone = np.array([unknown.condition is None for unknown in self.unknowns])
-        held = np.stack([unknown.part(self.body.schur[-dim:]) for unknown in self.unknowns])[:, :-dim]
-        floor = SMALLEST_PIVOT * np.abs(held @ alone[:, 1:]).max(initial=0.0)
+        bone_forces = np.stack([unknown.component(self.body.schur[-dim:]) for unknown in self.unknowns])[
+            :, :-dim
+        ]
+        floor = SMALLEST_PIVOT * np.abs(bone_forces @ body_motion[:, 1:]).max(initial=0.0)
         return carried, pivot, value, np.where(bone, floor, 0.0)
 
     def _bone_balance(
-        self, rows: Ints, alone: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
+        self, rows: Ints, body_motion: Floats, active: tuple[Floats, Floats], follower: FollowerStiffness
     ) -> tuple[Floats, Floats, Floats] | None:
-        """These equations with the follower forces of the near nodes, at `rows` (dim k,)."""
+        """These equations with the follower forces of the active nodes, at `rows` (dim k,)."""
         if not self.unknowns:
             return None
-        (C, W), (carried, pivot, value, floor) = near, self._far_balance(alone)
+        (C, W), (carried, pivot, value, floor) = active, self._far_balance(body_motion)
         row = carried[:, rows]
         through = follower.transposed(row)
         pivot = pivot + through @ W[:, 1:]
         own = np.diagonal(pivot)
-        held = np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
-        return row + through @ C, pivot + held, value - through @ W[:, 0]
+        least_pivots = np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
+        return row + through @ C, pivot + least_pivots, value - through @ W[:, 0]
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Of the p unknowns, the bone's balance along their axes or a condition: what displacements (p, m)
-        and unknowns (p, p) add, right-hand sides (p,), and what forces on the candidates add (p, m - dim).
+        """Equations of the p unknowns, the bone's balance along their axes or a condition: coefficients of
+        displacements (p, m) and unknowns (p, p), right-hand sides (p,), and coefficients of forces on the
+        candidates (p, m - dim).
         """
         dim = self.body.dim
         pushes = np.stack([unknown.push[-dim:] for unknown in self.unknowns], axis=1)
         bone = (self.body.schur[-dim:], self.body.bone_rows, pushes, self.residual[-dim:])
-        S, carried, pushed, residual = (np.stack([one.part(rows) for one in self.unknowns]) for rows in bone)
+        S, carried, pushed, residual = (
+            np.stack([one.component(rows) for one in self.unknowns]) for rows in bone
+        )
         by_unknowns, wanted = -pushed, residual + np.array([unknown.force for unknown in self.unknowns])
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:

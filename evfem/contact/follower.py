@@ -1,8 +1,9 @@
-r"""Candidates for contact; stiffness of forces that turn with the profile, in the block of near nodes.
+r"""Candidates for contact; follower-load stiffness of contact forces that rotate with the profile, in the
+block of active nodes.
 
-A node that moves along a profile, by dx[, dz], takes the direction of its contact force along, and at a
-slope of the friction coefficient its size: :math:`df = T\,dx`. With the compliance C of the body that gives
-:math:`u = C (f + T u)`, so :math:`(1 - C T)^{-1} C` takes the place of C, and the same of free motions.
+As a node moves along a profile, by dx[, dz], its contact force rotates with the normal, and at a slope of
+the friction coefficient changes its size: :math:`df = T\,dx`. With the compliance C of the body that gives
+:math:`u = C (f + T u)`: :math:`(1 - C T)^{-1} C` replaces C, and likewise for motions without contact forces.
 Where the feedback C T exceeds 1, stability is lost: no solution, or one in the wrong direction.
 
 Components are ordered per node, (y, x[, z]); axes (k, 1 + d, 1 + d) are rows n, t[, t2] in that order.
@@ -46,17 +47,17 @@ class Candidates:
     slip_stiffness: Floats | None = None
 
     def __getitem__(self, nodes: Ints) -> Candidates:
-        """These of the candidates alone."""
-        parts: Any = (None if part is None else part[nodes] for part in vars(self).values())
-        return Candidates(*parts)
+        """The data of these candidates."""
+        columns: Any = (None if column is None else column[nodes] for column in vars(self).values())
+        return Candidates(*columns)
 
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force (y, x[, z]) per displacement of its node along x[, z], (c, 1 + d, d),
-        of the own compliances (c, d) along them.
+        """Follower-load stiffness: change of the contact force (y, x[, z]) per displacement of its node along
+        x[, z], (c, 1 + d, d), with the diagonal compliances `own` (c, d) along these.
         """
-        turned = self.surface.turned(self.force)
+        rotated_force = self.surface.turned(self.force)
         grown = np.einsum("caj,cak->ckj", self.friction_growth(own), self.surface.axes[:, 1:])
-        return np.asarray(turned + grown)
+        return np.asarray(rotated_force + grown)
 
     @property
     def shear_direction(self) -> Floats:
@@ -67,8 +68,8 @@ class Candidates:
         slips = (self.status == SLIP) & (shear > 0.0)
         return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
 
-    def by_chords(self, compliance: Floats) -> Floats | None:
-        """Coefficients (c,) by the chords of their friction law, not too steep, or None."""
+    def secant_coefficients(self, compliance: Floats) -> Floats | None:
+        """Secant friction coefficients (c,) of a friction law, bounded, or None under Coulomb's."""
         if self.cohesion is None:
             return None
         normal, along = np.maximum(self.force[:, 0], 0.0), self.shear_direction
@@ -80,9 +81,9 @@ class Candidates:
         return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
 
     def friction_growth(self, own: Floats) -> Floats:
-        """That part of it which is friction: change of the shear force (a) per displacement of the node along
-        x[, z] (j), (c, d, d). Where it falls faster than the tissue stiffens, a node snaps forward: its
-        friction stays at the present coefficient.
+        """The frictional contribution to it: change of the shear force (a) per displacement of the node along
+        x[, z] (j), (c, d, d). Where friction falls faster than the tissue stiffens, a node snaps forward: its
+        friction keeps the present coefficient.
         """
         direction = self.shear_direction
         if self.slip_stiffness is None and not self.friction_slope.any():
@@ -90,7 +91,7 @@ class Candidates:
         growth = direction[:, :, None] * (self.friction_slope * self.force[:, :1])[:, None, :]
         along = np.any(direction, axis=1, keepdims=True)
         if self.slip_stiffness is not None:
-            # a node that slips is held along its slip, one that sticks either way
+            # friction resists a slipping node along its slip, a sticking one in every direction
             held = np.where(
                 along[:, :, None], direction[:, :, None] * direction[:, None, :], np.eye(direction.shape[1])
             )
@@ -103,8 +104,8 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class FollowerStiffness:
-    """Forces (y, x[, z]) per displacement of nodes, `rate` (l, 1 + d): of the `loaded` nodes (l,) among the
-    near ones, along x (`axis` 1) or z (2).
+    """Follower-load stiffness: forces (y, x[, z]) per displacement, `rate` (l, 1 + d), of the nodes with
+    force, `loaded` (l,), among the active ones, along x (`axis` 1) or z (2).
     """
 
     loaded: Ints
@@ -113,9 +114,7 @@ class FollowerStiffness:
 
     @classmethod
     def of(cls, rate: Floats) -> FollowerStiffness:
-        """From the rates of all nodes (k, 1 + d, d); on flat surfaces without slopes of friction none
-        counts.
-        """
+        """From the rates of all nodes (k, 1 + d, d); none on flat surfaces with constant friction."""
         loaded, axis = np.nonzero(rate.any(axis=1))
         return cls(loaded, axis + 1, rate[loaded, :, axis])
 
@@ -124,7 +123,7 @@ class FollowerStiffness:
         """Rows of the nodes' first components."""
         return self.rate.shape[1] * self.loaded
 
-    def _through(self, C: Floats) -> Floats:
+    def _low_rank_product(self, C: Floats) -> Floats:
         """C (q, m) times the columns of T that are not zero."""
         each = (C[:, self._first + a] * self.rate[:, a] for a in range(self.rate.shape[1]))
         return np.asarray(sum(each))
@@ -133,7 +132,7 @@ class FollowerStiffness:
         """(1 - C T)^-1 applied to the compliance (m, m) and to motions (m, p): T has few columns."""
         if not self.loaded.size:
             return C, W
-        x, B = self._first + self.axis, self._through(C)
+        x, B = self._first + self.axis, self._low_rank_product(C)
         gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
         return C + gain @ C[x], W + gain @ W[x]
 
@@ -145,9 +144,9 @@ class FollowerStiffness:
 
     def transposed(self, rows: Floats) -> Floats:
         """Rows (p, m) times T."""
-        through = np.zeros_like(rows)
-        through[:, self._first + self.axis] = self._through(rows)
-        return through
+        product = np.zeros_like(rows)
+        product[:, self._first + self.axis] = self._low_rank_product(rows)
+        return product
 
 
 def local(axes: Floats, columns: Floats) -> Floats:

@@ -1,10 +1,10 @@
 r"""Unilateral contact with Coulomb friction on the dense compliance of the contact candidates: the problem,
-its laws, and its equations where every node has a status.
+its laws, and the linear equations for given statuses of the nodes.
 
 A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered per
 node. With the contact forces :math:`\lambda` the new gaps and slips are :math:`v = (g, s) = v_0 + C\lambda +
 e\,d`, where d are extra unknowns (the bone's travel under a prescribed force) with the equations
-:math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
+:math:`r\lambda + \rho\,d = b`. Signorini and Coulomb require, per node, one of
 
 ======  ==============================  =====================================================
 status  equations                       stays if
@@ -20,16 +20,16 @@ e = z/abs(z), and the direction is an unknown of its own (`solve_statuses`). The
 .. math:: \lambda_n = \max(0, p), \quad \lambda_t = \mathrm{proj}_{\mu\lambda_n}(z), \qquad
           p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
 
-for any positive r; taken is the inverse of the node's own compliance, bounded by what is usual among the
+for any positive r; here the inverse of the node's own compliance, bounded by a fraction of the mean over the
 nodes where it vanishes or is negative.
 
-The attraction of an open node weakens with its gap, a negative stiffness k_e: its drop is one more unknown,
-f = k_e (g - g_ref). A closed node needs none, as its gap is known. Between rough faces the attraction also
-grows with what presses the node (`Roughness`): a closed node moves the body with (1 - kappa) lam_n, and one
-that opens loses what its contact force gained.
+The attraction of an open node decreases with its gap, a negative stiffness k_e: the loss of attraction is one
+more unknown, f = k_e (g - g_ref). A closed node needs none, as its gap is known. Between rough faces the
+attraction also grows with the contact force (`Roughness`): a closed node loads the body with
+(1 - kappa) lam_n, and one that opens loses the gain by its contact force.
 
-A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
-here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
+A bound of friction that is not proportional to the contact force (`evfem.surface.friction`) is linearised:
+mu lam_n + c, with `cohesion` c, replaces mu lam_n.
 
 Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175, doi:10.1016/0045-7825(86)90095-2 (the
 frictional problem as complementarity); P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991)
@@ -50,8 +50,8 @@ from evfem.common.constants import BLOCK, DISC_OWN, ROUNDING
 
 @dataclass(frozen=True)
 class Roughness:
-    """Attraction between rough faces, along normal and tangent: stronger by `gain` (k, 1 + d) times what a
-    contact force has beyond `present` (k,), weaker by `loss_on_opening` (k, 1 + d) N/mm where open.
+    """Attraction between rough faces, along normal and tangent: increased by `gain` (k, 1 + d) times the
+    contact force beyond `present` (k,), reduced by `loss_on_opening` (k, 1 + d) N/mm where open.
     """
 
     gain: Floats
@@ -81,11 +81,13 @@ NO_NODES: Ints = np.zeros(0, dtype=np.int64)
 
 
 class ContactNotSolved(ArithmeticError):
-    """The sub-problem cycles: no solution near, or several. `softest` (k,): statuses, cycling ones open."""
+    """The sub-problem cycles: no solution near, or several. `most_compliant` (k,): the last statuses, with
+    the cycling nodes open.
+    """
 
-    def __init__(self, message: str, softest: Ints = NO_NODES) -> None:
+    def __init__(self, message: str, most_compliant: Ints = NO_NODES) -> None:
         super().__init__(message)
-        self.softest = softest
+        self.most_compliant = most_compliant
 
 
 class Unstable(ContactNotSolved):
@@ -94,9 +96,9 @@ class Unstable(ContactNotSolved):
 
 @dataclass(frozen=True)
 class ExtraUnknowns:
-    """p extra unknowns d: what they do to gaps and slips, `columns` (m, p) with m = (1 + d) k, and the
-    equations that settle them, `rows` (p, m) lam + `pivot` (p, p) d = `right` (p,). Those `conditioned`
-    follow what the body does even where its stability is asked for, as a voltage that keeps a charge.
+    """p extra unknowns d: gaps and slips per unit of them, `columns` (m, p) with m = (1 + d) k, and their
+    equations, `rows` (p, m) lam + `pivot` (p, p) d = `right` (p,). Those `conditioned` respond to the body
+    in its stability analysis too, as a voltage at constant charge.
     """
 
     columns: Floats
@@ -107,28 +109,28 @@ class ExtraUnknowns:
 
     @property
     def followed(self) -> tuple[Floats, Any]:
-        """Factors (m, c), (c, m) of what the conditioned components take off the compliance."""
+        """Factors (m, c), (c, m) of the reduction of the compliance by the conditioned unknowns."""
         some = self.conditioned
         return self.columns[:, some], np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Contact forces and drops of the attraction (m,), and extra unknowns (p,)."""
+    """Contact forces and losses of attraction (m,), and extra unknowns (p,)."""
 
     contact: Floats
-    drop: Floats
+    attraction_loss: Floats
     extra: Floats
 
 
 @dataclass(frozen=True)
 class ContactProblem:
     """Gaps and slips without contact forces (m,), m = (1 + d) k, and compliance (m, m), both per node
-    (n, t[, t2]), friction coefficients (k,), optional extra_unknowns and attraction, the shear force that
-    friction has without a pressing one, `cohesion` (k,) in N/mm (N in three dimensions), and how far the
-    interface itself gives way to contact forces, not to attraction, `give` (m,) in mm per N/mm.
-    `chords` (k,): coefficients that take the place of tangents and cohesion of a friction law. The laws hold
-    to `tolerance`, relative to the largest force; `dense` solves.
+    (n, t[, t2]), friction coefficients (k,), optional extra_unknowns and attraction, the friction bound at
+    zero contact force, `cohesion` (k,) in N/mm (N in three dimensions), and the compliance of the interface
+    to contact forces, not to attraction, `give` (m,) in mm per N/mm. `secants` (k,): secant friction
+    coefficients that replace tangent and cohesion of a friction law. The laws hold to `tolerance`, relative
+    to the largest force; `dense` solves.
     """
 
     start: Floats
@@ -138,15 +140,15 @@ class ContactProblem:
     attraction: AttractionStiffness | None = None
     cohesion: Floats | None = None
     give: Floats | None = None
-    chords: Floats | None = None
+    secants: Floats | None = None
     tolerance: float = ROUNDING
     dense: DenseSolver = field(default_factory=DenseSolver)
 
     @property
-    def by_chords(self) -> ContactProblem:
-        """The problem with the chords of its friction laws in the place of their tangents."""
-        assert self.chords is not None
-        return replace(self, friction=self.chords, cohesion=None, chords=None)
+    def with_secants(self) -> ContactProblem:
+        """The problem with secant friction coefficients instead of the tangents of the friction laws."""
+        assert self.secants is not None
+        return replace(self, friction=self.secants, cohesion=None, secants=None)
 
     @property
     def size(self) -> int:
@@ -165,7 +167,7 @@ class ContactProblem:
 
     @cached_property
     def gives_way(self) -> bool:
-        """Whether the body gives way the more, the more it is loaded: the compliance is not positive."""
+        """Whether the compliance is not positive definite: the body yields against its load."""
         try:
             return not np.linalg.cholesky(self.under_forces + self.under_forces.T).size
         except np.linalg.LinAlgError:
@@ -184,7 +186,7 @@ class ContactProblem:
 
     @cached_property
     def own(self) -> tuple[Floats, Floats]:
-        """Size of each node's own compliance, normal and tangent, (k,), at least `DISC_OWN` of the mean."""
+        """Diagonal compliance of each node, normal and tangent, (k,), at least `DISC_OWN` of the mean."""
         i, C = self.dim * np.arange(self.size), self.under_forces
         shear = np.abs(C[i + 1, i + 1])
         if self.dim == 3:
@@ -195,7 +197,7 @@ class ContactProblem:
 
     def state(self, forces: Forces) -> Floats:
         """Gaps and slips (m,) under these forces."""
-        v = self.start + self.compliance @ (forces.contact + forces.drop)
+        v = self.start + self.compliance @ (forces.contact + forces.attraction_loss)
         if self.give is not None:
             v = v + self.give * forces.contact
         return v if self.extra_unknowns is None else v + self.extra_unknowns.columns @ forces.extra
@@ -203,7 +205,7 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (m,), drops of the attraction (m,), statuses (k,), the extra unknowns (p,), new gaps and
+    """Contact forces (m,), losses of attraction (m,), statuses (k,), the extra unknowns (p,), new gaps and
     slips (m,), the number of dense solves, and whether the negative stiffness had to be scaled down.
     """
 
@@ -219,7 +221,7 @@ class ContactSolution:
 @dataclass(frozen=True, eq=False)
 class Projected:
     """Projections of forces, gaps and slips onto the laws: p and z of every node, (k,) and (k, d), its status
-    (k,), and the residual of the laws (k,), relative to the largest force.
+    (k,), and the violation of the laws, `miss` (k,), relative to the largest force.
     """
 
     p: Floats
@@ -231,7 +233,9 @@ class Projected:
     def of(cls, problem: ContactProblem, forces: Forces) -> Projected:
         """Of these forces."""
         state, (normal_own, shear_own) = problem.state(forces), problem.own
-        force, v, drop = (each.reshape(problem.size, -1) for each in (forces.contact, state, forces.drop))
+        force, v, attraction_loss = (
+            each.reshape(problem.size, -1) for each in (forces.contact, state, forces.attraction_loss)
+        )
         # trial forces: those that would close gap and slip if each node had its own compliance alone
         p = force[:, 0] - v[:, 0] / normal_own
         z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
@@ -239,10 +243,12 @@ class Projected:
         slip = np.where(z[:, 0] < 0.0, FORWARD, BACKWARD) if problem.dim == 2 else SLIP
         status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.resists, STICK, slip))
         # radial return onto the disc of friction: sticking keeps z, slipping scales it to the limit
-        part = np.where(status == STICK, 1.0, limit / np.maximum(size, np.maximum(limit, 1e-300)))
-        wanted = np.column_stack([np.maximum(p, 0.0), z * np.where(status == OPEN, 0.0, part)[:, None]])
-        held = 1e-3 * v[:, 0] / normal_own  # what would close the gap, where no node presses
-        scale = max(1e-300, *(np.abs(one).max(initial=0.0) for one in (wanted, force, drop, held)))
+        fraction = np.where(status == STICK, 1.0, limit / np.maximum(size, np.maximum(limit, 1e-300)))
+        wanted = np.column_stack([np.maximum(p, 0.0), z * np.where(status == OPEN, 0.0, fraction)[:, None]])
+        closing_force = 1e-3 * v[:, 0] / normal_own  # what would close the gap, where no node presses
+        scale = max(
+            1e-300, *(np.abs(one).max(initial=0.0) for one in (wanted, force, attraction_loss, closing_force))
+        )
         return cls(p, z, status, np.abs(wanted - force).max(axis=1) / scale)
 
 
@@ -259,12 +265,12 @@ def sizes(vectors: Floats) -> Floats:
 class _Equations:
     """Unknowns and equations of nodes that have these statuses (k,).
 
-    Per node, (k, 1 + d), are known: the force of a closed one that presses with 1, `sheared`, the attraction
-    that this adds, `gain`, and the `drop` and `shear` that no unknown changes. Unknown are, at `place` of the
-    m components, first the pressing forces of the `closed` nodes, which the body feels as `felt` (c, 1 + d),
-    the shear forces of those that stick, and the drops of the `attracted` open ones; then the shear forces
-    of the `turned` nodes (t,) along `aside` (t, 2), of which the fraction `kept` (t,) stays, the slip across
-    counting `turns` (t,). All components that act with them are `whole` (w,), at `index` (m,) of these.
+    Known per node, (k, 1 + d): the force of a closed one with unit pressing force, `sheared`, the attraction
+    that this adds, `gain`, and the constant `attraction_loss` and `shear`. Unknown, at `position` of the m
+    components: first the pressing forces of the `closed` nodes, of which `felt` (c, 1 + d) acts on the body,
+    the shear forces of sticking nodes, and the losses of the `attracted` open ones; then the shear forces
+    of the `turned` nodes (t,) along `aside` (t, 2), with the weight `kept` (t,), and the slip across with
+    `turns` (t,). All components that act with the unknowns are `whole` (w,), numbered by `index` (m,).
     """
 
     def __init__(
@@ -273,16 +279,18 @@ class _Equations:
         n, opened, resists = problem.dim, (status == OPEN)[:, None], problem.resists
         along = np.where((status >= SLIP)[:, None], along, 0.0)
         self.sheared = np.hstack([np.ones(opened.shape), problem.friction[:, None] * along])
-        self.gain, self.drop, self.shear = np.zeros((3, *self.sheared.shape))
+        self.gain, self.attraction_loss, self.shear = np.zeros((3, *self.sheared.shape))
         if problem.cohesion is not None:
             self.shear[:, 1:] = problem.cohesion[:, None] * along
         attracted = np.zeros(0, dtype=np.int64)
         if (attraction := problem.attraction) is not None:
             attracted = np.flatnonzero(opened[:, 0] & (attraction.negative_stiffness > 0.0))
-            self.drop[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
+            self.attraction_loss[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
             if (rough := attraction.roughness) is not None:
                 self.gain = rough.gain
-                self.drop += np.where(opened, rough.loss_on_opening, rough.gain * rough.present[:, None])
+                self.attraction_loss += np.where(
+                    opened, rough.loss_on_opening, rough.gain * rough.present[:, None]
+                )
         turned = np.flatnonzero((status == SLIP) & resists & (turning is not None))
         m = np.ones(status.size) if turning is None else turning
         self.attracted, self.turned, self.closed = attracted, turned, np.flatnonzero(status != OPEN)
@@ -291,20 +299,20 @@ class _Equations:
         self._find(n, status)
 
     def _find(self, n: int, status: Ints) -> None:
-        """Where among the m components the unknowns are, and what acts with them."""
+        """Positions of the unknowns among the m components, and the components that act with them."""
         closed, tangents = self.closed, np.arange(1, n)
         self.felt = (self.sheared - self.gain)[closed]
         sheared = closed[(status[closed] != STICK) & self.felt[:, 1:].any(axis=1)]
         beside = np.append(self.turned, np.setdiff1d(sheared, self.turned)) if self.turned.size else sheared
         held = (n * np.flatnonzero(status == STICK)[:, None] + tangents).ravel()
-        self.place = np.concatenate([n * closed, held, n * self.attracted])
-        self.whole = np.append(self.place, (tangents[:, None] + n * beside).ravel())
+        self.position = np.concatenate([n * closed, held, n * self.attracted])
+        self.whole = np.append(self.position, (tangents[:, None] + n * beside).ravel())
         self.index = np.zeros(n * status.size, dtype=np.int64)
         self.index[self.whole] = np.arange(self.whole.size)
 
     def matrix(self, compliance: Floats) -> Floats:
-        """The equations (u, u) but for their diagonal, made of blocks of rows that the cache holds."""
-        columns = np.empty((self.whole.size, self.place.size + self.turned.size))
+        """The equations (u, u) but for their diagonal, in blocks of rows that fit into the cache."""
+        columns = np.empty((self.whole.size, self.position.size + self.turned.size))
         for begin in range(0, self.whole.size, BLOCK):
             rows = compliance.take(self.whole[begin : begin + BLOCK], axis=0)
             columns[begin : begin + BLOCK] = self.columns(rows.take(self.whole, axis=1))
@@ -321,12 +329,12 @@ class _Equations:
         return self._across(C.T, self.aside).T
 
     def rows(self, v: Floats) -> Floats:
-        """The equations' part (u, q) of gaps and slips of the `whole` (w, q), which are overwritten."""
+        """Rows (u, q) of the equations from gaps and slips of the `whole` (w, q), which are overwritten."""
         return self._across(v, self.turns[:, None] * self.aside)
 
     def _across(self, v: Floats, weight: Floats) -> Floats:
         """v (w, q) with the tangential components of turned nodes as one, by a `weight` (t, 2) of each."""
-        size, end = self.place.size, self.place.size + self.turned.size
+        size, end = self.position.size, self.position.size + self.turned.size
         if self.turned.size:
             v[size:end] *= weight[:, :1]
             v[size:end] += v[self.index[self.felt.shape[1] * self.turned + 2]] * weight[:, 1:]
@@ -346,16 +354,16 @@ def solve_statuses(
     with m given as `turning` (k,); at the solution r drops out.
     """
     extra, system = problem.extra_unknowns, _Equations(problem, status, along, turning)
-    place, closed, attracted, whole = system.place, system.closed, system.attracted, system.whole
-    steady = (system.drop + system.shear).ravel()
+    position, closed, attracted, whole = system.position, system.closed, system.attracted, system.whole
+    steady = (system.attraction_loss + system.shear).ravel()
     start = problem.start + problem.compliance @ steady if steady.any() else problem.start
     right = -system.rows(start[whole, None])
     matrix = system.matrix(problem.compliance)
-    pressed, own = np.split(np.arange(place.size), [place.size - attracted.size])
-    last = np.arange(place.size, len(right))
+    pressed, own = np.split(np.arange(position.size), [position.size - attracted.size])
+    last = np.arange(position.size, len(right))
     matrix[last, last] += system.kept
     if problem.give is not None:
-        matrix[pressed, pressed] += problem.give[place[pressed]]
+        matrix[pressed, pressed] += problem.give[position[pressed]]
     if attracted.size:
         pull: Any = problem.attraction
         matrix[own, own] -= 1.0 / pull.negative_stiffness[attracted]
@@ -371,11 +379,14 @@ def solve_statuses(
         x = both[:, 0] - both[:, 1:] @ d
     pressing = np.zeros((problem.size, 1))
     pressing[closed, 0] = x[: closed.size]
-    force, drop = system.shear + pressing * system.sheared, system.drop - pressing * system.gain
-    force.ravel()[place[closed.size : pressed.size]] = x[closed.size : pressed.size]
+    force, attraction_loss = (
+        system.shear + pressing * system.sheared,
+        system.attraction_loss - pressing * system.gain,
+    )
+    force.ravel()[position[closed.size : pressed.size]] = x[closed.size : pressed.size]
     force[system.turned, 1:] += x[last, None] * system.aside
-    drop[attracted, 0] += x[own]
-    return Forces(force.ravel(), drop.ravel(), d)
+    attraction_loss[attracted, 0] += x[own]
+    return Forces(force.ravel(), attraction_loss.ravel(), d)
 
 
 def linearised(problem: ContactProblem, found: Projected) -> Forces:

@@ -1,20 +1,20 @@
 r"""Signorini and Coulomb on a dense compliance, solved exactly, in the plane and in three dimensions, and
-under an attraction that weakens with the gap (`evfem.contact.signorini`).
+under an attraction that decreases with the gap (`evfem.contact.signorini`).
 
 Newton's method on the laws as projections, a primal-dual active set::
 
     status <- that of the last iteration
     repeat
         solve the equations of `status` (one dense linear system) for forces and extra unknowns
-        wanted, z <- the status and direction that the laws make of each node's forces, gap and slip
-        if wanted = status, and slips go along z: done
-        change all violated nodes; from the first statuses on that have been met before, the worst one
-            alone; give up where these go round in a circle
+        wanted, z <- projection of each node's forces, gap and slip onto the laws: status and direction
+        if wanted = status, and slips are along z: done
+        change all violated nodes; from the first statuses on that were visited before, the worst one
+            alone; fail where these cycle too
 
-What has not converged is never used. From a circle it begins again from what the laws make of the last
-iteration's forces after the motion, then with the nodes that touched, and with all nodes, sticking: slips
-found by chance may drive it about, but nothing changes for nodes that stick. In the plane it does so only
-if the body does not give way.
+What has not converged is never used. After a cycle it restarts from the projection of the last iteration's
+forces after the motion, then with the nodes that touched, and with all nodes, sticking: accidental slips may
+keep it from converging, but nothing changes for nodes that stick. In the plane it restarts only if the
+compliance is positive definite.
 
 The projections' sources are in `evfem.contact.signorini`; primal-dual active set: S. Hueeber, G. Stadler,
 B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
@@ -52,15 +52,15 @@ SCALINGS, SOFTER = 2, 1.1
 
 def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = None) -> ContactSolution:
     """Signorini and Coulomb from `status` (k,) and, in space, forces (m,); raises `ContactNotSolved`."""
-    total, softest = 0, status
+    total, most_compliant = 0, status
     for start in _starts(problem, status, np.zeros(problem.start.size) if force is None else force):
-        forces, found, solves, softest = _newton(problem, start)
+        forces, found, solves, most_compliant = _newton(problem, start)
         total += solves
         if forces is not None:
-            kept = forces.contact, forces.drop, found.status, forces.extra, problem.state(forces)
+            kept = forces.contact, forces.attraction_loss, found.status, forces.extra, problem.state(forces)
             return ContactSolution(*kept, total)
     keep = int((found.miss > problem.tolerance).sum())
-    raise ContactNotSolved(f"{keep} of {problem.size} nodes keep changing", softest)
+    raise ContactNotSolved(f"{keep} of {problem.size} nodes keep changing", most_compliant)
 
 
 def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Projected]:
@@ -72,7 +72,7 @@ def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Pr
     if problem.dim == 2 or touched.any():
         yield Projected(pressing[:, 0], shear, present, none)
     if problem.dim == 2 and problem.gives_way:
-        return  # what is found from elsewhere is seldom stable
+        return  # solutions from other start values are seldom stable
     count = 0 if problem.extra_unknowns is None else problem.extra_unknowns.right.size
     yield Projected.of(problem, Forces(force, np.zeros_like(force), np.zeros(count)))
     for closed in ([touched] if touched.any() else []) + [np.ones_like(touched)]:
@@ -81,8 +81,8 @@ def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Pr
 
 
 def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, Projected, int, Ints]:
-    """Forces or None, what the laws make of them, the number of solves, last statuses (k,), cycling open."""
-    met, alone, late, softest = set[bytes](), set[bytes](), False, found.status
+    """Forces or None, their projections, the number of solves, the most compliant statuses (k,)."""
+    visited, single_changes, after_cycling, most_compliant = set[bytes](), set[bytes](), False, found.status
     for solves in range(1, ACTIVE_SET_LIMIT + 1):
         try:
             forces = linearised(problem, found)
@@ -90,27 +90,29 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
             break
         key = found.status.tobytes()
         after = Projected.of(problem, forces)
-        if not (late or key in met):
-            after = _passing(found, after)
+        if not (after_cycling or key in visited):
+            after = _damped_status_change(found, after)
         changed = after.status != found.status
         rest = changed if problem.dim == 2 else changed | (after.status == SLIP)
         if not np.isfinite(after.miss).all():
             break
         if not (after.miss[rest] > problem.tolerance).any():
-            return forces, found, solves, softest
+            return forces, found, solves, most_compliant
         if changed.any():
-            softest = np.where(changed, OPEN, found.status)
-            late = late or key in met  # a cycle: from here on change the node that is furthest off alone
-            if key in alone:  # and that has led back too
+            most_compliant = np.where(changed, OPEN, found.status)
+            after_cycling = (
+                after_cycling or key in visited
+            )  # a cycle: from here on change only the node of the largest violation
+            if key in single_changes:  # and that cycles too
                 break
-            if late:
+            if after_cycling:
                 worst = np.where(changed, after.miss, -1.0).argmax()
                 status = found.status.copy()
                 status[worst] = after.status[worst]
                 after = replace(after, status=status)
-            (alone if late else met).add(key)
+            (single_changes if after_cycling else visited).add(key)
         found = after
-    return None, found, solves, softest
+    return None, found, solves, most_compliant
 
 
 def solve_with_attraction(
@@ -118,12 +120,12 @@ def solve_with_attraction(
 ) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted, started from statuses (k,) and forces (m,).
 
-    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), its negative
-    stiffness is scaled to `STABLE` of the critical value, which gives small steps in the right direction:
-    with the closed nodes fixed, then those that no longer change, at last none. Friction is linearised by
-    tangents first, then by chords: the tangent of a law that levels off soon may be too steep.
+    If the negative stiffness of the attraction exceeds the stiffness of the tissue (the pad snaps), it is
+    scaled to `STABLE` of the critical value, which gives small steps in the right direction: with the closed
+    nodes fixed, then those that no longer change, at last none. Friction is linearised by tangents first,
+    then by secants: the tangent of a law that levels off soon may be too steep.
     """
-    laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
+    laws = (problem,) if problem.secants is None else (problem, problem.with_secants)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:
         return _first(laws, status, force)
     root, n = np.sqrt(attraction.negative_stiffness), problem.dim
@@ -139,13 +141,13 @@ def solve_with_attraction(
         pulled = scaled(most) if most >= 1.0 else attraction
         try:
             found = solve_contact(replace(law, attraction=pulled), status, force)
-            softest = found.status
-            same = most < 1.0 and np.array_equal(softest, status)
-            if same or _feedback(problem, pulled, softest) < 1.0:
+            most_compliant = found.status
+            same = most < 1.0 and np.array_equal(most_compliant, status)
+            if same or _feedback(problem, pulled, most_compliant) < 1.0:
                 return replace(found, reduced=most >= 1.0)
         except ContactNotSolved as error:
-            softest = error.softest
-        most = max(SOFTER * most, float(law is laws[-1]), _feedback(problem, attraction, softest))
+            most_compliant = error.most_compliant
+        most = max(SOFTER * most, float(law is laws[-1]), _feedback(problem, attraction, most_compliant))
     most = max(most, _feedback(problem, attraction, np.full(problem.size, OPEN)))
     last = [replace(law, attraction=scaled(most)) for law in laws]
     return replace(_first(last, status, force), reduced=True)
@@ -160,8 +162,8 @@ def _first(problems: Sequence[ContactProblem], status: Ints, force: Floats | Non
 
 
 def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
-    """Largest factor by which the attraction of open nodes returns to itself where the nodes have these
-    statuses (k,), from 1 on they snap: it weakens with their gaps, and what is closed does not move.
+    """Largest feedback of the attraction of open nodes on itself for these statuses (k,), the ratio of its
+    negative stiffness to that of the body, closed nodes fixed: from 1 on the pad snaps.
     """
     stiffness, opened, n = attraction.negative_stiffness, status == OPEN, problem.dim
     pulled, stick = np.flatnonzero(opened & (stiffness > 0.0)), np.flatnonzero(status == STICK)
@@ -188,9 +190,10 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
     return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
 
 
-def _passing(before: Projected, after: Projected) -> Projected:
-    """The same; in the plane closing nodes and changes of the slip's side pass through slip, or stick: that
-    is quicker, but under a steep bound of friction a node may stick that can neither slip nor open.
+def _damped_status_change(before: Projected, after: Projected) -> Projected:
+    """`after` with damped changes of status: in the plane closing nodes slip first, and slips change their
+    side by way of stick. That is faster, but under a steep bound of friction a node may stick that can
+    neither slip nor open.
     """
     if after.z.shape[1] == 2:
         return after

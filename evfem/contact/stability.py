@@ -1,12 +1,12 @@
-r"""Which force takes an equilibrium its stability, and how close it is.
+r"""Stability of an equilibrium: how close it is to its loss, and which force causes it.
 
-Closed nodes are held along the normal, sticking ones along the tangent too. What is left to move are the
-slips of the slipping nodes and the gaps of the open ones. With the compliance C of body and bone in local
+Closed nodes are fixed along the normal, sticking ones along the tangent too. Free are the slips of the
+slipping nodes and the gaps of the open ones. With the compliance C of body and bone in local
 frames, and :math:`m = \pm\mu` of the slipping nodes, forces along the slips move them by
 
 .. math:: A = C_{tt} - (C_{tn} + C_{tt} m)\,(C_{nn} + C_{nt} m)^{-1} C_{nt},
 
-gaps of open nodes likewise. Four forces grow with such a motion, by a stiffness D of their own: contact
+gaps of open nodes likewise. Four forces grow with such a motion, with a destabilising stiffness D: contact
 forces that turn with the profile, :math:`D = -\lambda_n (1 + \mu^2)\,h''/(1 + h'^2)^{3/2}`, positive on a
 crest; friction whose coefficient falls along the path, :math:`D = -\lambda_n\,d\mu/ds`; friction that falls
 with the speed, :math:`D = -(db/dv)/\Delta t`; the attraction of open nodes, :math:`D = -A\,dp/dg`.
@@ -35,8 +35,8 @@ ATTRACTION = "the attraction grows as the gap closes"
 
 @dataclass(frozen=True)
 class StabilityRatio:
-    """The ratio of destabilising to stabilising stiffness, 1 at the loss of stability, and the force that
-    works most in the unstable motion, in words.
+    """The ratio of destabilising to stabilising stiffness, 1 at the loss of stability, and its cause, the
+    force that works most in the unstable motion, in words.
     """
 
     ratio: float
@@ -63,15 +63,15 @@ def stability_ratio(step: LinearContactStep, least: float = 0.0) -> StabilityRat
         ATTRACTION: np.concatenate([none, known.negative_stiffness[opened]]),
     }
     stiffness = sum(grows.values(), np.zeros(none.size + far.size))
-    largest, motion = _fastest(_freed(step, nodes, slipping, opened), stiffness, least)
+    largest, motion = _largest_eigenvalue(_free_compliance(step, nodes, slipping, opened), stiffness, least)
     return StabilityRatio(largest, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
 
 
-def _freed(step: LinearContactStep, nodes: Ints, slipping: Ints, opened: Ints) -> Floats:
-    """Compliance (f, f) of slips and gaps of these nodes, contact held, the bone free where it is loaded."""
+def _free_compliance(step: LinearContactStep, nodes: Ints, slipping: Ints, opened: Ints) -> Floats:
+    """Compliance (f, f) of slips and gaps of these nodes, contact fixed, the bone free where it is loaded."""
     known, bone = step.candidates[nodes], _bone(step, nodes)
     axes, closed, stick = known.surface.axes, np.flatnonzero(known.status != OPEN), known.status == STICK
-    C = local(axes, local(axes, step.among(nodes)).T).T + np.diag(_yielding(known).ravel())
+    C = local(axes, local(axes, step.among(nodes)).T).T + np.diag(_interface_compliance(known).ravel())
     held, free = np.append(2 * closed, 2 * np.flatnonzero(stick) + 1), np.append(2 * slipping + 1, 2 * opened)
     ratio, moving = (known.friction * known.shear_direction[:, 0])[closed], np.vstack([C, bone.rows])
     pushes = moving[:, held]
@@ -81,7 +81,7 @@ def _freed(step: LinearContactStep, nodes: Ints, slipping: Ints, opened: Ints) -
     return block(C, free, free) - np.hstack([pushes[free], bone.columns[free]]) @ moved
 
 
-def _yielding(known: Candidates) -> Floats:
+def _interface_compliance(known: Candidates) -> Floats:
     """Compliance of the interface (c, 2), along normal and tangent. Along the tangent a slipping node has one
     only if its friction falls with the speed of the slip: what turns with the profile or falls along the
     path depends on the node's position alone.
@@ -105,7 +105,7 @@ def _bone(step: LinearContactStep, nodes: Ints) -> ExtraUnknowns:
     return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(wanted.size))
 
 
-def _fastest(A: Floats, stiffness: Floats, least: float) -> tuple[float, Floats]:
+def _largest_eigenvalue(A: Floats, stiffness: Floats, least: float) -> tuple[float, Floats]:
     """Largest real eigenvalue of A times a diagonal stiffness, 0 if below `least` >= 0, and its vector."""
     if not stiffness.any() or (np.abs(A) @ np.abs(stiffness)).max() < least:  # no eigenvalue is above
         return 0.0, np.zeros_like(stiffness)

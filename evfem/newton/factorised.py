@@ -282,7 +282,7 @@ class FactorisedBody:
         # below the candidates an elastic surface moves as the linear step found, which includes the change
         # of the attraction
         push = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
-        found = c, update.contact.given, fraction
+        found = c, update.contact.surface_displacement, fraction
         return after.remembering(
             self.interface.bed.sunk(self.interface.positions(state.u), state, push, found)
         )

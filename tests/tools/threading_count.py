@@ -72,8 +72,8 @@ CAPABILITIES = (
     capability(
         "elastic surface",
         r"""\bbed\b|\bBed\b|Yielding|CandidatesBed|yielded|unyielded|tilted|untilted|surface_sink|\b_sunk\b
-        |\b_kept\(|\.elastic\b|\belastic\b|(state|old|new|after|contact)\.given|\.strain\b|\bstrain\b
-        |NO_BED|bed_of|_stretched""",
+        |\b_kept\(|\.elastic\b|\belastic\b|(state|old|new|after)\.given
+        |surface_displacement|\.strain\b|\bstrain\b|NO_BED|bed_of|_stretched""",
     ),
     capability(
         "full field",
@@ -97,7 +97,7 @@ CAPABILITIES = (
     capability(
         "friction laws beyond Coulomb",
         r"""friction_law|FrictionLaw|Coulomb|Slipping|\.slipping\b|Oscillating|oscillating|cohesion
-        |slip_stiffness|chords|by_speed|by_slip|\bage\b|\baged\b|NO_AGE|known\.law|self\.law\b
+        |slip_stiffness|secants|by_speed|by_slip|\bage\b|\baged\b|NO_AGE|known\.law|self\.law\b
         |interface\.law""",
     ),
     capability(
