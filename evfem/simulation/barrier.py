@@ -1,26 +1,26 @@
-r"""Whether the finger could get from one equilibrium to the next without climbing.
+r"""Energy barrier between two equilibria.
 
-A part leads from u_0 to u_1. With the loads of its END held it has the potential
+A substep leads from u_0 to u_1. Under the constant loads of its END it has the potential
 
 .. math:: \Phi(u) = \psi(u) - W_e(u_0 \to u;\,U_1) - r_1\cdot(b - b_0) + D_f(\lambda_1)
           + \Phi_t(u) ,
 
 of which u_1 is a stationary point: tissue and springs, attraction, the reaction on the bone, friction under
 the contact forces of the end, and of a step in time :math:`\Phi_t` of viscosity, branches, drag and inertia
-(`evfem.tissue.dynamics`). Where it is convex it falls all along the straight way from u_0 to u_1, however
-long the part, whatever slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations
-have come to u_1 over it, the body never would. The reverse does not hold: of several equilibria some may all
-lie downhill.
+(`evfem.tissue.dynamics`). Where it is convex it falls along the whole straight path in configuration space
+from u_0 to u_1, however long the substep, whatever nodes slip, close or open. So a rise on that path (`rise`)
+shows a barrier: iterations have crossed it, the body never would. The converse does not hold: several
+equilibria may be reached without a barrier.
 
-A bone that is held and not loaded has its place at the end already: nodes that do not touch at both ends
-begin where it carries them. Nodes that touch at both ends follow the surface, not the chord; to first
-order that adds :math:`-\lambda_1 g` on the chord. A spring of the hand adds its own stiffness. Charges
-are those of the end. An attraction without a potential (the vertical one on changing tributary lengths,
-that of touching nodes alone, the full field beside its columns) is asked for its work along the straight
-way alone; where another way would give another work, a barrier of that difference may be missed.
+A bone with prescribed position is at its end position already: nodes that do not touch at both ends begin
+translated with it. Nodes that touch at both ends follow the surface, not the chord; to first order that
+adds :math:`-\lambda_1 g` on the chord. A spring of the hand adds its stiffness. Charges are those of the
+end. For an attraction without a potential (the vertical one on changing tributary lengths, that of touching
+nodes alone, the full field beside its columns) the work along the straight path is taken; where another path
+has another work, a barrier of that difference may be missed.
 
 The potential with the loads of the end is the upper estimate of the energy in the theory of
-rate-independent systems; asked along the way it selects the branch that begins at the last state. A.
+rate-independent systems; evaluated along the path it selects the branch that begins at the last state. A.
 Mielke, T. Roubicek, Rate-Independent Systems (2015), doi:10.1007/978-1-4939-2706-7.
 """
 
@@ -33,76 +33,91 @@ from evfem.newton.control import Target
 from evfem.simulation.works import SubstepWork
 from evfem.surface.pad import surface_state
 
-#: where the potential is taken on the way, and, denser at its ends, the attraction
-PLACES = np.linspace(0.0, 1.0, 9)
-FINE = np.linspace(0.0, 1.0, 33) ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 33))
-#: stored energy (N mm) that a climb is compared with at least: below it is the rounding of stiff cells
-LEAST = 1e-6
+#: fractions of the path at which the potential is sampled, and, denser at its ends, the attraction
+SAMPLES = np.linspace(0.0, 1.0, 9)
+FINE_SAMPLES = np.linspace(0.0, 1.0, 33) ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 33))
+#: smallest stored energy (N mm) to which a barrier is related: below is the rounding of stiff cells
+SMALLEST_ENERGY = 1e-6
 
 
-def rise(part: SubstepWork, target: Target) -> float:
-    """The highest climb of the potential on the straight way of a part, as a share of the stored energy."""
-    body, old, new = part.model.body, part.old, part.new
-    way = new.u - old.u
-    springs = [float(0.5 * np.sum(part.compliance * state.contact_force**2)) for state in (old, new)]
-    stored = body.energies(old.u, way, PLACES) + springs[0] + (springs[1] - springs[0]) * PLACES**2
-    before, between, after = part.yielded
-    stored = stored + (1.0 - PLACES) ** 2 * before + (1.0 - PLACES) * PLACES * between + PLACES**2 * after
-    carried = _carried(part, target)
-    given = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
-    given = given - float(np.sum(body.given_forces(new.u) * way))
-    potential = stored - stored[0] - _pulled(part, carried) + (_rubbed(part) - given) * PLACES
-    potential = potential + _lifted(part) + _dragged(part)
-    potential = potential + sum(term.potential(old, new, PLACES) for term in part.model.terms)
+def rise(substep: SubstepWork, target: Target) -> float:
+    """Energy barrier: the largest rise of the potential on the straight path of a substep, relative to the
+    stored energy.
+    """
+    body, old, new = substep.model.body, substep.old, substep.new
+    increment = new.u - old.u
+    springs = [float(0.5 * np.sum(substep.compliance * state.contact_force**2)) for state in (old, new)]
+    stored = body.energies(old.u, increment, SAMPLES) + springs[0] + (springs[1] - springs[0]) * SAMPLES**2
+    before, between, after = substep.foundation_energies
+    stored = stored + (1.0 - SAMPLES) ** 2 * before + (1.0 - SAMPLES) * SAMPLES * between + SAMPLES**2 * after
+    carried = _moved_with_bone(substep, target)
+    load_work = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
+    load_work = load_work - float(np.sum(body.given_forces(new.u) * increment))
+    potential = (
+        stored
+        - stored[0]
+        - _attraction_work(substep, carried)
+        + (_friction_work(substep) - load_work) * SAMPLES
+    )
+    potential = potential + _contact_work(substep) + _drag_potential(substep)
+    potential = potential + sum(term.potential(old, new, SAMPLES) for term in substep.model.terms)
     climbed = potential - np.minimum.accumulate(potential)
-    return float(climbed.max()) / max(stored[0], stored[-1], LEAST)
+    return float(climbed.max()) / max(stored[0], stored[-1], SMALLEST_ENERGY)
 
 
-def _carried(part: SubstepWork, target: Target) -> Floats:
-    """Displacements (P, dim) of pad nodes with a bone that is not loaded; 0 where they keep touching."""
-    travel = part.new.bone - part.old.bone
+def _moved_with_bone(substep: SubstepWork, target: Target) -> Floats:
+    """Displacements (P, dim) of pad nodes with a bone of prescribed position; 0 where they keep touching."""
+    travel = substep.new.bone - substep.old.bone
     travel[target.free] = 0.0
-    sticks = any(one.always for one in part.model.attraction.parts)  # what adheres is not carried off
-    return np.where((part.old.touching & (part.new.touching | sticks))[:, None], 0.0, travel)
+    sticks = any(one.always for one in substep.model.attraction.parts)  # what adheres is not carried off
+    return np.where((substep.old.touching & (substep.new.touching | sticks))[:, None], 0.0, travel)
 
 
-def _pulled(part: SubstepWork, carried: Floats) -> Floats:
-    """Work of the attraction up to `PLACES` under the end's voltage or charges, after `carried`."""
-    attraction, old, new = part.model.attraction, part.old, part.new
+def _attraction_work(substep: SubstepWork, carried: Floats) -> Floats:
+    """Work of the attraction up to the `SAMPLES` under the end's voltage or charges, after the translation
+    `carried`.
+    """
+    attraction, old, new = substep.model.attraction, substep.old, substep.new
     if not attraction.acts(new.voltage):
-        return np.zeros_like(PLACES)
-    along, equilibrium = part.way - carried, part.model.equilibrium
+        return np.zeros_like(SAMPLES)
+    along, equilibrium = substep.relative_displacement - carried, substep.model.equilibrium
     begin = equilibrium.interface.resting(old) + carried
-    begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
+    begin[:, 1] -= np.minimum(surface_state(substep.model.surface, begin).gap, 0.0)
     ends = equilibrium.pulls(new)
-    paths = [(one, part.path(ends[one.name], ends[one.name])) for one in attraction.parts]
-    work = sum(one.released_work(path, along, begin, FINE) for one, path in paths)
-    return np.asarray(np.interp(PLACES, FINE, work))
+    paths = [(one, substep.path(ends[one.name], ends[one.name])) for one in attraction.parts]
+    work = sum(one.released_work(path, along, begin, FINE_SAMPLES) for one, path in paths)
+    return np.asarray(np.interp(SAMPLES, FINE_SAMPLES, work))
 
 
-def _rubbed(part: SubstepWork) -> float:
+def _friction_work(substep: SubstepWork) -> float:
     """Dissipation of the slips under the contact forces of the end."""
-    length = part.slip_length
+    length = substep.slip_length
     if not length.any():
         return 0.0
-    interface, normal = part.model.equilibrium.interface, np.maximum(part.new.contact_force[:, 0], 0.0)
-    return float(np.sum(interface.resistance((part.old, part.new), part.places[1], normal, length) * length))
+    interface, normal = substep.model.equilibrium.interface, np.maximum(substep.new.contact_force[:, 0], 0.0)
+    return float(
+        np.sum(
+            interface.resistance((substep.old, substep.new), substep.positions[1], normal, length) * length
+        )
+    )
 
 
-def _lifted(part: SubstepWork) -> Floats:
-    """Work against contact forces of nodes that touch at both ends, off the chord of their places."""
-    model, old, new = part.model, part.old, part.new
+def _contact_work(substep: SubstepWork) -> Floats:
+    """Work against the contact forces of nodes that touch at both ends, as they leave their chord."""
+    model, old, new = substep.model, substep.old, substep.new
     touching = old.touching & new.touching
     if model.surface.is_flat or not touching.any():
-        return np.zeros_like(PLACES)
+        return np.zeros_like(SAMPLES)
     begin, end = (model.equilibrium.interface.places(state)[touching] for state in (old, new))
     normal = new.contact_force[touching, 0]
-    lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in PLACES]
-    return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES
+    lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in SAMPLES]
+    return np.array(lifts) - lifts[0] * (1.0 - SAMPLES) - lifts[-1] * SAMPLES
 
 
-def _dragged(part: SubstepWork) -> Floats:
-    """The potential of drag, which counts from the release."""
-    way = part.new.u - part.old.u
-    held = np.array([0.5 * part.model.body.drag_dissipation(part.old.u + s * way) for s in PLACES])
-    return held - held[0]
+def _drag_potential(substep: SubstepWork) -> Floats:
+    """The potential of drag since the begin of the substep."""
+    increment = substep.new.u - substep.old.u
+    drag = np.array(
+        [0.5 * substep.model.body.drag_dissipation(substep.old.u + s * increment) for s in SAMPLES]
+    )
+    return drag - drag[0]

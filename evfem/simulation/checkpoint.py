@@ -40,19 +40,19 @@ OF_ANY_SIZE = ("candidates", "factor_memory.pressure", "came_off", PROBES)
 
 
 def state_arrays(state: State) -> dict[str, Any]:
-    """Every part of a state, by name."""
-    return {name: np.asarray(part) for name, part in state.parts.items()}
+    """All fields of a state, by name."""
+    return {name: np.asarray(value) for name, value in state.parts.items()}
 
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """Data of the solver for the next step; of the same shapes with and without a factorisation."""
     nowhere = TangentPoint(state, state.touching, Beginning(state.u, state.memory), 0.0)
     at = carried.tangent_point or nowhere
-    parts = {"candidates": carried.candidates, "duration": carried.duration, "factorised": at is not nowhere}
-    parts |= {f"factor_{name}": part for name, part in state_arrays(at.state).items()}
-    parts |= {"touched": at.touched, "factor_seconds": at.duration, "begun_u": at.begin.u}
-    parts |= {f"begun_memory.{name}": kept for name, kept in at.begin.memory.items()}
-    return {name: np.asarray(part) for name, part in parts.items()}
+    found = {"candidates": carried.candidates, "duration": carried.duration, "factorised": at is not nowhere}
+    found |= {f"factor_{name}": value for name, value in state_arrays(at.state).items()}
+    found |= {"touched": at.touched, "factor_seconds": at.duration, "begun_u": at.begin.u}
+    found |= {f"begun_memory.{name}": kept for name, kept in at.begin.memory.items()}
+    return {name: np.asarray(value) for name, value in found.items()}
 
 
 def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
@@ -74,7 +74,7 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
     return {
         "sums": np.array(list(ledger.sums.values())),
         "internal_forces": end.forces,
-        "given_forces": end.given,
+        "given_forces": end.user_forces,
         "pull": np.array(ledger.pull_off.pull),
         "came_off": ledger.pull_off.came_off,
         "energies": np.array([end.stored, end.springs, end.kinetic]),
@@ -100,15 +100,15 @@ def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, 
         allowed = f"at most the {most_rows} steps of the scene"
         raise InputError("checkpoint", f"{len(saved.rows)} steps", allowed)
     for name, expected in fresh.items():
-        given, fits = saved.arrays.get(name), np.asarray(expected)
-        if given is None or given.dtype.kind != fits.dtype.kind:
+        user_forces, fits = saved.arrays.get(name), np.asarray(expected)
+        if user_forces is None or user_forces.dtype.kind != fits.dtype.kind:
             raise _unusable(name)
-        if given.ndim != fits.ndim or (name not in OF_ANY_SIZE and given.shape != fits.shape):
+        if user_forces.ndim != fits.ndim or (name not in OF_ANY_SIZE and user_forces.shape != fits.shape):
             raise _unusable(name)
         if name == PROBES:  # a form in the plane leaves the stress out of it open: nan
-            if given.shape != (len(saved.rows), *fits.shape[1:]):
+            if user_forces.shape != (len(saved.rows), *fits.shape[1:]):
                 raise _unusable(name)
-        elif not np.isfinite(given).all():
+        elif not np.isfinite(user_forces).all():
             raise _unusable(name)
     arrays = {name: saved.arrays[name] for name in fresh}
     pad = arrays["status"].size
@@ -170,13 +170,13 @@ class Checkpoint:
         except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
             raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
         if version != evfem.__version__:
-            given = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
-            raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
+            user_forces = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
+            raise InputError("checkpoint", user_forces, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
             raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")
         if odd:
-            given = f"{self.path}, of another version: without the columns {', '.join(odd)}"
-            raise InputError("checkpoint", given, allowed)
+            user_forces = f"{self.path}, of another version: without the columns {', '.join(odd)}"
+            raise InputError("checkpoint", user_forces, allowed)
         state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
         return Saved(state, rows)
 

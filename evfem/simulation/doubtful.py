@@ -1,5 +1,5 @@
-"""What is said of a run: warnings about its numbers, one sentence each (`Result.warnings`); of a step that
-failed, which force wins and where, if no equilibrium is near, and what to try.
+"""Warnings about the numbers of a run, one sentence each (`Result.warnings`); reasons and suggestions for a
+step that failed: the force that causes the loss of stability, where, and what to try.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from evfem.simulation.model import Model
 from evfem.surface.pad import surface_state
 from evfem.terms.hand import drive_of
 
-#: share of the energy of motions that take time that their finite steps may dissipate
+#: fraction of the energy of motions in time that numerical dissipation may take
 DISSIPATED = 0.05
-#: share of the energy of a run that a row may have from nowhere
+#: fraction of the energy of a run that a row may create
 GAINED = 0.01
-#: share of the works that an equilibrium's tolerance leaves open, of those of no force too
+#: fraction of the works below the tolerance of an equilibrium
 OPEN_WORK = 1e-7
-#: share of the energy of a run that is lost in one row where other states are stable too
+#: fraction of the energy of a run that is lost in one row where other states are stable too
 SNAPPED = 0.1
 #: strain to which an elastic surface is taken as linear
 STRAINED = 0.1
@@ -38,48 +38,48 @@ BORNE = 1.0
 
 #: unit of forces by dimension
 FORCES = {2: "N/mm", 3: "N"}
-#: penetration that is told, relative to the size of the finger
+#: penetration that is worth a warning, relative to the size of the finger
 SUNK = 1e-6
 
 
-def outside(model: Model) -> Ints:
-    """Nodes of the finger's boundary that no contact holds: all but those of `pad` that may touch."""
+def free_nodes(model: Model) -> Ints:
+    """Nodes of the finger's boundary without contact: all but those of `pad` that may touch."""
     mesh, pad = model.mesh, model.pad
     facets = mesh.outer_sides
     return np.setdiff1d(facets, pad.nodes[pad.free])
 
 
-def deepest(model: Model, nodes: Ints, u: Floats) -> Floats:
+def deepest_penetration(model: Model, nodes: Ints, u: Floats) -> Floats:
     """Largest penetration (mm) of these nodes into the surface, and the number of that node: (2,)."""
     gap = surface_state(model.surface, (model.mesh.points + u)[nodes]).gap
     return np.array([-gap.min(), nodes[gap.argmin()]], dtype=float) if gap.size else np.zeros(2)
 
 
-def through(model: Model, sunk: Floats) -> Iterator[str]:
-    """A boundary outside `pad` that went through the surface; `sunk` is the `deepest` of a run."""
+def penetration(model: Model, sunk: Floats) -> Iterator[str]:
+    """Penetration of the boundary outside `pad`; `sunk` is the `deepest_penetration` of a run."""
     points = model.mesh.points
     if sunk[0] > SUNK * float(np.ptp(points, axis=0).max()):
-        place = ", ".join(f"{x + 0.0:.4g}" for x in points[int(sunk[1])])
+        at = ", ".join(f"{x + 0.0:.4g}" for x in points[int(sunk[1])])
         yield (
-            f"the boundary outside `pad` passed through the surface, by {sunk[0]:.3g} mm at ({place}) of the "
+            f"the boundary outside `pad` passed through the surface, by {sunk[0]:.3g} mm at ({at}) of the "
             "undeformed mesh: nothing holds it there, and contact forces are too small; extend `pad`"
         )
 
 
-def off(found: Floats, dim: int) -> Iterator[str]:
-    """Where adhesion let go of the finger: rows (k, 2) of the step and the pull."""
+def pull_offs(found: Floats, dim: int) -> Iterator[str]:
+    """Pull-off of an adhering finger: rows (k, 2) of the step and the pull-off force."""
     unit = FORCES[dim]
     for step, pull in found:
         yield f"in step {int(step)} the finger came off: adhesion held it up to a pull of {pull:.3g} {unit}"
 
 
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
-    """A sentence for everything that the rows of a scene's run say of their own worth."""
+    """Warnings that follow from the rows of a scene's run."""
     told = (
-        _missed(scene, rows),
+        _never_touched(scene, rows),
         _crushed(scene, rows),
         _dissipated(scene, rows),
-        _gained(rows),
+        _energy_created(rows),
         _snapped(rows),
         _climbed(rows),
         _strained(scene, rows),
@@ -91,8 +91,8 @@ def _column(rows: Sequence[Row], name: str) -> Floats:
     return np.array([row[name] for row in rows], dtype=float)
 
 
-def _missed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
-    """Slides that touch nothing, unless on the way to where the finger is pressed."""
+def _never_touched(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
+    """Slides that touch nothing, unless the finger is pressed later."""
     for i, course in enumerate(scene.courses):
         forces = [row["normal_force"] for row in rows if row["motion_index"] == i]
         later = any(one.presses for one in scene.courses[i:])
@@ -150,7 +150,7 @@ def _energy(rows: Sequence[Row]) -> float:
     )
 
 
-def _gained(rows: Sequence[Row]) -> Iterator[str]:
+def _energy_created(rows: Sequence[Row]) -> Iterator[str]:
     own, works = _lost(rows, "integrator"), np.abs(_column(rows, "external_work")).max()
     works += SMALLEST_FORCE * np.abs(_column(rows, "indentation")).max()
     if own.min() < -GAINED * _energy(rows) - OPEN_WORK * works:
@@ -173,7 +173,7 @@ def _snapped(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _climbed(rows: Sequence[Row]) -> Iterator[str]:
-    """Rows in time that a barrier of the energy does not stop however short their parts are."""
+    """Rows in time that pass an energy barrier however short their substeps are."""
     climbed = (np.diff(_column(rows, "time"), prepend=0.0) > 0.0) & (_column(rows, "jumps") > 0.0)
     if climbed.any():
         first, count = rows[int(climbed.argmax())]["step"], int(climbed.sum())
@@ -197,24 +197,24 @@ def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
 
 def advice(scene: Scene, model: Model, failed: StepFailed) -> str:
     """Why the step failed, how its last iterate looked, and what to try, joined by semicolons."""
-    lost = _gone(model, failed)
-    parts = [lost or failed.reason, failed.findings, _try(scene, failed, bool(lost))]
-    return "; ".join(part for part in parts if part)
+    lost = _reason_for_failure(model, failed)
+    sentences = [lost or failed.reason, failed.findings, _suggestions(scene, failed, bool(lost))]
+    return "; ".join(sentence for sentence in sentences if sentence)
 
 
-def _gone(model: Model, failed: StepFailed) -> str:
+def _reason_for_failure(model: Model, failed: StepFailed) -> str:
     """The sentence on the equilibrium that was lost; empty where nothing shows that there is none."""
     if isinstance(failed, Folded) or failed.last is None:
         return ""
     if isinstance(failed, LiftedOff):
-        return f"{failed.reason}; it was lost at {_place(model, failed.last[0])}"
+        return f"{failed.reason}; it was lost at {_whereabouts(model, failed.last[0])}"
     state, target = failed.last
     try:
         with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite
             margin = model.equilibrium.body.stability_ratio(state, target)
     except StepFailed:  # the tangent there is singular
         return ""
-    # a trial far from equilibrium may give way too: alone that shows nothing
+    # a trial far from equilibrium may be unstable too: alone that shows nothing
     if margin is None or margin.ratio < (SOFTENED if failed.unstable else CRITICAL):
         return ""
     passing = not model.body.dynamics.still(target.duration)
@@ -222,19 +222,19 @@ def _gone(model: Model, failed: StepFailed) -> str:
     released = ", and released there it does not come to rest" if failed.released else ""
     return (
         f"there is no equilibrium {rest} near here: {margin.cause}, {margin.ratio:.3g} times as hard as its "
-        f"tissue holds it at {_place(model, state)}, and harder beyond{released}"
+        f"tissue holds it at {_whereabouts(model, state)}, and harder beyond{released}"
     )
 
 
-def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> str:
-    """The sentence on an equilibrium at a given gap that its voltage alone does not hold; empty where it may.
+def unstable_alone(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> str:
+    """The sentence on an equilibrium at a prescribed gap that is unstable at its voltage; empty if stable.
 
     In three dimensions the last two `rows` tell: the voltage falls as the gap closes.
     """
     margin = model.equilibrium.body.stability_ratio(state, Target.held(state.bone, state.voltage))
     if margin is None and len(rows) > 1:
-        ways = [rows[-1][name] - rows[-2][name] for name in ("voltage", "min_gap")]
-        lost = abs(rows[-2]["voltage"]) > 0.0 and ways[0] * np.sign(state.voltage) * ways[1] > 0.0
+        changes = [rows[-1][name] - rows[-2][name] for name in ("voltage", "min_gap")]
+        lost = abs(rows[-2]["voltage"]) > 0.0 and changes[0] * np.sign(state.voltage) * changes[1] > 0.0
     else:
         lost = margin is not None and margin.ratio > 1.0
     if not lost:
@@ -245,7 +245,7 @@ def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> s
     )
 
 
-def _place(model: Model, state: State) -> str:
+def _whereabouts(model: Model, state: State) -> str:
     position, indentation = state.bone[0] + 0.0, model.indentation(state.bone) + 0.0
     load, voltage = f"{-state.reaction[1] + 0.0:.3g} {state.unit}", state.voltage + 0.0
     return f"position {position:.4g} mm, indentation {indentation:.4g} mm, {load} and {voltage:.4g} V"
@@ -262,7 +262,7 @@ def _may_have_an_energy(scene: Scene) -> bool:
     return True
 
 
-def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
+def _suggestions(scene: Scene, failed: StepFailed, lost: bool) -> str:
     pulled = scene.electrics.acts
     finer = "less friction or a finer mesh" if scene.has_friction else "a finer mesh"
     if isinstance(failed, LiftedOff):

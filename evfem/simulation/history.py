@@ -131,7 +131,7 @@ KINDS: Mapping[str, type] = {
     spec.name: {"Words": str, "Ints": int}.get(str(spec.type), float) for spec in fields(History)
 }
 INTEGERS = tuple(name for name, kind in KINDS.items() if kind is int)
-#: columns to which every part of a step adds
+#: columns to which every substep adds
 ADDED = ("_work", "_dissipation")
 SUMS = tuple(name for name in COLUMNS if name.endswith(ADDED))
 #: columns of the rooms of the package: a run has those of its scene's rooms

@@ -1,4 +1,4 @@
-"""Reports of a run: a row per requested step, works and energies (`works`), fields."""
+"""Energy account and output of a run: a row per requested step, works and energies (`works`), fields."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from evfem.terms.tractions import NoPullOff, PullOff
 
 
 def unloaded(state: State) -> State:
-    """The state before the first part, without its voltage and what follows from it."""
+    """The state before the first substep, without voltage, attraction and reaction."""
     attraction, reaction = np.zeros_like(state.attraction), np.zeros_like(state.reaction)
     return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
 
 
 @dataclass
 class Ledger:
-    """Running sums of a run by the history's columns, the energies at the end of its last substep, and the
-    watch for a finger that comes off.
+    """Energy account of a run: sums of works and dissipations by the history's columns, the energies at the
+    end of its last substep, and the pull-off force.
     """
 
     model: Model
@@ -44,27 +44,27 @@ class Ledger:
         self.sums = dict.fromkeys((*SUMS, *names), 0.0) | self.sums
 
     def accept(self, old: State, new: State) -> bool:
-        """Adds the works of one converged part; returns whether stability was lost in it."""
-        part = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
+        """Add the works of one converged substep; returns whether stability was lost in it."""
+        substep = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
         self._watch(new)
         begin = self.end or Books.nothing(old.u.shape)
-        self.end = part.end()
-        works = part.works(begin, self.end)
+        self.end = substep.end()
+        works = substep.works(begin, self.end)
         for name, work in works.items():
             self.sums[name] += work
         return works["snap_dissipation"] > 0.0
 
     def _watch(self, new: State) -> None:
-        """Remember the pull at which a finger that tractions hold comes off."""
+        """Record the pull-off force of a finger under tractions without a voltage."""
         pulls, always = self.model.equilibrium.pulls(new), self.model.held_by
         self.pull_off.watch(new, {name: pulls[name] for name in always}, self.model.body.drag_rate == 0.0)
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
-        """Present sums and energy balance."""
+        """Snapshot of the sums and energies."""
         return self.sums.copy(), self.end
 
     def back(self, mark: tuple[dict[str, float], Books | None]) -> None:
-        """Take back what was booked since `mark`."""
+        """Restore the snapshot `mark`."""
         self.sums, self.end = mark[0].copy(), mark[1]
 
     def row(self, state: State, step: int, motion_index: int, motion: str, time: float) -> dict[str, Any]:
@@ -94,7 +94,7 @@ class Ledger:
             **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
-            "peak_contact_pressure": float((pressing / shares(model, position)).max()),
+            "peak_contact_pressure": float((pressing / current_lengths(model, position)).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
             "stored_energy": end.stored + end.springs,
@@ -103,16 +103,18 @@ class Ledger:
         }
 
     def _pulls(self, state: State, withheld: Floats) -> dict[str, tuple[Floats, float]]:
-        """Of every attraction by name: its force on the pad (dim,), its part of what cores withhold."""
+        """Of every attraction by name: its force on the pad (dim,), and the force that its regularised law
+        removes.
+        """
         model, none = self.model, np.zeros(state.bone.size)
         found: dict[str, tuple[Floats, float]] = {ELECTROSTATIC: (none, 0.0)}
         pulls = model.equilibrium.pulls(state)
         interface, both = model.equilibrium.interface, model.attraction.restored(state.voltage)[0]
-        every = np.where(both > 0.0, both, np.inf)
-        for part in model.attraction.parts:
-            share = part.restored(state.voltage)[0] / every
-            pull = interface.tilted(state, pulls[part.name]).sum(axis=0)
-            found[part.name] = pull, float(np.sum(share * withheld))
+        removed = np.where(both > 0.0, both, np.inf)
+        for traction in model.attraction.parts:
+            fraction = traction.restored(state.voltage)[0] / removed
+            pull = interface.tilted(state, pulls[traction.name]).sum(axis=0)
+            found[traction.name] = pull, float(np.sum(fraction * withheld))
         return found
 
     def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
@@ -140,7 +142,7 @@ def _components(name: str, force: Floats) -> dict[str, float]:
 
 def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
     """Columns of the widths or areas of contact, mm or mm2, in space those along z too."""
-    pressure = state.contact_force[:, 0] / shares(model, position)
+    pressure = state.contact_force[:, 0] / current_lengths(model, position)
     gap = surface_state(model.surface, position).normal_gap
     at = reach(gap, pressure, model.pad.spacing_at(position), model.shear_modulus)
     if isinstance(model.pad, Pad):
@@ -159,20 +161,20 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
     }
 
 
-def shares(model: Model, position: Floats) -> Floats:
+def current_lengths(model: Model, position: Floats) -> Floats:
     """Current tributary lengths or areas of the pad nodes (P,) in mm or mm2; infinite where there is none."""
     return _positive(model.pad.tributary(position))
 
 
-def _positive(share: Floats) -> Floats:
-    return np.where(share > 0, share, np.inf)
+def _positive(length: Floats) -> Floats:
+    return np.where(length > 0, length, np.inf)
 
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
     size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
     position, withheld = interface.places(state), interface.withheld(state)
-    surface, share = surface_state(model.surface, position), shares(model, position)
+    surface, length = surface_state(model.surface, position), current_lengths(model, position)
 
     pulled = _positive(model.attraction.weights(interface.pad_state(state, state.touching)))
 
@@ -189,8 +191,8 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         position=row["position"],
         displacement=model.body.whole(state.u).copy(),
         gap=on_pad(surface.gap, np.nan),
-        contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
-        shear_traction=on_pad(_shear(state) / share, 0.0),
+        contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / length, 0.0),
+        shear_traction=on_pad(_shear(state) / length, 0.0),
         electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
         surface_sink=on_pad(interface.bed.sink(state), 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),

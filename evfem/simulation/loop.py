@@ -1,8 +1,8 @@
-"""Steps at will: a run whose motion is decided while it goes on, one step after the other.
+"""Interactive stepping: a run whose motion is decided while it goes on, one step after the other.
 
-A step is what a motion's step is to `simulate`: its exact target is reached in as many parts as it takes,
-and its row is that of the history. What is not given stays: the place, the voltage, and the load where a
-force was given last, else the indentation.
+A step is the same as a step of a motion in `simulate`: its exact target is reached in as many substeps as
+needed, and its row is that of the history. Quantities that are left out keep their last value: position,
+voltage, and the load where a force was prescribed last, else the indentation.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ _SECONDS = number("a time in s, not negative, up to 1e6", Within(0.0, 1e6), "s")
 
 
 @dataclass(frozen=True)
-class Asked(Checked):
-    """What one step is asked for; None stays as it is."""
+class StepRequest(Checked):
+    """Targets of one step at its end; None leaves a quantity unchanged."""
 
     position: Annotated[float | None, _PLACE, "x of the bone, of the drive where there is a hand"] = None
     position_z: Annotated[float | None, _PLACE, "z of the bone, of a fingertip"] = None
@@ -57,9 +57,9 @@ class Asked(Checked):
 
 
 @dataclass(frozen=True)
-class AtWill(Motion):
-    """All steps of a loop as one motion: how many there were, and of what they did the last slide, the last
-    press and the largest voltage.
+class InteractiveMotion(Motion):
+    """All steps of a loop as one motion: their number, and `did`: the last slide, the last press and the
+    largest voltage of the completed steps.
     """
 
     kind: ClassVar[str] = "step"
@@ -77,8 +77,8 @@ class AtWill(Motion):
     def part(self, step: int) -> tuple[float, float, float]:
         return 0.0, 1.0, 1.0
 
-    def and_then(self, course: Course) -> AtWill:
-        """The same with what one more step does, which is not counted yet."""
+    def and_then(self, course: Course) -> InteractiveMotion:
+        """The same with the programme of one more step, which is not counted yet."""
         slide = course if course.distance else self.did
         press = course if course.depth is not None else self.did
         voltages = [one for one in (self.did.voltage, course.voltage) if one is not None]
@@ -93,16 +93,16 @@ class AtWill(Motion):
 
 
 class Loop:
-    """A scene on its way, made by `ev.loop`; its own motion is done."""
+    """A scene that is stepped interactively, made by `ev.loop`; its own motion is done."""
 
     def __init__(self, scene: Scene, observers: Sequence[Observer], largest_voltage: float | None) -> None:
         notices.check_observers(observers)
         self.scene, self._observers = scene, observers
-        self._own, self._at_will = scene.motion, AtWill(did=Course(voltage=largest_voltage))
-        self._check(Asked(voltage=largest_voltage, duration=0.0))
+        self._own, self._interactive = scene.motion, InteractiveMotion(did=Course(voltage=largest_voltage))
+        self._check(StepRequest(voltage=largest_voltage, duration=0.0))
         self._reasons: list[str] = []
         with blas_limits():
-            self._run = Run(self._moved(self._at_will), None)
+            self._run = Run(self._moved(self._interactive), None)
             self._tell("started", self._run.model.mesh, scene, scene.total_steps)
             self._blas = loaded_blas()
         self._largest = self._run.scene.electrics.largest_voltage
@@ -115,7 +115,7 @@ class Loop:
         held = any(one.force is not None or one.hold == "force" for one in last)
         self._load: float | None = rows[-1]["applied_force"] if held else None
         self._true: Loop | None = None
-        self._asked: list[Asked] = []
+        self._to_check: list[StepRequest] = []
 
     def linearised(self) -> Loop:
         """The same with tissue linear from now on; this one goes on behind it, when its error is read."""
@@ -139,14 +139,14 @@ class Loop:
         Parameters
         ----------
         position, position_z
-            Place of the bone (mm), along x and, of a fingertip, along z; of the drive where there is a
-            hand. Absolute.
+            Absolute position of the bone (mm), along x and, of a fingertip, along z; with a hand that of
+            the drive.
         indentation
             Travel of the bone beyond first touch (mm), negative when hovering. This or `force`.
         force
             Load on the bone (N/mm, of a fingertip N), which then stays.
         voltage
-            At the end (V); on the way it changes evenly.
+            At the end (V); within the step it changes evenly.
         duration
             Seconds. Without it no time passes; needed where something depends on time, where 0 stands
             for a step without time.
@@ -159,26 +159,26 @@ class Loop:
         Raises
         ------
         NotConverged
-            There is no such state. The loop is where it was, and may be asked for another one.
+            There is no such state. The loop is where it was, and another step may be tried.
         InputError
-            What is asked for does not go together, or with the scene.
+            The requested targets contradict each other or the scene.
         StopRun
             An observer raised it; the step is done.
         """
-        asked = Asked(position, position_z, indentation, force, voltage, duration)
-        self._check(asked)
+        wanted = StepRequest(position, position_z, indentation, force, voltage, duration)
+        self._check(wanted)
         start = self._start()
-        course = self._course(asked, start)
+        course = self._course(wanted, start)
         self._check_course(course)
         with self._threads():
             self._make_for(course)
-            frame = self._advance(course, start, asked)
+            frame = self._advance(course, start, wanted)
         if course.force is not None:
             self._load = self._run.rows[-1]["applied_force"]
         elif course.indentation is not None:
             self._load = None
         if self._true is not None:
-            self._asked.append(asked)
+            self._to_check.append(wanted)
         reasons = self._told(frame)
         self._reasons += reasons
         if reasons:
@@ -207,9 +207,9 @@ class Loop:
         if self._true is None:
             return 0.0
         try:
-            while self._asked:
-                self._true.step(**vars(self._asked[0]))
-                del self._asked[0]
+            while self._to_check:
+                self._true.step(**vars(self._to_check[0]))
+                del self._to_check[0]
         except NotConverged:
             return math.inf
         runs = self._run, self._true._run
@@ -218,7 +218,7 @@ class Loop:
         return float((np.abs(found - true).max(axis=0) / np.maximum(size, FAINT * size.max())).max())
 
     def __repr__(self) -> str:
-        """Number of steps, place and forces."""
+        """Number of steps, position and forces."""
         rows = self._run.rows
         text = f"Loop of {self.scene.name!r}: {len(rows)} steps"
         names = ("position", "indentation", "voltage", "normal_force", "tangential_force")
@@ -226,19 +226,19 @@ class Loop:
 
     # -- what a step is
 
-    def _check(self, asked: Asked) -> None:
+    def _check(self, wanted: StepRequest) -> None:
         """Raise InputError for what the scene does not have."""
         scene = self.scene
         over_time = isinstance(scene.electrics.voltage, TimeSignal) or scene.electrics.resolved
         needing = scene.time_needed_by or ("a voltage over time",) * over_time
-        if asked.duration is None and needing:
+        if wanted.duration is None and needing:
             raise InputError("duration", ABSENT, f"a time in s, needed with {' and '.join(needing)}")
-        if asked.voltage is None:
+        if wanted.voltage is None:
             return
         if not scene.has_voltage:
             raise InputError("voltage", "a voltage without a law", "a scene with an electrostatic law")
         if isinstance(scene.electrics.voltage, SIGNALS):
-            given = f"{asked.voltage:g} beside the {type(scene.electrics.voltage).__name__} of the scene"
+            given = f"{wanted.voltage:g} beside the {type(scene.electrics.voltage).__name__} of the scene"
             raise InputError("voltage", given, "one of the two")
 
     def _check_course(self, course: Course) -> None:
@@ -259,11 +259,11 @@ class Loop:
         start |= run.model.drive.place(run.state)
         return start if self._load is None else start | {"applied_force": self._load}
 
-    def _course(self, asked: Asked, start: Start) -> Course:
-        """What the step does; a way along x is one of angle 0 whatever its sign, as in the plane."""
+    def _course(self, wanted: StepRequest, start: Start) -> Course:
+        """The programme of the step; a slide along x has the angle 0 for either sign, as in the plane."""
         along, across = (
             0.0 if end is None else end - start[name]
-            for name, end in (("position", asked.position), ("position_z", asked.position_z))
+            for name, end in (("position", wanted.position), ("position_z", wanted.position_z))
         )
         distance, angle = along, 0.0
         if across:
@@ -274,22 +274,22 @@ class Loop:
         return Course(
             distance=distance,
             angle=angle,
-            indentation=asked.indentation,
-            force=asked.force,
-            hovers=(asked.indentation or 0.0) < 0.0,
-            hold="indentation" if self._load is None or asked.indentation is not None else "force",
-            voltage=asked.voltage,
-            duration=asked.duration or 0.0,
+            indentation=wanted.indentation,
+            force=wanted.force,
+            hovers=(wanted.indentation or 0.0) < 0.0,
+            hold="indentation" if self._load is None or wanted.indentation is not None else "force",
+            voltage=wanted.voltage,
+            duration=wanted.duration or 0.0,
         )
 
     # -- the run
 
-    def _advance(self, course: Course, start: Start, asked: Asked) -> Frame | None:
+    def _advance(self, course: Course, start: Start, wanted: StepRequest) -> Frame | None:
         """Do the step, or leave everything as it was."""
-        run, before = self._run, self._at_will
+        run, before = self._run, self._interactive
         mark, substep = run.ledger.mark(), run.stepper.substep
-        path = _exactly(run.path(course, start, (0.0, 1.0), course.duration), asked)
-        request = Request(len(run.rows) + 1, len(self._own), AtWill.kind, path, course.duration)
+        path = _exactly(run.path(course, start, (0.0, 1.0), course.duration), wanted)
+        request = Request(len(run.rows) + 1, len(self._own), InteractiveMotion.kind, path, course.duration)
         self._move(before.and_then(course))
         try:
             frame = run.advance(request)
@@ -298,16 +298,16 @@ class Loop:
             run.ledger.back(mark)
             run.stepper.substep = substep
             raise
-        self._move(replace(self._at_will, steps=before.steps + 1))
+        self._move(replace(self._interactive, steps=before.steps + 1))
         return frame
 
-    def _moved(self, at_will: AtWill) -> Scene:
+    def _moved(self, at_will: InteractiveMotion) -> Scene:
         """The scene with the steps so far behind its own motion; a copy that nobody else has."""
         return replace(self.scene, motion=(*self._own, at_will))
 
-    def _move(self, at_will: AtWill) -> None:
+    def _move(self, at_will: InteractiveMotion) -> None:
         """Tell the run's scene what its steps are: checked anew, a long loop would slow down."""
-        self._at_will = at_will
+        self._interactive = at_will
         set_frozen(self._run.scene, motion=(*self._own, at_will))
 
     def _make_for(self, course: Course) -> None:
@@ -317,7 +317,7 @@ class Loop:
             return
         if self._true is not None:
             raise InputError("voltage", voltage, "at most `largest_voltage` of a loop that is linearised")
-        scene = self._moved(self._at_will.and_then(course))
+        scene = self._moved(self._interactive.and_then(course))
         cored = (Closing(scene, run.model.mesh).core is None) != (run.model.closing.core is None)
         if cored or not run.scene.electrics.acts:
             self._run = Run(scene, Saved(run.checkpoint(), run.rows) if run.rows else None)
@@ -336,11 +336,11 @@ class Loop:
         return self._tell("step", self._run.rows[-1], frame, self._run.checkpoint)
 
 
-def _exactly(path: Path, asked: Asked) -> Path:
-    """The path with its end where it was asked for, to the last digit."""
-    across = None if asked.position_z is None else (asked.position_z,)
-    places: dict[str, Any] = {"x": asked.position, "z": across}
-    ends: dict[str, Any] = {name: place for name, place in places.items() if place is not None}
+def _exactly(path: Path, wanted: StepRequest) -> Path:
+    """The path with exactly the requested end."""
+    across = None if wanted.position_z is None else (wanted.position_z,)
+    coordinates: dict[str, Any] = {"x": wanted.position, "z": across}
+    ends: dict[str, Any] = {name: one for name, one in coordinates.items() if one is not None}
 
     def exact(done: float, fraction: float) -> Target:
         target = path(done, fraction)

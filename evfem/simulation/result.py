@@ -64,7 +64,7 @@ class Frame:
 
     `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip. `cauchy_stress`
     holds xx, yy, zz, xy of the cell means, in three dimensions yz and xz too, where `shear_traction` is a
-    magnitude; `J` is the volume ratio. Tractions are nodal forces over the current shares of the pad, of the
+    magnitude; `J` is the volume ratio. Tractions are nodal forces over the current tributary lengths, of the
     full field over those of its columns. `surface_sink` is how far an elastic surface has sunk below a node.
     """
 
@@ -121,7 +121,7 @@ class Result(History, FurtherColumns):
     `tangential_force` and `applied_tangential_force` are along the direction of the last slide's
     angle (+x before the first), positive where a finger slides by a positive distance.
 
-    `probes` has by name the histories at points that the scene asked for (`evfem.scene.probes`).
+    `probes` has by name the histories at points requested by the scene (`evfem.scene.probes`).
     """
 
     frames: list[Frame]
@@ -320,7 +320,7 @@ class Result(History, FurtherColumns):
 
     def to_xarray(self) -> Any:
         """The result as an `xarray.Dataset`: every column over `step`, the fields kept over `frame` (the
-        number of its step) and `node` or `cell`, with `units` and `long_name`; places of the undeformed
+        number of its step) and `node` or `cell`, with `units` and `long_name`; positions of the undeformed
         nodes (mm) are the coordinates x, y and z. A field with the name of a column ends in `_of_nodes`.
 
         Raises InputError where xarray is not installed (the extra `xarray`).

@@ -1,4 +1,4 @@
-"""Run a scene: build the parts it needs, follow its motions step by step, and hand every converged
+"""Run a scene: build its model, follow its motions step by step, and hand every converged
 step out.
 """
 
@@ -48,7 +48,15 @@ from evfem.simulation.checkpoint import (
     state_of,
     usable,
 )
-from evfem.simulation.doubtful import advice, deepest, doubtful, off, outside, through, unheld
+from evfem.simulation.doubtful import (
+    advice,
+    deepest_penetration,
+    doubtful,
+    free_nodes,
+    penetration,
+    pull_offs,
+    unstable_alone,
+)
 from evfem.simulation.history import ROOM_COLUMNS
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, linearised, make_model
@@ -63,10 +71,10 @@ from evfem.tissue.kernels.blocks import loops
 if TYPE_CHECKING:
     from evfem.scene.probes import Probes
 
-#: what is known where a motion starts
+#: quantities of the initial state of a motion
 Start = dict[str, float]
-START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
-#: the first part of a run under a voltage that can close nodes one by one: it is raised in such parts
+START_COLUMNS = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
+#: first substep of a run under a voltage that can close nodes one by one: the voltage is raised in such ones
 FIRST_PART = 0.125
 
 
@@ -155,12 +163,14 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
 
 
 def climb(model: Model, old: State, new: State, target: Target) -> float:
-    """The climb between two states; of no run, which would hold itself and its factors by it."""
+    """The energy barrier between two states; no method of a run, which would then refer to itself and keep
+    its factors alive.
+    """
     return rise(SubstepWork(model, old, new), target)
 
 
 class Run:
-    """A scene on its way: the model, the present state, the rows and frames so far."""
+    """A simulation in progress: the model, the present state, the rows and frames so far."""
 
     def __init__(self, scene: Scene, resume: Saved | None) -> None:
         self.scene = scene
@@ -173,7 +183,7 @@ class Run:
         self.stepper = Stepper(equilibrium, body=body, scheme=scheme, rise=partial(climb, self.model))
         if self.model.closing.trapped and self.source.start != 0.0:
             self.stepper.substep = FIRST_PART
-        self.outside, self.sunk = outside(self.model), np.zeros(2)
+        self.free_nodes, self.sunk = free_nodes(self.model), np.zeros(2)
         self.probes: Probes | None = None
         if scene.output.probes:
             from evfem.scene.probes import Probes
@@ -206,7 +216,7 @@ class Run:
     # -- from motions to targets
 
     def requests(self) -> Iterator[Request]:
-        """The steps still to do; paths start from the state at the time they are asked for."""
+        """The remaining steps; paths start from the state at the time of their request."""
         done, step = len(self.rows), 0
         before = Course()
         for index, motion in enumerate(self.scene.motion):
@@ -216,8 +226,8 @@ class Run:
             if step <= done:
                 continue
             start = self.start_of(first)
-            let_go = last.gap is not None and course.gap is None
-            if let_go and done <= first and (said := unheld(self.model, self.state, self.rows)):
+            gap_ended = last.gap is not None and course.gap is None
+            if gap_ended and done <= first and (said := unstable_alone(self.model, self.state, self.rows)):
                 notices.warn(f"motion {index}: {said}")
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
                 begun, reached, steps = motion.part(k)
@@ -225,17 +235,17 @@ class Run:
                 path = self.path(course, start, (begun, reached), seconds)
                 yield Request(first + k, index, motion.kind, path, seconds)
 
-    def path(self, course: Course, start: Start, shares: tuple[float, float], seconds: float) -> Path:
-        """The path of the next step, between two `shares` (0 to 1) of a motion that began at `start`.
+    def path(self, course: Course, start: Start, fractions: tuple[float, float], seconds: float) -> Path:
+        """The path of the next step, between two `fractions` (0 to 1) of a motion that began at `start`.
 
-        The voltage acts in full from the first step on; only a first step in parts raises it on the way.
+        The voltage acts in full from the first step on; only a first step in substeps raises it within.
         """
-        now, (begun, reached) = self.time, shares
+        now, (begun, reached) = self.time, fractions
         raised = not (self.rows or self.source.prescribed(seconds))
 
         def target(done: float, fraction: float) -> Target:
-            time, share = now + fraction * seconds, begun + fraction * (reached - begun)
-            at = self._target(course, start, reached if fraction == 1.0 else share, time)
+            time, reached_now = now + fraction * seconds, begun + fraction * (reached - begun)
+            at = self._target(course, start, reached if fraction == 1.0 else reached_now, time)
             if raised and fraction < 1.0:
                 end = self._target(course, start, reached, now + seconds).voltage
                 at = replace(at, voltage=at.voltage.raised(end, fraction))
@@ -244,12 +254,12 @@ class Run:
         return target
 
     def start_of(self, rows_before: int) -> Start:
-        """Where a motion starts: bone, indentation, force, voltage, and whether the finger is loose."""
-        start = dict.fromkeys(START, 0.0)
+        """Initial state of a motion: bone, indentation, force, voltage, and whether it is unloaded."""
+        start = dict.fromkeys(START_COLUMNS, 0.0)
         if rows_before == 0:
             return start | {"voltage": self.source.start}
         row = self.rows[rows_before - 1]
-        start |= {name: row[name] for name in START if name in row}
+        start |= {name: row[name] for name in START_COLUMNS if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
         names = ("electrostatic", *(one.name for one in self.model.attraction.parts))
         pulled = any(row[f"{name}_force"] != 0.0 for name in names)
@@ -276,10 +286,10 @@ class Run:
         position = towards("position", start["position"] + course.travel[0])
         position_z = towards("position_z", start["position_z"] + course.travel[1])
         bone = self.model.bone(position, towards("indentation", course.indentation), position_z)
-        way = course.direction[: bone.size - 1]
-        along = float(np.dot((position, position_z)[: bone.size - 1], way))
+        heading = course.direction[: bone.size - 1]
+        along = float(np.dot((position, position_z)[: bone.size - 1], heading))
         slides, ramp = bool(course.distance), towards("voltage", course.voltage)
-        moment = Moment(ramp, time, self.time, position, along, way, slides)
+        moment = Moment(ramp, time, self.time, position, along, heading, slides)
         height: HeightControl = Indentation(float(bone[1]))
         if course.force is not None:
             height = Force(towards("applied_force", course.force))
@@ -307,7 +317,11 @@ class Run:
             raise NotConverged(request.step, error.residuals, said, self.result()) from None
         except Unresolved as error:
             raise NotConverged(request.step, [], str(error), self.result()) from None
-        self.sunk = max(self.sunk, deepest(self.model, self.outside, self.state.u), key=lambda one: one[0])
+        self.sunk = max(
+            self.sunk,
+            deepest_penetration(self.model, self.free_nodes, self.state.u),
+            key=lambda one: one[0],
+        )
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
         row["substeps"] = substeps
@@ -351,7 +365,10 @@ class Run:
         about = provenance(self.scene, self.model.mesh, solver)
         if (core := self.model.closing.core) is not None:
             about["core"] = core.told
-        said = (*through(self.model, self.sunk), *off(self.ledger.pull_off.came_off, self.model.mesh.dim))
+        said = (
+            *penetration(self.model, self.sunk),
+            *pull_offs(self.ledger.pull_off.came_off, self.model.mesh.dim),
+        )
         if further := [one for one in self.model.columns if one.name not in ROOM_COLUMNS]:
             about["columns"] = [[one.name, one.unit, one.meaning] for one in further]
         about["warnings"] = [*said, *doubtful(self.scene, self.rows)]

@@ -24,9 +24,9 @@ from evfem.errors import InputError, quoted
 from evfem.simulation.result import Result
 
 WINDOWS = ("none", "hann")
-#: largest difference of two steps, as a share of a step
+#: largest difference of two steps, as a fraction of a step
 EVEN = 1e-6
-#: times that differ by less, as a share of the last one, are the same
+#: times that differ by less, as a fraction of the last one, are the same
 ROUNDING = 1e-12
 
 

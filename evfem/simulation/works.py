@@ -1,4 +1,4 @@
-r"""Works and dissipations of one accepted part of a run, each from its own definition.
+r"""Works and dissipations of one accepted substep of a run, each from its own definition.
 
 Between two equilibria 0 and 1, with :math:`\Delta` the change of a quantity and
 :math:`\bar f = (f_0 + f_1)/2`: internal forces f (tissue, viscosity, mass), forms of the user
@@ -11,21 +11,21 @@ the solver's tolerance,
 
 The history has
 
-- ``external_work`` :math:`W = \bar r\cdot\Delta b - \bar f_u\cdot\Delta u + W_t`, given by bone and user's
-  forms; :math:`W_t = -\tfrac{1}{2}\sum \Delta\lambda_t\,s` is of nodes that begin to slip in the part, or
-  turn: their shear force changes while they stick and stays while they slip;
-- ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
-  evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
-  ``adhesive_work`` likewise;
+- ``external_work`` :math:`W = \bar r\cdot\Delta b - \bar f_u\cdot\Delta u + W_t`, done by bone and user's
+  forms; :math:`W_t = -\tfrac{1}{2}\sum \Delta\lambda_t\,s` is of nodes that begin to slip in the substep, or
+  reverse: their shear force changes while they stick and is constant while they slip;
+- ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight path in configuration space, the
+  squared voltage growing evenly; the travel of open nodes with the bone counts trapezoidally, as the bone's
+  does; ``adhesive_work`` likewise;
 - ``stored_energy`` :math:`\psi` of the tissue, with penalties of the springs of the interface, of an elastic
-  surface (`evfem.terms.foundation`), relative to which ways then are, and with a hand of its spring
-  (``kinetic_energy``, ``viscous_dissipation`` and the work of the drive have its mass and damper);
+  foundation (`evfem.terms.foundation`; displacements are then relative to its surface), and with a hand of
+  its spring (``kinetic_energy``, ``viscous_dissipation`` and the work of the drive have its mass and damper);
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
 - ``viscous_dissipation`` :math:`D_v = \int 2\eta|\Delta E|^2/\Delta t`, never negative, and what Maxwell
-  branches lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a part without time, after
+  branches lose (`evfem.tissue.branches`), whose energy is in ``stored_energy``; a substep without time, after
   which they are at rest, loses all of it.
 
 Their difference is computed term by term without the work of the bone, so the balance is a check
@@ -34,32 +34,34 @@ that the forces of the accepted states are in equilibrium:
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
           + (W_e - \bar f_e\cdot\Delta u) + W_t .
 
-What tissue and backward differences lose on the way, the work of nodes that land, leave or begin to slip, and
-what the way adds to the attraction's work. Over a motion the sum falls with the square of the step, in time
-without inertia with the step, and is ``integrator_dissipation``.
+These are the quadrature error of the tissue, the numerical dissipation of backward differences, the work of
+nodes that close, open or begin to slip, and the dependence of the attraction's work on the path. Over a
+motion the sum falls with the square of the step, in time without inertia with the step, and is
+``integrator_dissipation``.
 
-A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
-where time stops), and the end is far away however small the part. Then L does not fall with the step. It is
-the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and either the body, the loads at their
-final values, moves along forces that grow faster than the tissue's, seen from the bone,
+A quasi-static substep may contain a **snap**: stability is lost within it (or speeds and viscous stresses
+are, where time stops), and the end is far away however small the substep. Then L does not fall with the step.
+It is the energy set free, and ``snap_dissipation``. A substep snaps if L > 0 and either the body, the loads
+at their final values, moves along forces that grow faster than the tissue's, seen from the bone,
 
 .. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
           w = \Delta u - \Delta b,
 
-and from the surface, with u_0 and Delta u on the right (a bone that presses moves what sticks to the surface
-only in its own eyes), or L exceeds the share `SNAP` of half the larger of :math:`|\Delta f\cdot w|` and what
-the shear of the nodes changes by times their slip. Both are right in the limit of small parts, and only say
-which of two columns has L.
+and from the surface, with u_0 and Delta u on the right (sticking nodes move relative to a pressing bone
+only), or L exceeds the fraction `SNAP` of half the larger of :math:`|\Delta f\cdot w|` and of the change of
+the nodes' shear times their slip. Both are right in the limit of small substeps, and only decide which of two
+columns has L.
 
-Where no equilibrium is near, the body is released and comes to rest at another one
-(`evfem.solver.relaxation`). The energy set free there is what the drag dissipates on the way,
+Where no equilibrium is near, pseudo-transient continuation leads to another one
+(`evfem.solver.relaxation`). The energy set free there is the dissipation by drag,
 :math:`D_d = \int S_d : \Delta E + |\Delta u|_{M_d}^2 s^2 \ge 0`, and the L of these steps, from which
 :math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``. If their sum is negative, as it
 can be in the first of these steps, which moves the loads, it is ``integrator_dissipation``.
 
 Where the voltage is resolved in time (`evfem.terms.charging`) the pad first moves with the charges
-and the voltage that it had, which is the way of :math:`W_e`, and then charge flows:
-``source_work`` is what the source gives in both, ``leakage_dissipation`` what crosses the layers, and
+and the voltage that it had, which is the path of :math:`W_e`, and then charge flows:
+``source_work`` is the work of the source in both, ``leakage_dissipation`` that of conduction in the layers,
+and
 
 .. math:: W_s = \Delta W_f + D_l + W_e + W_a
 
@@ -72,7 +74,7 @@ Under another law these columns are 0. Kaczmarek's is the work of a source with 
 eps_0 V ln[(g + D)/(g + s)]/(D - s), but leaves a closed gap a voltage across no thickness: with a leak no
 displacement is both that of the law and that of layers that conduct.
 
-The first part begins without any load: voltage, adhesion and user's forms count as raised within it.
+The first substep begins without any load: voltage, adhesion and user's forms count as raised within it.
 """
 
 from __future__ import annotations
@@ -91,37 +93,39 @@ from evfem.simulation.model import Model
 from evfem.terms.foundation import Rigid
 from evfem.terms.traction import PadPath, PadState
 
-#: share of the work of the change of internal forces or shear that no small smooth part sets free
+#: fraction of the work of the change of internal forces or shear that a small smooth substep cannot set free
 SNAP = 0.5
-#: share of the work of the internal forces, all counted positive, that is the solver's tolerance
+#: fraction of the work of the internal forces, absolute values added, that is the solver's tolerance
 NOISE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Books:
-    """Of an accepted state: internal and users' forces (N, dim), energies of tissue, springs, motion."""
+    """Energy balance, data of an accepted state: internal forces and forces of user-supplied forms (N, dim),
+    energies of tissue, springs, motion.
+    """
 
     forces: Floats
-    given: Floats
+    user_forces: Floats
     stored: float
     springs: float
     kinetic: float
 
     @property
     def energy(self) -> float:
-        """All of it."""
+        """Total energy."""
         return self.stored + self.springs + self.kinetic
 
     @classmethod
     def nothing(cls, shape: tuple[int, ...]) -> Books:
-        """Before the first part, displacements of this shape."""
+        """Before the first substep, with displacements of this shape."""
         none = np.zeros(shape)
         return cls(none, none, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class SubstepWork:
-    """One accepted part of a run of `model`, from `old` to `new`; the `first` begins without any load."""
+    """One accepted substep of a run of `model`, from `old` to `new`; the `first` begins without any load."""
 
     model: Model
     old: State
@@ -129,41 +133,41 @@ class SubstepWork:
     first: bool = False
 
     def end(self) -> Books:
-        """Energies at the end of the part, its loads held."""
+        """Forces and energies at the end of the substep."""
         body, new = self.model.body, self.new
-        given = body.given_forces(new.u)
-        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2) + self.yielded[-1])
+        user_forces = body.given_forces(new.u)
+        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2) + self.foundation_energies[-1])
         springs += float(sum(term.stored(new) for term in self.model.terms))
         kinetic = float(sum(term.kinetic(new) for term in self.model.terms))
-        return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
+        return Books(body.forces(new.u) - user_forces, user_forces, body.energy(new.u), springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
         """Contributions of the substep to the columns that add up, N mm per mm of depth."""
         old, new, body = self.old, self.new, self.model.body
-        moved, turned = new.u - old.u, self._turned()
-        given = _mean_work(old.reaction, new.reaction, new.bone - old.bone) + turned
-        given -= _mean_work(begin.given, end.given, moved)
+        moved, slip_onset = new.u - old.u, self._slip_onset_work()
+        external_work = _mean_work(old.reaction, new.reaction, new.bone - old.bone) + slip_onset
+        external_work -= _mean_work(begin.user_forces, end.user_forces, moved)
         pulled, friction = self.pulled(), self.friction()
         pulls = {f"{name}_work": work for name, work in pulled.items()}
         driven = float(sum(term.work(old, new) for term in self.model.terms))
         viscous = float(sum(term.dissipation(old, new, self._seconds) for term in self.model.terms))
-        given += driven
-        lost = turned + sum(pulls.values()) - friction + driven
+        external_work += driven
+        lost = slip_onset + sum(pulls.values()) - friction + driven
         lost += _mean_work(begin.forces, end.forces, moved) - (end.energy - begin.energy) - viscous
         lost -= _mean_work(*self._on_surface, moved[self.model.pad.nodes])
         lost -= (drag := body.drag_dissipation(new.u))
         snap = drag + lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost))
         snapped = (0.0, drag + lost) if snap else (drag + lost, 0.0)
-        own = {"electrostatic_work": 0.0, "external_work": given, "friction_dissipation": friction}
+        own = {"electrostatic_work": 0.0, "external_work": external_work, "friction_dissipation": friction}
         own |= {"viscous_dissipation": viscous, "integrator_dissipation": snapped[0]}
         own |= {"snap_dissipation": snapped[1]} | pulls
         for room in self.model.shown:
             own |= room.works(self)
         return own
 
-    def _turned(self) -> float:
-        """Work of the bone beyond the trapezoid where nodes begin to slip: their shear force changes while
-        they stick, and stays while they slip.
+    def _slip_onset_work(self) -> float:
+        """Correction of the boundary work for nodes that start to slip within the substep: their shear force
+        changes while they stick and is constant while they slip.
         """
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
         slip = slipped(interface, old, new) if interface.dim == 3 else self._slip[:, None]
@@ -174,36 +178,36 @@ class SubstepWork:
     def pulled(self) -> dict[str, float]:
         """Works of the tractions by name, N mm per mm of depth."""
         before, after = (self.model.equilibrium.pulls(state) for state in (self.old, self.new))
-        parts = self.model.attraction.parts
-        return {one.name: one.work_along(self.path(before[one.name], after[one.name])) for one in parts}
+        tractions = self.model.attraction.parts
+        return {one.name: one.work_along(self.path(before[one.name], after[one.name])) for one in tractions}
 
     @cached_property
     def pads(self) -> tuple[PadState, PadState]:
-        """The pad before and after; in the first substep what acts without a voltage is raised."""
+        """The pad before and after; in the first substep tractions without a voltage are raised from 0."""
         interface, touching = self.model.equilibrium.interface, self.old.touching
         before, after = (interface.pad_state(state, touching) for state in (self.old, self.new))
         return replace(before, load=0.0) if self.first else before, after
 
     def path(self, before: Floats, after: Floats) -> PadPath:
-        """The substep as a traction with these forces (P, dim) at both ends sees it."""
+        """The path of the pad for the work of a traction with these forces (P, dim) at both ends."""
         if self.first:
             before = np.zeros_like(after)
         open_ = ~(self.old.touching | self.new.touching)
-        # trapezoidal only on the way with the bone, and only where that is not stopped by the surface
-        turned = self.way - np.where(open_[:, None], self.new.bone - self.old.bone, 0.0)
-        return PadPath(*self.pads, self.way, turned, (before, after))
+        # trapezoidal only for the travel with the bone, and only of nodes that the surface does not stop
+        turned = self.relative_displacement - np.where(open_[:, None], self.new.bone - self.old.bone, 0.0)
+        return PadPath(*self.pads, self.relative_displacement, turned, (before, after))
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""
-        length, (begin, end) = self.slip_length, self.places
+        length, (begin, end) = self.slip_length, self.positions
         if not length.any():
             return 0.0
         before, after = (np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new))
-        way = SLIDE[:, None]
-        normal = (1.0 - way) * before + way * after
-        part, places = (self.old, self.new), begin + way[..., None] * (end - begin)
+        fractions = SLIDE[:, None]
+        normal = (1.0 - fractions) * before + fractions * after
+        ends, positions = (self.old, self.new), begin + fractions[..., None] * (end - begin)
         resists = self.model.equilibrium.interface.resistance
-        limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
+        limit = np.array([resists(ends, *each, length) for each in zip(positions, normal, strict=True)])
         slips = self._bed.stretched((self.old, self.new), end - begin, length)
         return float(PART @ np.sum(limit * slips, axis=1))
 
@@ -212,20 +216,20 @@ class SubstepWork:
         return float(self.model.equilibrium.interface.duration)
 
     @cached_property
-    def places(self) -> tuple[Floats, Floats]:
+    def positions(self) -> tuple[Floats, Floats]:
         """x[, z] of the pad nodes (P, d) before and after."""
         begin, end = (self.model.equilibrium.interface.on_display(state) for state in (self.old, self.new))
         return begin, end
 
     @cached_property
-    def way(self) -> Floats:
-        """How far the pad's nodes have moved relative to the surface (P, dim) in mm."""
+    def relative_displacement(self) -> Floats:
+        """Displacements of the pad's nodes relative to the surface (P, dim) in mm."""
         moved = (self.new.u - self.old.u)[self.model.pad.nodes]
-        return self._bed.way((self.old, self.new), moved)
+        return self._bed.relative_displacement((self.old, self.new), moved)
 
     @cached_property
-    def yielded(self) -> Floats:
-        """Energy of an elastic surface before, between (forces of one end, places of the other) and after."""
+    def foundation_energies(self) -> Floats:
+        """Energy of an elastic foundation before, mixed (forces and positions of two ends), and after."""
         return self._bed.energies((self.old, self.new), self._on_surface)
 
     @property
@@ -241,15 +245,15 @@ class SubstepWork:
 
     @cached_property
     def compliance(self) -> Floats:
-        """Compliance of the interface (P, 2) in this part, mm per N/mm."""
+        """Compliance of the interface (P, 2) in this substep, mm per N/mm."""
         return self.model.equilibrium.interface.compliance(self.old)
 
     @cached_property
     def _slip(self) -> Floats:
-        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they left."""
+        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they opened."""
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
         stretch = [interface.surface_at(state).stretch for state in (old, new)]
-        slip = 0.5 * (stretch[0] + stretch[1]) * (self.places[1] - self.places[0])[:, 0]
+        slip = 0.5 * (stretch[0] + stretch[1]) * (self.positions[1] - self.positions[0])[:, 0]
         slip = slip + self.compliance[:, 1] * (new.contact_force[:, 1] - old.contact_force[:, 1])
         status = np.where(new.touching | (old.status == STICK), new.status, old.status)
         # a node may stick at a jump of friction that it has slipped up to
@@ -265,12 +269,12 @@ class SubstepWork:
             return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))
         return np.abs(self._slip)
 
-    def _coefficient(self, place: Floats) -> Floats:
-        """Friction coefficient of the pad nodes (P,) at the places (P, d)."""
-        return self.model.equilibrium.interface.friction(self.old, np.arange(len(place)), place)
+    def _friction_coefficient(self, position: Floats) -> Floats:
+        """Friction coefficient of the pad nodes (P,) at the positions (P, d)."""
+        return self.model.equilibrium.interface.friction(self.old, np.arange(len(position)), position)
 
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
-        """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
+        """Whether stability was lost in the substep, from the internal forces (N, dim) and L."""
         new, old = self.new, self.old
         rooms = (*self.model.terms, *self.model.attraction.parts)
         if any(room.takes_time(self._seconds) for room in rooms):
@@ -284,25 +288,25 @@ class SubstepWork:
         if lost > 0.5 * SNAP * max(abs(work), float(changed @ self.slip_length)):
             return True
         carried = replace(old, u=old.u + (new.bone - old.bone))
-        return all(work < self._pulled(begin) for begin in (carried, old))
+        return all(work < self._growing_work(begin) for begin in (carried, old))
 
-    def _pulled(self, begin: State) -> float:
-        """Work of what attraction and friction grow by from `begin` to the end, under the end loads."""
+    def _growing_work(self, begin: State) -> float:
+        """Work of the growth of attraction and friction from `begin` to the end, under the end loads."""
         model, old, new = self.model, self.old, self.new
         along = (new.u - begin.u)[model.pad.nodes]
         at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (begin, new)]
         work = float(np.sum((at[1] - at[0]) * along))
-        less = self._coefficient(model.equilibrium.interface.on_display(begin))
-        less = less - self._coefficient(self.places[1])
+        less = self._friction_coefficient(model.equilibrium.interface.on_display(begin))
+        less = less - self._friction_coefficient(self.positions[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 
     def _with_slip(self, along: Floats) -> Floats:
-        """The share (P,) of the way `along` (P, dim) that the pad nodes go the way they slip."""
+        """Component (P,) of the displacements `along` (P, dim) of the pad nodes in the direction of slip."""
         interface = self.model.equilibrium.interface
         if interface.dim == 3:
             slip = slipped(interface, self.old, self.new) / np.maximum(self.slip_length, 1e-300)[:, None]
-            way = np.einsum("paj,pj->pa", interface.surface_at(self.new).travel, along[:, ::2])
-            return np.asarray(np.sum(slip * way, axis=1))
+            moved = np.einsum("paj,pj->pa", interface.surface_at(self.new).travel, along[:, ::2])
+            return np.asarray(np.sum(slip * moved, axis=1))
         return np.sign(self._slip) * along[:, 0]
 
 

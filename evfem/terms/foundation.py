@@ -127,7 +127,7 @@ class Rigid(Room):
         """Energy before, between (forces of one end, places of the other) and after a part, N mm."""
         return np.zeros(3)
 
-    def way(self, part: tuple[Any, Any], moved: Floats) -> Floats:
+    def relative_displacement(self, ends: tuple[Any, Any], moved: Floats) -> Floats:
         """How far nodes that `moved` (P, dim) did so relative to the surface."""
         return moved
 
@@ -260,8 +260,8 @@ class Bed(Rigid):
         between = 0.5 * (np.sum(forces[0] * sunk[1]) + np.sum(forces[1] * sunk[0]))
         return np.array([energy(*pairs[0]), float(between), energy(*pairs[1])])
 
-    def way(self, part: tuple[Any, Any], moved: Floats) -> Floats:
-        return np.asarray(moved + self.displacement(part[1]) - self.displacement(part[0]))
+    def relative_displacement(self, ends: tuple[Any, Any], moved: Floats) -> Floats:
+        return np.asarray(moved + self.displacement(ends[1]) - self.displacement(ends[0]))
 
     def stretched(self, part: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
         along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)

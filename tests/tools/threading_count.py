@@ -71,7 +71,7 @@ CAPABILITIES = (
     capability("adhesion", r"adhes|adher|came_off|\bON\b|self\.let_go|ledger\.let_go|self\.pull\b"),
     capability(
         "elastic surface",
-        r"""\bbed\b|\bBed\b|Yielding|CandidatesBed|yielded|unyielded|tilted|untilted|surface_sink|\b_sunk\b
+        r"""\bbed\b|\bBed\b|Yielding|CandidatesBed|foundation_energies|tilted|untilted|surface_sink|\b_sunk\b
         |\b_kept\(|\.elastic\b|\belastic\b|(state|old|new|after)\.given
         |surface_displacement|\.strain\b|\bstrain\b|NO_BED|bed_of|_stretched""",
     ),
@@ -128,7 +128,7 @@ CAPABILITIES = (
         own="newton/pressure",
     ),
     capability("sensitivities", r"response|sensitivit|Sensitivit|derivatives?_of|adjoint"),
-    capability("forms of the user", r"\bforms\b|given_forces|body\.given|begin\.given|make_term|users"),
+    capability("forms of the user", r"\bforms\b|given_forces|body\.given|user_forces|make_term|users"),
     capability(
         "linearised loop",
         r"linearised\b(?!\()|LinearBody|linearbody|\.whole\(",
