@@ -1,9 +1,9 @@
-r"""What every capability answers, so that solver, checkpoint, balance of energy and history sum over lists.
+r"""Interface of a capability, so that solver, checkpoint, energy balance and history sum over lists.
 
-A *room* holds one capability: its keys, equation, tangent, memory, energies and columns. The solver asks the
+A *room* holds one capability: its keys, equation, tangent, memory, energies and columns. The solver calls the
 rooms of a scene in the order of a step and knows none by name (docs, Inside)::
 
-    memory(state)           once, at rest            what the room keeps from substep to substep, by name
+    memory(state)           once, at rest            internal variables from substep to substep, by name
     begin(old, seconds)     a trial begins           any number of times from the same accepted state
     accept(old, new)        a substep is accepted    the room's memory at its end
     stored, kinetic         of an accepted state     energies
@@ -11,7 +11,7 @@ rooms of a scene in the order of a step and knows none by name (docs, Inside)::
     values, works           of a state, a substep    the room's `columns` in the history
 
 Units: mm, N, MPa, s, V; in the plane per mm of depth. N nodes, P nodes of the pad, dim = 2 or 3.
-A room that keeps nothing, stores nothing and shows nothing inherits all of it from here.
+A room without memory, energies and columns inherits all of this.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Room:
     columns: tuple[Column, ...] = ()
 
     def memory(self, state: Any) -> dict[str, Floats]:
-        """What is kept of the undeformed `state`, by name; shapes stay the same from then on."""
+        """Memory of the undeformed `state`, by name; shapes stay the same from then on."""
         return {}
 
     def begin(self, old: Any, seconds: float) -> None:
@@ -75,8 +75,8 @@ class Room:
         return np.zeros_like(fractions)
 
     def takes_time(self, seconds: float) -> bool:
-        """Whether rates count in a substep of so many seconds: what sets energy free then is no snap, as of
-        springs that relax while nothing moves.
+        """Whether rates count in a substep of so many seconds: energy set free then is no snap, as of springs
+        that relax without motion.
         """
         return False
 
@@ -85,15 +85,15 @@ class Room:
         return {}
 
     def works(self, substep: Any) -> Mapping[str, float]:
-        """What a substep adds to the `columns` that end in _work or _dissipation (N mm)."""
+        """Contributions of a substep to the `columns` that end in _work or _dissipation (N mm)."""
         return {}
 
 
 class BodyTerm(Room):
     """Forces within the body beside those of the tissue: springs, dampers, masses on its nodes.
 
-    A term of one's own has `forces`, and `stiffness` where they depend on where the nodes are; `stored` and
-    `dissipation` close the balance of energy.
+    A user-defined term has `forces`, and `stiffness` where they depend on the displacements; `stored` and
+    `dissipation` close the energy balance.
     """
 
     def placed(self, mesh: Any) -> None:
@@ -114,14 +114,15 @@ class BodyTerm(Room):
 
 
 class Foundation(Room):
-    """An elastic surface below the pad that may remember: for `elastic=` of any surface.
+    """An elastic foundation of the pad, which may have memory: for `elastic=` of any surface.
 
-    `compliance` is that of the present step; to what the forces on the pad displace the surface by, `left` of
-    the displacement before the step is added, as of a surface that creeps: a Kelvin-Voigt solid with the
+    `compliance` is that of the present step; the fraction `left` of the displacement before the step is added
+    to the displacement under the present forces, as of a surface that creeps: a Kelvin-Voigt solid with the
     relaxation time T has the compliance C h/(h + T) in a step of h seconds and leaves T/(h + T).
 
-    The states that `accept` and `dissipation` get remember the forces on the pad's nodes, `surface_force`
-    (P, dim), and what these add to their places relative to the surface, `surface_displacement` (P, dim).
+    The states that `accept` and `dissipation` get have in memory the forces on the pad's nodes,
+    `surface_force` (P, dim), and their contribution to the relative positions, `surface_displacement`
+    (P, dim).
     """
 
     def compliance(self, x: Floats, lengths: Floats) -> Floats:

@@ -410,7 +410,7 @@ class Target:
             ((self.bone(old.bone) - old.bone) / self.duration).tolist(),
         )
         pairs = list(zip(before, now, strict=True))
-        pairs[::2] = self.drive.given_speeds(old, self.place, self.duration, pairs[::2])
+        pairs[::2] = self.drive.prescribed_speeds(old, self.place, self.duration, pairs[::2])
         if self.height.free:
             del pairs[1]
         jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)

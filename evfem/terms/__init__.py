@@ -1,7 +1,7 @@
-"""Capabilities as rooms: what pulls on the pad, what is below it, what drives the bone, bounds of friction.
+"""Capabilities as rooms: tractions on the pad, elastic foundations, drives of the bone, bounds of friction.
 
-For a capability of one's own (docs, Add a capability): bases of tractions on the pad (`PadTraction`), terms
-of the body (`BodyTerm`), elastic surfaces that remember (`Foundation`) and drives of the bone (`Hand`).
+For user-defined capabilities (docs, Add a capability): bases of tractions on the pad (`PadTraction`), terms
+of the body (`BodyTerm`), elastic surfaces with memory (`Foundation`) and drives of the bone (`Hand`).
 """
 
 from evfem.common.rooms import BodyTerm as BodyTerm

@@ -47,7 +47,7 @@ def attraction(u: Any, v: Any, w: Any) -> Any:
 
 #: name of the traction of a voltage, whose columns every history has
 ELECTROSTATIC = "electrostatic"
-#: adhesion, in the place of a voltage: it is always on
+#: strength of adhesion, instead of a voltage
 ON = 1.0
 
 
@@ -67,7 +67,7 @@ class Attraction(PadTraction):
     charging: Any = NO_CHARGES
     #: of its columns in the history
     name: str = field(default=ELECTROSTATIC, kw_only=True)
-    #: whether it acts without a voltage; its law then takes the strength `ON` in the place of one
+    #: whether it acts without a voltage; the argument of its law is then the strength `ON`
     always: bool = field(default=False, kw_only=True)
     label: str = field(default="attraction", kw_only=True)
 

@@ -63,8 +63,8 @@ class ChargeBooks(Room):
         volts, work = charging.old.voltage, 0.0
         none = np.zeros_like(before.position)
         path = PadPath(before, after, none, none, (none, none)).at(WAY, np.full(WAY.shape, volts))
-        for pad, share in zip(path.states(), SHARE, strict=True):
+        for pad, weight in zip(path.states(), SHARE, strict=True):
             carried = {"charges": charging.carried(lengths(pad.position))}
             at = self.attraction.charged(replace(pad, memory=carried))
-            work += share * float(charging.energy_density(at) @ grown)
+            work += weight * float(charging.energy_density(at) @ grown)
         return work

@@ -26,7 +26,7 @@ from evfem.tensor import STEP
 
 #: pieces of a step, from the fastest charge's relaxation on, grow by this factor; Gauss points of each
 LONGER, POINTS = 3.0, 8
-#: positions at which the effective voltage is remembered
+#: positions at which the effective voltage is cached
 REMEMBERED = 4
 
 
@@ -72,7 +72,7 @@ NO_CHARGES = NoCharges()
 
 
 class Charging(NoCharges):
-    """The charges of a step that begins at `begin` and takes `seconds`."""
+    """Charge transport in a step of so many `seconds` from the state given to `begin`."""
 
     flows = True
 
@@ -117,14 +117,14 @@ class Charging(NoCharges):
         self._known: dict[tuple[bytes, float, bytes], tuple[Floats, Floats]] = {}
 
     def carried(self, length: Floats) -> Floats:
-        """The charges (M, P) of the beginning on other tributary lengths (P,)."""
+        """Charges (M, P) after motion: those of the begin of the step on other tributary lengths (P,)."""
         some = length > 0.0
         return np.asarray(
             self.old.charges * np.where(some, self.old.length / np.where(some, length, 1.0), 1.0)
         )
 
     def after(self, gap: Any, voltage: float, length: Floats) -> Any:
-        """The charges (M, P) at the end of the step, in the new place under the new voltage."""
+        """The charges (M, P) at the end of the step, at the new position and voltage."""
         before = self.old.voltage if self.seconds > 0.0 else voltage
         return self.stack.after(gap, self.carried(length), before, voltage, self.seconds)
 
@@ -136,7 +136,7 @@ class Charging(NoCharges):
         return value + 1j * np.imag(gap) * slope if np.iscomplexobj(gap) else value
 
     def _at(self, gap: Floats, voltage: float, length: Floats) -> tuple[Floats, Floats]:
-        """That voltage (P,) and its derivative by the gap, remembered for the last few places."""
+        """That voltage (P,) and its derivative by the gap, cached for the last few positions."""
         key = (gap.tobytes(), voltage, length.tobytes())
         if (known := self._known.get(key)) is not None:
             return known
@@ -152,7 +152,7 @@ class Charging(NoCharges):
         return float(np.sum(at.length * self.stack.fields(at.gap, at.voltage, at.charges)[2]))
 
     def capacity(self, at: Charged) -> float:
-        """By how much that charge grows with a volt at the end of the step: it is linear in it."""
+        """Derivative of that charge by the voltage (V) at the end of the step, in which it is linear."""
         none, one = (
             self.electrode_charge(Charged(self.after(at.gap, volts, at.length), volts, at.gap, at.length))
             for volts in (0.0, KILOVOLT)
@@ -205,7 +205,7 @@ class Charging(NoCharges):
         return Flow(float(eps_0 * source), float(eps_0 * leaked))
 
     def _times(self) -> tuple[Floats, Floats]:
-        """Places (s) and weights (s) of the step, dense where the fastest charge moves."""
+        """Quadrature nodes (s) and weights (s) of the step, dense where the fastest charge moves."""
         fastest = self.stack.fastest
         ends, end = [0.0], min(1.0 / fastest, self.seconds) if fastest > 0.0 else self.seconds
         while end < self.seconds:

@@ -1,14 +1,14 @@
-r"""An elastic surface below the pad: how far it gives way under each node, and how it then slopes.
+r"""Elastic foundation below the pad: surface displacement w = -C F for nodal forces F on the finger, with the
+compliance C of a layer (Green's function, `evfem.surface.elastic`).
 
-With the nodal forces F on the finger and the surface's compliance C (`evfem.surface.elastic`) the surface
-gives way by -C F. Relative to it a node is, as it would be above a rigid one, at :math:`r_i = x_i + u_i + (C
-F)_i`: gaps, slips, friction and attraction are functions of r. The energy :math:`F \cdot C F / 2` depends on
-the places of the nodes too: so contact and attraction act along the normal of the sunk surface, whose tangent
-is :math:`(1 + u_x', h' - w')`, with :math:`(-u_x', w')_i = \sum_j \partial_{x_i} C_{ij} F_j`; in space
-along x and along z.
+Contact conditions, slips, friction and attraction are functions of the relative positions :math:`r = x + u +
+C F`, which replace those above a rigid surface. The energy :math:`F \cdot C F / 2` depends on the positions
+of the nodes too: so contact and attraction act along the normal of the deformed surface, whose tangent is
+:math:`(1 + u_x', h' - w')`, with :math:`(-u_x', w')_i = \sum_j \partial_{x_i} C_{ij} F_j`; in space along x
+and along z.
 
-Exact where the strain of the surface is small. A node's own length may change on the way, which moves the
-surface by less than the strain of the finger over the number of its nodes; no force belongs to that.
+Valid for small surface strain. The tributary length of a node may change within a step, which moves the
+surface by less than the strain of the finger over the number of its nodes; its reaction is neglected.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from evfem.contact.condensed import COMPONENTS
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
-#: nodes with no force below which the surface counts, up to so many node distances above it; in space also
-#: those with an attraction
+#: height of the loaded zone in node distances: nodes above it have no foundation; in space with an attraction
+#: too
 NEAR, NEAR_IN_SPACE = 10.0, 4.0
-#: step (mm) of the slope of a compliance that does not say its own
+#: step (mm) of the difference for a compliance without `compliance_slope`
 STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Yielding:
-    """The surface below k of P pad nodes, those `over` it (k,), in one place: `compliance` (dim k, dim k) by
-    forces on the finger along x, y[, z], node by node, to what it adds to their places relative to it, and
-    its derivatives `slope` (d, dim k, dim k) by the places of the displaced nodes along x[, z]; what is
-    `left` of both from before the step.
+    """Surface compliance for k of P pad nodes, those in the loaded zone, `over` (k,), at one configuration:
+    `compliance` (dim k, dim k) from forces on the finger along x, y[, z], node by node, to their contribution
+    to the relative positions, and its derivatives `slope` (d, dim k, dim k) by the positions of the displaced
+    nodes along x[, z]; what is `left` of both from before the step.
     """
 
     over: Ints
@@ -49,20 +49,20 @@ class Yielding:
     left: tuple[Any, Any] = (0.0, 0.0)
 
     def given(self, force: Floats) -> Floats:
-        """What the surface adds to the nodes' places (P, dim) under forces on the finger (P, dim)."""
+        """Contribution C F to the relative positions (P, dim) by forces on the finger (P, dim)."""
         found = np.zeros_like(force) + self.left[0]
         found[self.over] += (self.compliance @ force[self.over].ravel()).reshape(-1, force.shape[1])
         return found
 
     def change(self, force: Floats) -> Floats:
-        """Derivatives of that (P, d, dim) along x[, z]: the surface's stretch, and its sinking's slope."""
+        """Its derivatives (P, d, dim) along x[, z]: stretch and slope of the displaced surface."""
         found = np.zeros((len(force), len(self.slope), force.shape[1])) + self.left[1]
         moved = (self.slope @ force[self.over].ravel()).reshape(len(self.slope), -1, force.shape[1])
         found[self.over] += moved.transpose(1, 0, 2)
         return found
 
     def among(self, nodes: Ints) -> Floats:
-        """Compliance (dim c, dim c) of these nodes, 0 of those that are not over the surface."""
+        """Compliance (dim c, dim c) of these nodes, 0 of those outside the loaded zone."""
         dim = len(self.slope) + 1
         (_, own, there) = np.intersect1d(nodes, self.over, assume_unique=True, return_indices=True)
         found = np.zeros((dim * nodes.size, dim * nodes.size))
@@ -71,20 +71,20 @@ class Yielding:
         return found
 
 
-#: names in a state's memory: what the surface adds to the places of the pad's nodes relative to it, (P, dim)
-#: in mm, and its derivatives along x[, z] (P, d, dim)
+#: names in a state's memory: C F, the contribution of the surface to the relative positions of the pad's
+#: nodes, (P, dim) in mm, and its derivatives along x[, z] (P, d, dim)
 DISPLACEMENT, GRADIENT = "surface_displacement", "surface_gradient"
 #: of a foundation that remembers: the forces of contact and attraction on the pad's nodes (P, dim)
 FORCE = "surface_force"
 
 
 class Rigid(Room):
-    """A surface that does not give way: what every surface below the pad answers (P nodes, C candidates)."""
+    """A rigid surface, with the methods of every surface below the pad (P nodes, C candidates)."""
 
     reach, yields = 0.0, False
 
     def displacement(self, state: Any) -> Any:
-        """What the surface adds to the places of the pad's nodes relative to it, (P, dim) in mm."""
+        """Contribution of the surface displacement to the relative positions, C F, (P, dim) in mm."""
         return 0.0
 
     def sink(self, state: Any) -> Any:
@@ -92,23 +92,23 @@ class Rigid(Room):
         return np.zeros(len(state.contact_force))
 
     def places(self, position: Floats, state: Any) -> Floats:
-        """Places (P, dim) relative to the surface of nodes at `position`, as if it were rigid."""
+        """Relative positions (P, dim) of nodes at `position`, as above a rigid surface."""
         return position
 
     def sloped(self, found: SurfaceState, state: Any) -> SurfaceState:
-        """The rigid surface as it lies in `state`."""
+        """The undeformed surface `found` with the slopes of the deformed one in `state`."""
         return found
 
     def tilted(self, state: Any, force: Floats) -> Floats:
-        """Attraction (P, dim) above the surface of `state`: along the normal of what it has sunk."""
+        """Attraction (P, dim) along the normal of the deformed surface of `state`."""
         return force
 
     def untilted(self, state: Any, force: Floats) -> Floats:
-        """The same attraction as above a surface that has not sunk, whose work is that of the field."""
+        """The same attraction as above the undeformed surface, whose work is that of the field."""
         return force
 
     def missed(self, position: Floats, state: Any, force: Floats) -> float:
-        """By how much, relative, the surface misses what forces on the nodes (P, dim) sink it by."""
+        """Relative residual of the surface displacement under the forces on the nodes (P, dim)."""
         return 0.0
 
     def of(self, position: Floats, state: Any, c: Ints) -> RigidBelow:
@@ -118,32 +118,32 @@ class Rigid(Room):
     def sunk(
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
     ) -> dict[str, Floats]:
-        """Memory of the next iterate: the surface gives way to `force` (P, dim), below the candidates of an
-        `update` (C,) by the fraction of what the linear step found.
+        """Memory of the next iterate: the surface displacement under `force` (P, dim), below the candidates
+        of an `update` (C,) the applied fraction of that of the linear step.
         """
         return {}
 
-    def energies(self, part: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
-        """Energy before, between (forces of one end, places of the other) and after a part, N mm."""
+    def energies(self, ends: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
+        """Energy before, mixed (forces of one end, positions of the other) and after a substep, N mm."""
         return np.zeros(3)
 
     def relative_displacement(self, ends: tuple[Any, Any], moved: Floats) -> Floats:
-        """How far nodes that `moved` (P, dim) did so relative to the surface."""
+        """Displacements relative to the surface of nodes that `moved` (P, dim)."""
         return moved
 
-    def stretched(self, part: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
-        """Slips (P,) along the surface, as long as it is stretched, of nodes that went a `way` (P, d)."""
+    def stretched(self, ends: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
+        """Slips (P,) along the stretched surface, for displacements `way` (P, d) along it."""
         return length
 
 
 class Memoryless(Foundation):
-    """An elastic surface whose displacement follows its forces at once."""
+    """An elastic surface without memory: its displacement is that of the present forces."""
 
 
 class Bed(Rigid):
-    """An elastic surface, `elastic`, below a `pad` whose nodes are at `rest` (P, dim) and `spacing` mm apart;
-    `least` is the smallest length (mm), in space area, of a node; `surface` the same at rest. Below nodes
-    without force that are high above it is left out; under an attraction there are none.
+    """Elastic foundation: an elastic surface, `elastic`, below a `pad` whose nodes are at `rest` (P, dim) and
+    `spacing` mm apart; `least` is the smallest tributary length (mm), in space area, of a node; `surface` the
+    undeformed one. Nodes without force high above it are left out.
     """
 
     yields = True
@@ -250,26 +250,28 @@ class Bed(Rigid):
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
     ) -> dict[str, Floats]:
         below, (c, gives, fraction), push = self.under(position, state), update, force()
-        given = below.given(push)
-        given[c] = self.displacement(state)[c] + fraction * np.asarray(gives).reshape(c.size, -1)
-        return {DISPLACEMENT: given, GRADIENT: below.change(push)}
+        displacement_below = below.given(push)
+        displacement_below[c] = self.displacement(state)[c] + fraction * np.asarray(gives).reshape(c.size, -1)
+        return {DISPLACEMENT: displacement_below, GRADIENT: below.change(push)}
 
-    def energies(self, part: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
-        energy, sunk = self._own.energy, [self.displacement(state) for state in part]
-        pairs = list(zip(part, forces, sunk, strict=True))
+    def energies(self, ends: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
+        energy, sunk = self._own.energy, [self.displacement(state) for state in ends]
+        pairs = list(zip(ends, forces, sunk, strict=True))
         between = 0.5 * (np.sum(forces[0] * sunk[1]) + np.sum(forces[1] * sunk[0]))
         return np.array([energy(*pairs[0]), float(between), energy(*pairs[1])])
 
     def relative_displacement(self, ends: tuple[Any, Any], moved: Floats) -> Floats:
         return np.asarray(moved + self.displacement(ends[1]) - self.displacement(ends[0]))
 
-    def stretched(self, part: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
+    def stretched(self, ends: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
         along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
-        stretch = 0.5 * (part[0].memory[GRADIENT] + part[1].memory[GRADIENT])[:, :, ::2]
+        stretch = 0.5 * (ends[0].memory[GRADIENT] + ends[1].memory[GRADIENT])[:, :, ::2]
         return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
     def below(self, position: Floats, height: Floats) -> Yielding:
-        """The surface below nodes at (P, dim), `height` (P,) above it at rest; kept, as many ask."""
+        """Surface compliance and its x-derivative for the nodes at (P, dim) within `reach` of the undeformed
+        surface, which is `height` (P,) below. The last result is cached by position.
+        """
         key = position[:, ::2].tobytes() + height.tobytes()
         if self._last is None or self._last[0] != key:
             reach = self.reach if position.shape[1] == 2 else NEAR_IN_SPACE * self.spacing
@@ -281,8 +283,8 @@ class Bed(Rigid):
         over = np.flatnonzero((length > 0.0) & near)
         flat, length, dim = position[over, ::2], np.maximum(length[over], self.least), position.shape[1]
         x = flat[:, 0] if dim == 2 else flat
-        given, changed = self.elastic.compliance(x, length), slopes(self.elastic, x, length)
-        compliance, *slope = (_by_nodes(np.asarray(each), dim) for each in (given, *changed))
+        compliances, changed = self.elastic.compliance(x, length), slopes(self.elastic, x, length)
+        compliance, *slope = (_by_nodes(np.asarray(each), dim) for each in (compliances, *changed))
         return Yielding(over, compliance, np.stack(slope), self._left)
 
 
@@ -292,13 +294,13 @@ def in_laboratory(force: Floats, surface: SurfaceState) -> Floats:
 
 
 def bed_of(surface: Any, pad: Pad | Skin, rest: Floats, spacing: float, least: float) -> Rigid:
-    """What is below a pad: the surface's own elasticity, or none."""
+    """The foundation of a pad: elastic, or rigid."""
     elastic = getattr(surface, "elastic", None)
     return Rigid() if elastic is None else Bed(surface, pad, rest, spacing, least)
 
 
 def _kept(state: Any) -> Floats:
-    """How long lengths on an elastic surface along x[, z] are for what they were, (P, d, d)."""
+    """Surface stretch along x[, z], deformed over undeformed lengths, (P, d, d)."""
     return np.asarray(np.eye(state.memory[GRADIENT].shape[1]) - state.memory[GRADIENT][:, :, ::2])
 
 
@@ -322,7 +324,11 @@ def slopes(elastic: Any, x: Floats, length: Floats) -> Floats:
     n, flat, found = len(x), x.reshape(len(x), -1), []
     dim = flat.shape[1] + 1
     for way in STEP * np.eye(dim - 1):
-        places = np.concatenate([flat + way, flat - way, flat]).reshape(-1, *x.shape[1:])
-        given = np.asarray(elastic.compliance(places, np.tile(length, 3))).reshape(dim, 3, n, dim, 3, n)
-        found.append((given[:, 0, :, :, 2] - given[:, 1, :, :, 2]).reshape(dim * n, dim * n) / (2.0 * STEP))
+        positions = np.concatenate([flat + way, flat - way, flat]).reshape(-1, *x.shape[1:])
+        compliances = np.asarray(elastic.compliance(positions, np.tile(length, 3))).reshape(
+            dim, 3, n, dim, 3, n
+        )
+        found.append(
+            (compliances[:, 0, :, :, 2] - compliances[:, 1, :, :, 2]).reshape(dim * n, dim * n) / (2.0 * STEP)
+        )
     return np.stack(found)

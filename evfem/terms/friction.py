@@ -1,10 +1,10 @@
-r"""The bound of friction in the equations: Coulomb's, and that of any law of friction.
+r"""Friction bounds: Coulomb's, and those of general friction laws.
 
-Under Coulomb's law the bound of a node is :math:`\mu(x)\,\lambda_n`, which the contact problem solves as it
-is. Another law (`evfem.surface.friction`) is linearised at each iterate, and keeps the time since each node
-touched, `contact_time` (P,) in s. Where the interface yields by C, a node that slips under a bound F(s) with
-dF/ds = K and moves by dx slips by ds = dx - C dF: friction grows by K dx / (1 + K C). With the part of F that
-does not grow, slip and yielding are (1 + K C) times as large.
+Under Coulomb's law the bound of a node is :math:`\mu(x)\,\lambda_n`, which the contact problem solves
+exactly. Another law (`evfem.surface.friction`) is linearised at each iterate, and has the contact time of
+each node, `contact_time` (P,) in s, as memory. With interface compliance C and slip stiffness dF/ds = K of
+the bound F(s), a node that moves by dx slips by ds = dx - C dF, and friction grows by K dx / (1 + K C): the
+tangential compliance is scaled by 1 + K C (springs in series).
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ class ProportionalFriction(Room):
     kinked = False
 
     def linearised(self, interface: Any, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
-        """The candidates c (C,) under the bound at an iterate."""
+        """The candidates c (C,) with the bound linearised at an iterate. With interface compliance C and slip
+        stiffness K the tangential compliance is scaled by 1 + K C (springs in series).
+        """
         return known
 
     def bound(self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
@@ -56,10 +58,10 @@ class ProportionalFriction(Room):
         return np.asarray(mu * state.contact_force[nodes, 0])
 
     def resistance(
-        self, interface: Any, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats
+        self, interface: Any, ends: tuple[State, State], position: Floats, normal: Floats, slip: Floats
     ) -> Floats:
         """Bounds (P,) of all nodes at (P, d) between two states, pressed by (P,) and slipping by (P,)."""
-        mu = interface.friction(part[0], np.arange(len(place)), place)
+        mu = interface.friction(ends[0], np.arange(len(position)), position)
         return np.asarray(mu * normal)
 
     def slopes(
@@ -71,7 +73,7 @@ class ProportionalFriction(Room):
 
 
 class LawFriction(ProportionalFriction):
-    """The bound of a `law`, between faces on which a regularised attraction may leave out a pressure."""
+    """The bound of a friction `law`; its pressure includes that which a regularised attraction removes."""
 
     kinked = True
 
@@ -117,7 +119,7 @@ class LawFriction(ProportionalFriction):
         yielding = np.maximum(by_slip, 0.0) * give
         series = 1.0 / (1.0 + yielding)
         normal = np.maximum(known.force[:, 0], 0.0)
-        by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
+        by_position = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
         along_normal, along_tangents = np.split(known.interface_compliance, [1], axis=1)
         return replace(
             known,
@@ -126,27 +128,27 @@ class LawFriction(ProportionalFriction):
             friction=series * found.slope,
             cohesion=series * (found.offset + yielding * shear),
             slip_stiffness=series * by_slip if timed else None,
-            friction_slope=(series * by_place)[:, None] * known.friction_slope,
+            friction_slope=(series * by_position)[:, None] * known.friction_slope,
         )
 
     def bound(self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Any) -> Floats:
         return self.slipping(interface, old, state, nodes, mu, slip).bound(self.law)
 
     def resistance(
-        self, interface: Any, part: tuple[State, State], place: Floats, normal: Floats, slip: Floats
+        self, interface: Any, ends: tuple[State, State], position: Floats, normal: Floats, slip: Floats
     ) -> Floats:
-        old, new = part
-        mu = interface.friction(old, nodes := np.arange(len(place)), place)
+        old, new = ends
+        mu = interface.friction(old, nodes := np.arange(len(position)), position)
         nodal = self.slipping(interface, old, new, nodes, mu, slip)
-        length = interface.tributary_at(part, place)
+        length = interface.tributary_at(ends, position)
         return replace(nodal, normal=normal, length=length).bound(self.law)
 
     def slopes(
         self, interface: Any, old: State, state: State, c: Ints, mu: Floats, slip: Floats
     ) -> BoundSlopes:
         normal = np.maximum(state.contact_force[c, 0], 0.0)
-        seen = self.slipping(interface, old, state, c, mu, slip)
-        found, law = seen.linearised(self.law), self.law
-        by_normal = derivative(lambda N: replace(seen, normal=N).bound(law), normal, FORCE_STEP)
-        by_length = derivative(lambda A: replace(seen, length=A).bound(law), seen.length, LENGTH_STEP)
-        return BoundSlopes(seen.bound(law), by_normal, found.by_mu, found.by_speed, by_length)
+        nodal = self.slipping(interface, old, state, c, mu, slip)
+        found, law = nodal.linearised(self.law), self.law
+        by_normal = derivative(lambda N: replace(nodal, normal=N).bound(law), normal, FORCE_STEP)
+        by_length = derivative(lambda A: replace(nodal, length=A).bound(law), nodal.length, LENGTH_STEP)
+        return BoundSlopes(nodal.bound(law), by_normal, found.by_mu, found.by_speed, by_length)

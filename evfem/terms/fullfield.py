@@ -9,8 +9,8 @@ gap in series. Nodal forces are derivatives of the discrete energy
 .. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)}.
 
 The tangent of a step is that of the column law, between rough faces scaled by the ratio of the forces
-(`tangent_factor`). Where it leads nowhere, among ridges or steep waves close to a thin insulator, it is the
-field's own by differences (`fringe_stiffness`): a node's field decays within a few nodes, so every
+(`tangent_factor`). Where iterations stagnate, among ridges or steep waves close to a thin insulator, it is
+that of the field by differences (`fringe_stiffness`): the field of a node decays within a few nodes, so every
 `APART`-th one is moved at once. In every accepted state C lies between its bounds (`certificate`).
 """
 
@@ -50,14 +50,14 @@ MARGIN = 1e-3
 STEEP = 6.0
 #: columns below an edge with a middle node
 PARTS = 4
-#: solutions that are remembered
+#: solutions that are cached
 KEPT = 3
 #: nodes of a line that are moved at once for differences: one of so many, by this length (mm), small
 #: beside the gap that touching nodes keep
 APART, MOVED = 8, 1e-9
 
 
-def in_sight(places: Floats) -> Ints:
+def in_sight(points: Floats) -> Ints:
     """Numbers (K,) of the points (L, 2) of an outline, from left to right, that are visible from the display
     and have columns. Of two neighbours along a slope above `STEEP` the higher one is behind an overhang, or
     deep in a groove.
@@ -65,10 +65,10 @@ def in_sight(places: Floats) -> Ints:
     >>> in_sight(np.array([[0.0, 0.0], [1.0, 0.0], [0.9, 0.5], [2.0, 0.0]])).tolist()
     [0, 1, 3]
     """
-    apart, rise = np.diff(places, axis=0).T
+    apart, rise = np.diff(points, axis=0).T
     if np.all(apart > 0.0) and np.all(apart >= np.abs(rise) / STEEP):
-        return np.arange(len(places))
-    x, y = places.T.tolist()
+        return np.arange(len(points))
+    x, y = points.T.tolist()
     kept: list[int] = []
     for k in range(len(x)):
         while kept and x[k] - x[kept[-1]] < (y[kept[-1]] - y[k]) / STEEP and y[k] < y[kept[-1]]:

@@ -8,7 +8,7 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
           - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
 
 by backward Euler; beside tissue with mass by its differences of second order
-(`evfem.tissue.dynamics`), which count the part before too. Where no time passes the spring alone acts. In
+(`evfem.tissue.dynamics`), over the previous substep too. Where no time passes the spring alone acts. In
 three dimensions the same holds along z. The motion prescribes the bone's height.
 
 Values for a finger (`Hand.of_finger`): Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid
@@ -101,13 +101,13 @@ class Hand(Room):
         stretched = (new.memory["hand"][0] - old.memory["hand"][0]) - (new.bone - old.bone)[::2]
         return float(self.damping * np.sum(stretched**2) / duration)
 
-    def potential(self, old: State, new: State, places: Floats) -> Floats:
-        """Energy of the spring beyond the constant force of the end, at the fractions `places` (w,)."""
+    def potential(self, old: State, new: State, fractions: Floats) -> Floats:
+        """Energy of the spring beyond the constant force of the end, at the fractions `fractions` (w,)."""
         square = float(np.sum((new.bone - old.bone)[::2] ** 2))
-        return 0.5 * self.stiffness * square * ((1.0 - places) ** 2 - (1.0 - places[0]) ** 2)
+        return 0.5 * self.stiffness * square * ((1.0 - fractions) ** 2 - (1.0 - fractions[0]) ** 2)
 
     def takes_time(self, seconds: float) -> bool:
-        """Whether speeds count in a part of so many seconds."""
+        """Whether speeds count in a substep of so many seconds."""
         return self.timed and seconds > 0.0
 
 
@@ -115,15 +115,15 @@ class Hand(Room):
 class Drive(Room):
     """What moves the bone along the display, here rigidly: its x[, z] is that of the drive.
 
-    `free`: whether the bone's place along the display is an unknown; `timed`: whether it knows of time.
+    `free`: whether the bone's position along the display is an unknown; `timed`: whether it depends on time.
     """
 
     free = timed = False
-    #: further terms of the books
+    #: further terms of the energy balance
     books: ClassVar[tuple[Any, ...]] = ()
 
     def memory(self, dim: int) -> dict[str, Floats]:
-        """What `State.memory` has of it at the beginning of a run."""
+        """Its `State.memory` at the beginning of a run."""
         return {}
 
     def begun(self, old: State, drive: Floats, duration: float) -> Drive:
@@ -131,11 +131,11 @@ class Drive(Room):
         return self
 
     def known(self, drive: Floats, present: Floats) -> Floats:
-        """x[, z] of the bone (d,) as far as it is known: `present` where it is an unknown."""
+        """Prescribed x[, z] of the bone (d,), or the `present` one where it is an unknown."""
         return drive
 
     def travel(self, ahead: Floats) -> Floats:
-        """Expected displacement of the bone (d,) in mm; `ahead` if it stood still before."""
+        """Predicted displacement of the bone (d,) in mm; `ahead` is that of the drive."""
         return ahead
 
     def unknowns(self, tangent: CondensedTangent, bone: Floats) -> tuple[ExtraUnknown, ...]:
@@ -143,23 +143,25 @@ class Drive(Room):
         return ()
 
     def residual(self, bone: Floats, drive: Floats, reaction: Floats) -> Floats:
-        """What the bone (dim,) lacks along x[, z] (d,): of its place in mm, or of the force on it in N/mm."""
+        """Residual along x[, z] (d,) of the bone at (dim,): of its position in mm, or of the force, N/mm."""
         return np.asarray(bone[::2] - drive)
 
     def unbalanced(self, x: Any, reaction: Floats) -> float:
-        """The largest missing force on the bone in N/mm."""
+        """The largest force residual of the bone in N/mm."""
         return 0.0
 
     def own_stiffness(self, axis: int) -> float | None:
-        """Stiffness at the bone along an axis (N/mm per mm), None where its place is prescribed."""
+        """Stiffness at the bone along an axis (N/mm per mm), None where its position is prescribed."""
         return None
 
-    def given_speeds(self, old: State, drive: Floats, duration: float, bone: Any) -> list[tuple[Any, Any]]:
+    def prescribed_speeds(
+        self, old: State, drive: Floats, duration: float, bone: Any
+    ) -> list[tuple[Any, Any]]:
         """Speeds (mm/s) that are prescribed along x[, z] before and now; `bone`: those of the bone."""
         return list(bone)
 
-    def settled(self, state: State) -> dict[str, Floats]:
-        """What the drive keeps of an accepted state."""
+    def hand_state(self, state: State) -> dict[str, Floats]:
+        """Memory of the drive in an accepted state."""
         return {}
 
     def begin_at(self, start: dict[str, float], travelled: tuple[float, float]) -> dict[str, float]:
@@ -182,7 +184,7 @@ def drive_of(hand: Hand | None) -> Drive:
 @dataclass(frozen=True)
 class HandControl(Drive):
     """A hand in one step: drive's x[, z] at its end (d,), seconds; before: those of drive and bone (mm), its
-    velocity (mm/s), and their mean rates over the part before, for the step's `difference`.
+    velocity (mm/s), and their mean rates over the substep before, for the step's `difference`.
     """
 
     hand: Hand
@@ -216,7 +218,9 @@ class HandControl(Drive):
     def own_stiffness(self, axis: int) -> float | None:
         return self.stiffness if axis != 1 else None
 
-    def given_speeds(self, old: State, drive: Floats, duration: float, bone: Any) -> list[tuple[Any, Any]]:
+    def prescribed_speeds(
+        self, old: State, drive: Floats, duration: float, bone: Any
+    ) -> list[tuple[Any, Any]]:
         kept = old.memory["hand"]
         return list(zip(kept[3].tolist(), ((drive - kept[0]) / duration).tolist(), strict=True))
 
@@ -252,7 +256,7 @@ class HandControl(Drive):
         """Velocity of the bone at the end of the step, (d,) in mm/s."""
         return self._rate(1, x) if self.duration > 0.0 else 0.0 * x
 
-    def driving(self, x: Any) -> Any:
+    def drive_force(self, x: Any) -> Any:
         """Force of the drive (d,) in N/mm, that of spring and damper, at the bone's x[, z] (d,)."""
         force = self.hand.stiffness * (self.drive - x)
         if self.duration > 0.0:
@@ -261,18 +265,18 @@ class HandControl(Drive):
 
     def force(self, x: Any) -> Any:
         """Force on the bone (d,) in N/mm: that of the drive minus the inertia of the mass."""
-        force = self.driving(x)
+        force = self.drive_force(x)
         if self.duration > 0.0:
             force -= self.hand.mass * self._rate(2, self.velocity(x))
         return force
 
     def missing(self, x: Any, reaction: Floats) -> Floats:
-        """Forces along x[, z] (d,) in N/mm that the bone lacks there and at reactions (dim,)."""
+        """Force residuals of the bone along x[, z] (d,) in N/mm, at reactions (dim,)."""
         return np.asarray(self.force(x) - reaction[::2])
 
     def unbalanced(self, x: Any, reaction: Floats) -> float:
-        """The largest force `missing` beyond the rounding of the four places, not negative."""
-        largest = max(float(np.max(np.abs(place))) for place in (x, self.drive, *self.before[:2]))
+        """The largest force residual beyond the rounding of the four positions, not negative."""
+        largest = max(float(np.max(np.abs(position))) for position in (x, self.drive, *self.before[:2]))
         rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
         return max(float(np.abs(self.missing(x, reaction)).max()) - rounding, 0.0)
 
@@ -285,12 +289,12 @@ class HandControl(Drive):
             found.append(ExtraUnknown(push, axis, force))
         return tuple(found)
 
-    def settled(self, state: State) -> dict[str, Floats]:
-        """Along x[, z], (6, d): the drive's place (mm), the bone's velocity (mm/s), the drive's force (N/mm),
-        mean rates of both places and that velocity.
+    def hand_state(self, state: State) -> dict[str, Floats]:
+        """Along x[, z], (6, d): the drive's position (mm), the bone's velocity (mm/s), the drive's force
+        (N/mm), mean rates of both positions and that velocity.
         """
         x = state.bone[::2]
         ends = np.stack([self.drive, x, self.velocity(x)])
         changes = ends - self.before
         rates = changes / self.duration if self.duration > 0.0 else 0.0 * changes
-        return {"hand": np.stack([self.drive, ends[2], self.driving(x), *rates])}
+        return {"hand": np.stack([self.drive, ends[2], self.drive_force(x), *rates])}

@@ -1,10 +1,10 @@
-r"""What pulls on the pad: nodal forces that depend on the pad's state, and what contact has to know of them.
+r"""Tractions on the pad: nodal forces that depend on its state, and their linearisation for contact.
 
-`PadState` is the pad as a traction sees it. A traction answers with forces on the finger, f (P, dim), their
-derivative by the places of the nodes, and three numbers per node that the contact problem solves along:
-`weakening`, -df/dg of its own vertical gap, `gain_on_pressing`, by how much it grows with the contact force,
-and `restored`, what of the pressure on closed nodes it leaves out. Forces on open nodes enter the balance as
-they are. Between two states the work is that of the forces along the straight path of the nodes.
+`PadState` is the argument of a traction. A traction has forces on the finger, f (P, dim), their derivative
+by the positions of the nodes, and three numbers per node for the contact problem: `weakening`, the softening
+-df/dg by the node's vertical gap, `gain_on_pressing`, the derivative by the contact force, and `restored`,
+the traction on closed nodes that a regularised law removes, and keeps. Forces on open nodes enter the balance
+unchanged. The work between two states is that along the straight path of the nodes.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class PadState:
     """The P nodes of a `pad` above a `surface`: their `position` (P, dim) in mm, touching ones exactly on it,
     the display's `voltage` (V), the contact forces `pressing` (P,) along the normal (N/mm, in space N; None
     for none), which were `touching` (P,) when the step began, the `memory` of rooms, and the `load`, 0 to 1,
-    by which what acts without a voltage is on: the first substep raises it. On a path of W states positions
-    are (W, P, dim), voltages and loads (W,), contact forces (W, P). `below`: the surface as it has sunk.
+    factor of tractions without a voltage: the first substep raises it. On a path of W states positions are
+    (W, P, dim), voltages and loads (W,), contact forces (W, P). `below`: the deformed surface.
     """
 
     pad: Pad | Skin
@@ -55,7 +55,7 @@ class PadState:
 
     @cached_property
     def gap(self) -> Floats:
-        """Vertical gaps (..., P) in mm, 0 where a trial state has sunk in."""
+        """Vertical gaps (..., P) in mm, 0 where a trial state penetrates."""
         return np.maximum(self.frame.gap, 0.0).reshape(self.position.shape[:-1])
 
     @cached_property
@@ -84,9 +84,9 @@ class PadState:
 
 @dataclass(frozen=True, eq=False)
 class PadPath:
-    """A substep as a traction sees it: the pad at both ends, how far its nodes `moved` (P, dim) relative to
-    the surface, the part of that along which the end forces alone do not give the work, `turned` (P, dim),
-    and the forces (P, dim) of the traction at both `ends`.
+    """Path of the pad in a substep: the pad at both ends, the displacements of its nodes relative to the
+    surface, `moved` (P, dim), the component of these whose work needs quadrature, beyond the trapezoidal
+    rule, `turned` (P, dim), and the forces (P, dim) of the traction at both `ends`.
     """
 
     old: PadState
@@ -96,7 +96,7 @@ class PadPath:
     ends: tuple[Floats, Floats]
 
     def at(self, fractions: Floats, voltage: Floats, begin: Floats | None = None) -> PadState:
-        """The states at fractions (w,) of the straight path, from `begin` (P, dim) if that is given."""
+        """The states at fractions (w,) of the straight path, from `begin` (P, dim) or the old position."""
         start, end = self.old.position if begin is None else begin, self.new.position
         pressed = self.old.pressed, self.new.pressed
         place = start + fractions[:, None, None] * (end - start)
@@ -134,7 +134,7 @@ def smallest_gap(pad: PadState) -> Reading:
 
 
 class Entries(NamedTuple):
-    """Entries (K,) of a matrix (size, size) at these rows and columns; those of one place add up."""
+    """Entries (K,) of a matrix (size, size) at these rows and columns; duplicates add up."""
 
     size: int
     row: Ints
@@ -165,12 +165,12 @@ def force_columns(name: str, label: str, dim: int = 3) -> tuple[Column, ...]:
 
 
 class PadTraction(Room):
-    """Forces on the pad's nodes that depend on where they are; here none.
+    """Forces on the pad's nodes that depend on their positions; here none.
 
-    A traction of one's own has a `name` and `forces`, and `weakening` where these fall with the gap. Its
+    A user-defined traction has a `name` and `forces`, and `weakening` where these fall with the gap. Its
     columns are NAME_force (N/mm, downwards), NAME_force_x and NAME_work (N). `begin` and `accept` get the
-    `PadState` in the place of the state. What it does to the energy is the work of its forces: `stored`,
-    `kinetic`, `work` and `dissipation` are not asked.
+    `PadState` instead of the state. Its energy is the work of its forces: `stored`, `kinetic`, `work` and
+    `dissipation` are not called.
     """
 
     #: of its columns in the history
@@ -254,7 +254,7 @@ class PadTraction(Room):
         return self.stiffness(pad)
 
     def restored(self, voltage: float) -> tuple[Any, Any]:
-        """Of closed nodes' pull (P,) in MPa what is left out, and what is not; 0 where nothing is."""
+        """Traction of closed nodes (P,) in MPa that a regularised law removes, and keeps; 0 without one."""
         return 0.0, 0.0
 
     @property
@@ -286,7 +286,7 @@ class PadTraction(Room):
 
     def powers(self, path: PadPath, along: Floats, fractions: Floats, begin: Floats | None = None) -> Floats:
         """Powers (w,) along `along` (P, dim) at fractions (w,) of the straight path, from `begin` (P, dim) if
-        that is given, the squared voltage growing evenly; of what has fringes that of the columns.
+        or the old position, the squared voltage growing evenly; with fringe fields that of the columns.
         """
         volts = evenly(path.old.voltage, path.new.voltage, fractions)
         forces = self.column_law.forces_along(path.at(fractions, volts, begin))

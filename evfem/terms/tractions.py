@@ -12,15 +12,15 @@ from evfem.common.arrays import Floats
 from evfem.common.rooms import begun, ended, shaped
 from evfem.terms.traction import Entries, NoTraction, PadState, PadTraction
 
-#: a finger that does not touch has come off when what holds it has fallen below this share of the last pull
+#: a finger that does not touch has come off when the attraction is below this fraction of the last pull
 LEFT = 0.01
 
 
 @dataclass
 class PullOff:
-    """Watches for the pull at which a finger that tractions hold without a voltage comes off: the `pull`
-    (N/mm) on it in the last equilibrium, that at which it `let_go` in this step, 0 if it did not, and rows
-    (k, 2) of the steps and pulls at which it `came_off`.
+    """Pull-off of a finger under tractions without a voltage: the tension `pull` (N/mm) on it in the last
+    equilibrium, the pull-off force in this step, `let_go`, 0 without a pull-off, and the pull-off events
+    `came_off`, rows (k, 2) of step and force.
     """
 
     pull: float = 0.0
@@ -83,7 +83,7 @@ class Tractions(PadTraction):
         return any(part.acts(voltage) for part in self.parts)
 
     def _sum(self, pad: PadState, of: Callable[[Any], Any]) -> Any:
-        """The sum over the parts that act on the pad."""
+        """The sum over the tractions that act on the pad."""
         return np.asarray(sum(of(part) for part in self.parts if part.acts(pad.voltage)))
 
     def memory(self, state: Any) -> dict[str, Floats]:
