@@ -153,9 +153,9 @@ def design(
     return Design(best.parameters, best.objective, best.scene, best.result, best.gradient, search.runs, told)
 
 
-def _bounds(scene: Scene, keys: tuple[str, ...], given: Any) -> Floats:
+def _bounds(scene: Scene, keys: tuple[str, ...], bounds: Any) -> Floats:
     """Bounds (P, 2) of the keys, the start within."""
-    pairs: list[Any] = [given.get(key) for key in keys] if isinstance(given, Mapping) else list(given)
+    pairs: list[Any] = [bounds.get(key) for key in keys] if isinstance(bounds, Mapping) else list(bounds)
     if len(pairs) != len(keys):
         raise InputError("bounds", f"{len(pairs)} for {len(keys)} parameters", "a pair (low, high) for each")
     for key, pair in zip(keys, pairs, strict=True):
@@ -167,12 +167,14 @@ def _bounds(scene: Scene, keys: tuple[str, ...], given: Any) -> Floats:
     return np.array(pairs, dtype=float)
 
 
-def _objective(scene: Scene, given: Any) -> Callable[[Result], float]:
+def _objective(scene: Scene, objective: Any) -> Callable[[Result], float]:
     """The objective as a function."""
-    if callable(given):
-        return given
-    if not isinstance(given, str):
-        raise InputError("objective", quoted(given), "a function of a result, or COLUMN.STATISTIC[.MOTION]")
-    sign, name = (-1.0, given[1:]) if given.startswith("-") else (1.0, given)
+    if callable(objective):
+        return objective
+    if not isinstance(objective, str):
+        raise InputError(
+            "objective", quoted(objective), "a function of a result, or COLUMN.STATISTIC[.MOTION]"
+        )
+    sign, name = (-1.0, objective[1:]) if objective.startswith("-") else (1.0, objective)
     check_output(name, len(scene.motion))
     return lambda result: sign * float(output(result, name) or 0.0)

@@ -16,9 +16,9 @@ along the tangent t their contact force changes by
           \qquad \phi' = \frac{h''}{1 + h'^2},
 
 with the bound :math:`b(\lambda_n, \mu, v)` of their friction, the direction e of their shear force, their
-speed v, and, in space, the part :math:`s_\perp` of s across e. The unknown :math:`d\lambda_n` is eliminated
-node by node, and one sparse system is solved for each frequency. Open nodes are free. A finger that slips is
-one that slides on: the motion is smaller than what it slides in a period.
+speed v, and, in space, the component :math:`s_\perp` of s across e. The unknown :math:`d\lambda_n` is
+eliminated node by node, and one sparse system is solved for each frequency. Open nodes are free. A slipping
+finger slides on: the motion is smaller than its sliding distance in a period.
 """
 
 from __future__ import annotations
@@ -131,8 +131,8 @@ def impedance(
     _check(scene := scene_of(scene))
     state, model = _end(scene)
     system = linearised(model, state)
-    way = _way(scene, axis, model.mesh.dim)
-    found = np.array([system.stiffness(2.0 * np.pi * each, way) for each in frequency])
+    unit_vector = _unit_vector(scene, axis, model.mesh.dim)
+    found = np.array([system.stiffness(2.0 * np.pi * each, unit_vector) for each in frequency])
     return Impedance(frequency, found, axis, "N/mm" if model.mesh.dim == 3 else "N/mm per mm")
 
 
@@ -145,7 +145,7 @@ def _checked(frequencies: Any) -> Floats:
 
 
 def _check(scene: Scene) -> None:
-    """Refuse what has no stiffness of small motions."""
+    """Raise `InputError` for scenes without a stiffness of small motions."""
     if scene.ground.elastic is not None:
         raise InputError("scene", "a scene with an elastic surface", "a rigid surface")
     resolved = scene.drive is not None and scene.drive.resolved
@@ -156,7 +156,7 @@ def _check(scene: Scene) -> None:
 
 
 def _end(scene: Scene) -> tuple[State, Model]:
-    """State at the end of the scene, its tissue at rest in every step, and the parts of the scene."""
+    """State at the end of the scene, its tissue at rest in every step, and the model of the scene."""
     at_rest = replace(scene, solver=replace(scene.solver, dynamics="quasistatic"))
     with blas_limits():
         with warnings.catch_warnings():  # branches count below
@@ -167,7 +167,7 @@ def _end(scene: Scene) -> tuple[State, Model]:
     return run.state, run.model
 
 
-def _way(scene: Scene, axis: str, dim: int) -> Floats:
+def _unit_vector(scene: Scene, axis: str, dim: int) -> Floats:
     """Unit vector (dim,) along which the bone moves."""
     if axis == "normal":
         return np.eye(dim)[1]
@@ -187,20 +187,20 @@ class LinearSystem:
     mass: Any
     branches: dict[float, Any]
 
-    def stiffness(self, omega: float, way: Floats) -> complex:
-        """Force along `way` (dim,) per displacement of the bone along it, at omega in rad/s."""
+    def stiffness(self, omega: float, unit_vector: Floats) -> complex:
+        """Force along `unit_vector` (dim,) per displacement of the bone along it, at omega in rad/s."""
         from scipy.sparse.linalg import splu
 
         A = self.still + 1j * omega * self.damping - omega**2 * self.mass
         for time, matrix in self.branches.items():
             A = A + (1j * omega * time / (1.0 + 1j * omega * time)) * matrix
         A = A.tocsc()
-        free = A.shape[0] - way.size
-        force = A[free:, free:] @ way
+        free = A.shape[0] - unit_vector.size
+        force = A[free:, free:] @ unit_vector
         if free:  # a single row of cells between bone and nodes that stick has none
             lu = splu(A[:free, :free], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-            force = force - A[free:, :free] @ lu.solve(A[:free, free:] @ way)
-        return complex(way @ force)
+            force = force - A[free:, :free] @ lu.solve(A[:free, free:] @ unit_vector)
+        return complex(unit_vector @ force)
 
 
 def linearised(model: Model, state: State) -> LinearSystem:
@@ -275,9 +275,9 @@ class Contact:
         c, state, interface = self.nodes, self.state, self.interface
         place = interface.on_display(state)[c]
         mu = interface.friction(old, c, place)
-        way = np.where(self.slips, sizes(interface.slip(old, state)[c]), 0.0)
-        speed = way / interface.duration if interface.duration > 0.0 else 0.0 * way
-        found = interface.bounds.slopes(interface, old, state, c, mu, way)
+        unit_vector = np.where(self.slips, sizes(interface.slip(old, state)[c]), 0.0)
+        speed = unit_vector / interface.duration if interface.duration > 0.0 else 0.0 * unit_vector
+        found = interface.bounds.slopes(interface, old, state, c, mu, unit_vector)
         each = (found.bound, found.by_normal, found.by_mu, found.by_speed, found.by_length, speed)
         of_slips = (np.where(self.slips, value, 0.0) for value in each)
         self.bound, self.by_normal, by_mu, self.by_speed, self.by_length, self.speed = of_slips

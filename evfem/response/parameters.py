@@ -191,18 +191,18 @@ def scene_of(source: Any) -> Scene:
         raise InputError("scene", given, "the scene itself") from None
 
 
-def parameter_of(scene: Scene, given: Any) -> Parameter:
+def parameter_of(scene: Scene, wanted: Any) -> Parameter:
     """What was asked for: a key or a `ShapeChange`; InputError for what the scene does not have, for a number
     that is 0, which has no small share, and for shapes whose velocities do not fit the mesh.
     """
-    if isinstance(given, ShapeChange):
-        following(scene.finger, scene_mesh(scene)[0], given.velocity)
-        return given
-    if not isinstance(given, str):
-        raise InputError("parameters", quoted(given), "dotted keys of the scene, and ShapeChange objects")
-    found = Keyed(scene, given)
+    if isinstance(wanted, ShapeChange):
+        following(scene.finger, scene_mesh(scene)[0], wanted.velocity)
+        return wanted
+    if not isinstance(wanted, str):
+        raise InputError("parameters", quoted(wanted), "dotted keys of the scene, and ShapeChange objects")
+    found = Keyed(scene, wanted)
     if found.value == 0.0:
-        raise InputError(f"parameters.{given}", 0.0, "a number other than 0: steps are shares of it")
+        raise InputError(f"parameters.{wanted}", 0.0, "a number other than 0: steps are shares of it")
     return found
 
 

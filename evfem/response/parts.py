@@ -1,8 +1,8 @@
-r"""The equations of an accepted part of a run, its nodes' statuses fixed, and their matrix.
+r"""The equations of an accepted substep of a run, its nodes' statuses fixed, and their matrix.
 
-With w = (u, bone, :math:`\lambda`) at the end of a part, the state z before it and the parameters p, a part
-obeys R(w; z, p) = 0: the balance of the free unknowns; for every axis of the bone its place or the force on
-it; and per pad node
+With w = (u, bone, :math:`\lambda`) at the end of a substep, the state z before it and the parameters p, a
+substep obeys R(w; z, p) = 0: the balance of the free unknowns; for every axis of the bone its position or the
+force on it; and per pad node
 
 =====  ========================================================
 open   :math:`\lambda = 0`
@@ -10,9 +10,9 @@ stick  :math:`g = 0`, slip since z :math:`= 0`
 slip   :math:`g = 0`, :math:`\lambda_t + b(\lambda_n, x, s)\,s/|s| = 0`
 =====  ========================================================
 
-with the bound b of friction, :math:`\mu(x)\lambda_n` under Coulomb's law. What an elastic surface gives way
-by follows from w (`Equations.sunk`). `Equations` asks the parts of the run's own model: tissue, attraction,
-surface, law of friction, controls.
+with the bound b of friction, :math:`\mu(x)\lambda_n` under Coulomb's law. The displacement of an elastic
+surface follows from w (`Equations.surface_displacement`). `Equations` evaluates the components of the run's
+model: tissue, attraction, surface, friction law, controls.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from evfem.simulation.model import Model
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """R of one part of `model` from `old` to `target`; `begin` makes its clocks those of the part."""
+    """R of one substep of `model` from `old` to `target`; made by `begin`, which begins the substep."""
 
     model: Model
     old: State
@@ -40,8 +40,8 @@ class Equations:
 
     @classmethod
     def begin(cls, model: Model, old: State, target: Target, pins: Floats) -> Equations:
-        """Start the part from `old`: velocities, branches, charges and slips count from there; `pins`
-        (P, d) are places of nodes that a jump of friction holds, else nan.
+        """Begin the substep from `old`: velocities, branches, charges and slips count from there; `pins`
+        (P, d) are positions of nodes pinned to a discontinuity of friction, else nan.
         """
         target = model.equilibrium.begin(old, target)
         model.equilibrium.interface.jumps.place = pins
@@ -57,18 +57,20 @@ class Equations:
         attraction = self.model.equilibrium.attraction_at(self.old, state, state.voltage)
         return replace(state, attraction=attraction)
 
-    def sunk(self, state: State) -> tuple[Floats, Floats]:
-        """What an elastic surface adds to the nodes' places, and its gradient (`evfem.terms.foundation`)."""
+    def surface_displacement(self, state: State) -> tuple[Floats, Floats]:
+        """Contribution of an elastic surface to relative positions, and its gradient
+        (`evfem.terms.foundation`).
+        """
         force = self.interface.contact_forces(state) + self._attracted(state).attraction
         below = self.interface.bed.under(self.interface.positions(state.u), state)
         return below.given(force), below.change(force)
 
-    def ended(self, state: State) -> State:
-        """The state as the run would accept it, its reaction left, with the history that it leaves behind."""
+    def accepted_state(self, state: State) -> State:
+        """The state as the run would accept it, with its memory, but for its reaction."""
         return self.model.equilibrium.accept(self.old, self._attracted(state), self.target)
 
     def smooth(self, state: State) -> tuple[Floats, Floats]:
-        """The part of R (m,) that is smooth over long ways, and its reaction (dim,)."""
+        """Smooth part of the residual R (m,), and its reaction (dim,)."""
         body = self.model.body
         forces = body.reduce(body.forces(state.u))
         contact = np.where(self._near(state), 0.0, self.contact(state)[0])
@@ -76,28 +78,30 @@ class Equations:
         bone = self._bone(replace(state, reaction=reaction))
         return np.concatenate([forces[: -state.bone.size], bone, contact.ravel()]), reaction
 
-    def kinked(self, state: State) -> tuple[Floats, Floats]:
-        """The rest of R (m,): attraction, friction, what follows a profile; and its reaction (dim,)."""
+    def nonsmooth(self, state: State) -> tuple[Floats, Floats]:
+        """Nonsmooth part of the residual R (m,): attraction, friction, contact on a profile; its reaction."""
         body, nodal = self.model.body, np.zeros_like(state.u)
         attraction = self._attracted(state).attraction
         nodal[self.model.pad.nodes] -= attraction + self.interface.contact_forces(state)
         forces = body.reduce(nodal)
         reaction = forces[body.bone]
-        forces[body.bone] = [-reaction[axis] if self.pulled(axis) else 0.0 for axis in range(reaction.size)]
+        forces[body.bone] = [
+            -reaction[axis] if self.force_controlled(axis) else 0.0 for axis in range(reaction.size)
+        ]
         contact = np.where(self._near(state), self.contact(state)[0], 0.0)
         return np.concatenate([forces, contact.ravel()]), reaction
 
     def _near(self, state: State) -> Any:
-        """Which of what contact lacks is `kinked`, (P, dim) bool."""
+        """Which residuals of contact are nonsmooth, (P, dim) bool."""
         slips = (state.status >= FORWARD)[:, None]
         return (slips & (np.arange(state.bone.size) > 0)) | (not self.interface.surface.is_flat)
 
-    def pulled(self, axis: int) -> bool:
-        """Whether the bone lacks a force along an axis, not a way."""
+    def force_controlled(self, axis: int) -> bool:
+        """Whether the bone is force-controlled along an axis, not displacement-controlled."""
         return bool(self.target.free[axis])
 
     def _bone(self, state: State) -> Floats:
-        """What the bone lacks (dim,): of its place in mm, or of the force on it in N/mm."""
+        """Residual of the bone (dim,): of its position in mm, or of the force on it in N/mm."""
         target, found = self.target, state.bone - self.target.bone(state.bone)
         if target.height.free:
             found[1] = target.height.missing(float(state.bone[1]), state.reaction)
@@ -107,30 +111,30 @@ class Equations:
         return found
 
     def _slip(self, state: State) -> Floats:
-        """Slips (P, dim - 1) in mm with what a penalty yields."""
+        """Slips (P, dim - 1) in mm, with the tangential yielding of a penalty."""
         yields = self.interface.compliance(self.old)[:, 1:]
         return self.interface.slip(self.old, state) + yields * (
             state.contact_force[:, 1:] - self.old.contact_force[:, 1:]
         )
 
     def held(self, state: State) -> State:
-        """The state whose nodes that slip nowhere stick: in space their slips have no direction."""
+        """The state with nodes of zero slip as sticking: in space their slips have no direction."""
         still = sizes(self._slip(state)) <= self.interface.tolerance * self.interface.length
         status = np.where((state.status >= FORWARD) & still, STICK, state.status)
         return state if state.bone.size == 2 else replace(state, status=status)
 
-    def bound(self, state: State, place: Floats, way: Floats) -> Floats:
-        """Bound of friction (P,) in N/mm at places (P, d) with slips of the size `way` (P,)."""
-        return self.interface.limit(self.old, state, self.interface.jumps.at(place), way)
+    def bound(self, state: State, position: Floats, slip: Floats) -> Floats:
+        """Bound of friction (P,) in N/mm at positions (P, d) with slips of the size `slip` (P,)."""
+        return self.interface.limit(self.old, state, self.interface.jumps.at(position), slip)
 
     def contact(self, state: State) -> tuple[Floats, Floats, Floats]:
-        """What contact lacks (P, dim), slips (P, dim - 1) and bounds of friction (P,)."""
+        """Residuals of contact (P, dim), slips (P, dim - 1) and bounds of friction (P,)."""
         interface, status = self.interface, state.status
         normal, shear = np.split(state.contact_force, [1], axis=1)
         gap = interface.surface_at(state).normal_gap + interface.compliance(self.old)[:, 0] * normal[:, 0]
         slip = self._slip(state)
-        way = np.where(status >= FORWARD, sizes(slip), 0.0)
-        bound = self.bound(state, interface.on_display(state), way)
+        size = np.where(status >= FORWARD, sizes(slip), 0.0)
+        bound = self.bound(state, interface.on_display(state), size)
         sliding = shear + bound[:, None] * directions(status, slip)
         along = np.where(
             (status == STICK)[:, None], slip, np.where((status >= FORWARD)[:, None], sliding, shear)

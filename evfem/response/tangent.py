@@ -1,4 +1,4 @@
-r"""The matrix :math:`K = \partial R/\partial w` of a part's equations (`evfem.response.parts`), factorised.
+r"""The matrix :math:`K = \partial R/\partial w` of a substep (`evfem.response.parts`), factorised.
 
 The tissue's tangent, in double precision, is condensed onto the nodes near contact and the bone
 (`evfem.newton.condensation`); what acts there, the attraction, the contact forces that turn with the profile,
@@ -25,8 +25,8 @@ from evfem.newton.condensation import Condensation
 from evfem.newton.state import State
 from evfem.response.parts import Equations, directions
 
-#: shares of a force and of a length by which the bound of friction is differenced
-SHARE = 1e-6
+#: relative steps of force and length by which the bound of friction is differenced
+RELATIVE_STEP = 1e-6
 #: rows, columns and values of a sparse matrix
 Triplet = tuple[Any, Any, Any]
 
@@ -54,33 +54,35 @@ class Tangent:
     def _condensed(self) -> Floats:
         """The dense matrix of kept displacements, bone and contact forces of touching nodes."""
         kept, closed, size = self.kept, self._closed, self.equations.model.body.size
-        place = np.full(size + self.state.contact_force.size, -1)
-        place[kept], place[size + closed] = np.arange(kept.size), kept.size + np.arange(closed.size)
+        number = np.full(size + self.state.contact_force.size, -1)
+        number[kept], number[size + closed] = np.arange(kept.size), kept.size + np.arange(closed.size)
         count = kept.size + closed.size
         matrix = np.zeros((count, count))
         below = np.full(self.state.contact_force.size, -1)
         below[closed] = kept.size + np.arange(closed.size)
-        _add(matrix, self._pad_forces(), place, place)
-        _add(matrix, self._contact_rows(), below, place)
+        _add(matrix, self._pad_forces(), number, number)
+        _add(matrix, self._contact_rows(), below, number)
         if self.equations.interface.bed.yields:
-            self._add_bed(matrix, place)
+            self._add_bed(matrix, number)
         matrix[: kept.size, : kept.size] += self.factor.schur
         for axis in range(self.state.bone.size):
             row = kept.size - self.state.bone.size + axis
             matrix[row] = self._bone_row(matrix[row], row, axis)
         return matrix
 
-    def _add_bed(self, matrix: Floats, place: Ints) -> None:
+    def _add_bed(self, matrix: Floats, number: Ints) -> None:
         """Add what an elastic surface gives way by, under the forces on the pad, to a matrix of the balance
         and of contact by these places.
         """
         moves = self._columns()[0]
-        near = np.flatnonzero((place[moves] >= 0).all(axis=1))
-        moved = place[moves[near]].ravel()
+        near = np.flatnonzero((number[moves] >= 0).all(axis=1))
+        moved = number[moves[near]].ravel()
         interface = self.equations.interface
         below = interface.bed.under(interface.positions(self.state.u), self.state)
-        given = below.among(near) @ -matrix[moved]
-        matrix += matrix[:, moved] @ np.linalg.solve(np.eye(moved.size) - given[:, moved], given)
+        moved_surface = below.among(near) @ -matrix[moved]
+        matrix += matrix[:, moved] @ np.linalg.solve(
+            np.eye(moved.size) - moved_surface[:, moved], moved_surface
+        )
 
     def _bone_row(self, balance: Floats, row: int, axis: int) -> Floats:
         """What the bone lacks along an axis by the dense unknowns, from the row of the `balance`."""
@@ -152,7 +154,7 @@ class Tangent:
         return [*found, *self._sliding_rows(slips)]
 
     def _sliding_rows(self, slips: Ints) -> list[Triplet]:
-        """Derivative of what friction lacks at slipping nodes."""
+        """Derivative of the friction residual at slipping nodes."""
         state, (moves, presses) = self.state, self._columns()
         rows, dim = np.arange(moves.size).reshape(moves.shape), state.bone.size
         _, slip, bound = self.equations.contact(state)
@@ -172,25 +174,27 @@ class Tangent:
                 found.append((rows[slips, a], moves[slips, 2 * (b - 1)], share[slips, b - 1]))
         return found
 
-    def _bound_slopes(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Derivatives of the bound of friction by contact force, place (P, d) and size of the slip."""
+    def _bound_slopes(self, slip: Floats) -> tuple[Floats, Floats, Floats]:
+        """Derivatives of the bound of friction by contact force, position (P, d) and size of the slip."""
         state, interface, bound = self.state, self.equations.interface, self.equations.bound
-        place, force = interface.on_display(state), state.contact_force
-        normal, length = SHARE * np.maximum(force[:, 0], 1e-12), SHARE * interface.length
+        position, force = interface.on_display(state), state.contact_force
+        normal, length = RELATIVE_STEP * np.maximum(force[:, 0], 1e-12), RELATIVE_STEP * interface.length
         more, less = (
             replace(state, contact_force=force + sign * normal[:, None] * (np.arange(force.shape[1]) == 0))
             for sign in (1.0, -1.0)
         )
-        by_normal = (bound(more, place, way) - bound(less, place, way)) / (2.0 * normal)
-        ways = length * np.eye(place.shape[1])
-        by_place = [bound(state, place + one, way) - bound(state, place - one, way) for one in ways]
-        further = SHARE * np.maximum(way, 1e-12)
-        by_way = (bound(state, place, way + further) - bound(state, place, way - further)) / (2.0 * further)
-        return by_normal, np.stack(by_place, axis=1) / (2.0 * length), by_way
+        by_normal = (bound(more, position, slip) - bound(less, position, slip)) / (2.0 * normal)
+        shifts = length * np.eye(position.shape[1])
+        by_place = [bound(state, position + one, slip) - bound(state, position - one, slip) for one in shifts]
+        further = RELATIVE_STEP * np.maximum(slip, 1e-12)
+        by_slip = (bound(state, position, slip + further) - bound(state, position, slip - further)) / (
+            2.0 * further
+        )
+        return by_normal, np.stack(by_place, axis=1) / (2.0 * length), by_slip
 
 
 def _add(matrix: Floats, triplets: list[Triplet], rows: Ints, columns: Ints) -> None:
-    """Add triplets to a dense matrix at the places of their rows and columns, those without one left out."""
+    """Add triplets to a dense matrix at the numbers of their rows and columns, those without one left out."""
     for row, column, value in triplets:
         at, to = rows[row], columns[column]
         there = (at >= 0) & (to >= 0)

@@ -45,7 +45,7 @@ class ProportionalFriction(Room):
     """Coulomb's bound: mu times the contact force."""
 
     #: whether the bound may have a kink over the pressure
-    kinked = False
+    nonsmooth = False
 
     def linearised(self, interface: Any, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
         """The candidates c (C,) with the bound linearised at an iterate. With interface compliance C and slip
@@ -75,7 +75,7 @@ class ProportionalFriction(Room):
 class LawFriction(ProportionalFriction):
     """The bound of a friction `law`; its pressure includes that which a regularised attraction removes."""
 
-    kinked = True
+    nonsmooth = True
 
     def __init__(self, law: FrictionLaw, nodes: int) -> None:
         self.law, self.nodes = law, nodes
