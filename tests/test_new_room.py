@@ -185,8 +185,8 @@ class MaxwellControl(HandControl):
 
     kept: Any = 0.0
 
-    def memory(self, dim):
-        return super().memory(dim) | {"arm": np.zeros(dim - 1)}
+    def memory(self, state):
+        return super().memory(state) | {"arm": np.zeros(state.bone.size - 1)}
 
     def begun(self, old, drive, duration):
         return replace(super().begun(old, drive, duration), kept=old.memory["arm"])
@@ -203,11 +203,11 @@ class MaxwellControl(HandControl):
     def stiffness(self):
         return super().stiffness + self.left * self.hand.arm
 
-    def driving(self, x):
-        return super().driving(x) + self.pull(x)
+    def drive_force(self, x):
+        return super().drive_force(x) + self.pull(x)
 
-    def settled(self, state):
-        return super().settled(state) | {"arm": self.pull(state.bone[::2])}
+    def accept(self, old, new):
+        return super().accept(old, new) | {"arm": self.pull(new.bone[::2])}
 
 
 def motions(dim, finer=1):

@@ -141,8 +141,8 @@ class Foundation(Room):
 
 def unchangeable(room: Any) -> bool:
     """Whether a room is a frozen dataclass with a `begin` of its own, which could keep nothing in it."""
-    frozen = is_dataclass(room) and type(room).__dataclass_params__.frozen
-    return bool(frozen and type(room).begin is not Room.begin)
+    kind: Any = type(room)
+    return bool(is_dataclass(room) and kind.__dataclass_params__.frozen and kind.begin is not Room.begin)
 
 
 def shaped(room: Any, what: str, found: Any, wanted: Floats) -> Floats:

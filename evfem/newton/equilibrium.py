@@ -94,7 +94,7 @@ class Equilibrium:
         for traction in self.attraction.keeping:
             ends = self.pad_state(old), self.interface.pad_state(state, old.touching)
             state = state.remembering(ended(traction, old.memory, traction.accept(*ends)))
-        return state.remembering(target.drive.hand_state(state))
+        return state.remembering(target.drive.accept(old, state))
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in `state`; touching nodes are those of `old`, accepted last."""

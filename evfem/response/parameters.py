@@ -253,7 +253,8 @@ def _with(owner: Any, path: tuple[str, ...], value: float, key: str) -> Any:
     assert attribute is not None
     if is_dataclass(owner) and attribute not in {spec.name for spec in fields(owner)}:
         raise InputError(key, f"{attribute}, which {type(owner).__name__} computes", "what is given to it")
-    if is_dataclass(owner) and type(owner).__dataclass_params__.init:
+    kind: Any = type(owner)
+    if is_dataclass(owner) and kind.__dataclass_params__.init:
         return replace(owner, **{attribute: part})  # type: ignore[type-var]
     changed = copy(owner)
     if is_dataclass(owner):  # made from other names than its fields' own; what is cached is not kept

@@ -195,7 +195,7 @@ class Run:
         self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.source.start)
         self.state = self.state.remembering(
-            begun(self.model.drive, self.state.memory, self.model.drive.memory(self.state.bone.size))
+            begun(self.model.drive, self.state.memory, self.model.drive.memory(self.state))
         )
         if resume is not None:
             self._restore(resume)

@@ -122,10 +122,6 @@ class Drive(Room):
     #: further terms of the energy balance
     books: ClassVar[tuple[Any, ...]] = ()
 
-    def memory(self, dim: int) -> dict[str, Floats]:
-        """Its `State.memory` at the beginning of a run."""
-        return {}
-
     def begun(self, old: State, drive: Floats, duration: float) -> Drive:
         """In the step from `old` that takes the drive to x[, z] = `drive` (d,)."""
         return self
@@ -159,10 +155,6 @@ class Drive(Room):
     ) -> list[tuple[Any, Any]]:
         """Speeds (mm/s) that are prescribed along x[, z] before and now; `bone`: those of the bone."""
         return list(bone)
-
-    def hand_state(self, state: State) -> dict[str, Floats]:
-        """Memory of the drive in an accepted state."""
-        return {}
 
     def begin_at(self, start: dict[str, float], travelled: tuple[float, float]) -> dict[str, float]:
         """Where a motion starts, from where the bone is and how far the drive has `travelled` (mm)."""
@@ -203,8 +195,8 @@ class HandControl(Drive):
     def books(self) -> tuple[Any, ...]:  # type: ignore[override]
         return (self.hand,)
 
-    def memory(self, dim: int) -> dict[str, Floats]:
-        return {"hand": np.zeros((6, dim - 1))}
+    def memory(self, state: State) -> dict[str, Floats]:
+        return {"hand": np.zeros((6, state.bone.size - 1))}
 
     def known(self, drive: Floats, present: Floats) -> Floats:
         return present
@@ -289,11 +281,11 @@ class HandControl(Drive):
             found.append(ExtraUnknown(push, axis, force))
         return tuple(found)
 
-    def hand_state(self, state: State) -> dict[str, Floats]:
+    def accept(self, old: State, new: State) -> dict[str, Floats]:
         """Along x[, z], (6, d): the drive's position (mm), the bone's velocity (mm/s), the drive's force
         (N/mm), mean rates of both positions and that velocity.
         """
-        x = state.bone[::2]
+        x = new.bone[::2]
         ends = np.stack([self.drive, x, self.velocity(x)])
         changes = ends - self.before
         rates = changes / self.duration if self.duration > 0.0 else 0.0 * changes
