@@ -90,7 +90,7 @@ class Tangent:
         own[row] = 1.0
         if (stiffness := target.drive.own_stiffness(axis)) is not None:
             return -stiffness * own - balance
-        return -balance if self.equations.pulled(axis) else own
+        return -balance if self.equations.force_controlled(axis) else own
 
     def solve(self, right: Floats) -> Floats:
         """w (m,) with K w = `right` (m,)."""
@@ -102,7 +102,7 @@ class Tangent:
         for axis in range(dim):
             row = self.kept.size - dim + axis
             lacking = right[size - dim + axis]
-            dense[row] = lacking - condensed[row] if self.equations.pulled(axis) else lacking
+            dense[row] = lacking - condensed[row] if self.equations.force_controlled(axis) else lacking
         found = linalg().lu_solve(self._dense, dense, check_finite=False)
         pressing = right[size:].copy()  # of open nodes, as they are
         pressing[self._closed] = found[self.kept.size :]
