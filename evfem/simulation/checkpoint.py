@@ -100,15 +100,15 @@ def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, 
         allowed = f"at most the {most_rows} steps of the scene"
         raise InputError("checkpoint", f"{len(saved.rows)} steps", allowed)
     for name, expected in fresh.items():
-        user_forces, fits = saved.arrays.get(name), np.asarray(expected)
-        if user_forces is None or user_forces.dtype.kind != fits.dtype.kind:
+        array, fits = saved.arrays.get(name), np.asarray(expected)
+        if array is None or array.dtype.kind != fits.dtype.kind:
             raise _unusable(name)
-        if user_forces.ndim != fits.ndim or (name not in OF_ANY_SIZE and user_forces.shape != fits.shape):
+        if array.ndim != fits.ndim or (name not in OF_ANY_SIZE and array.shape != fits.shape):
             raise _unusable(name)
         if name == PROBES:  # a form in the plane leaves the stress out of it open: nan
-            if user_forces.shape != (len(saved.rows), *fits.shape[1:]):
+            if array.shape != (len(saved.rows), *fits.shape[1:]):
                 raise _unusable(name)
-        elif not np.isfinite(user_forces).all():
+        elif not np.isfinite(array).all():
             raise _unusable(name)
     arrays = {name: saved.arrays[name] for name in fresh}
     pad = arrays["status"].size
@@ -170,13 +170,13 @@ class Checkpoint:
         except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
             raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
         if version != evfem.__version__:
-            user_forces = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
-            raise InputError("checkpoint", user_forces, f"a checkpoint of evfem {evfem.__version__}")
+            found = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
+            raise InputError("checkpoint", found, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
             raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")
         if odd:
-            user_forces = f"{self.path}, of another version: without the columns {', '.join(odd)}"
-            raise InputError("checkpoint", user_forces, allowed)
+            found = f"{self.path}, of another version: without the columns {', '.join(odd)}"
+            raise InputError("checkpoint", found, allowed)
         state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
         return Saved(state, rows)
 
