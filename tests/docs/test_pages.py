@@ -26,6 +26,7 @@ import pytest
 import evfem
 from evfem import cli, studies
 from evfem.electrostatics.laws import FORCE_LAWS
+from evfem.planning.rooms import KINDS
 from evfem.response.file import SensitivityTable
 from evfem.scene import file as scenefile
 from evfem.scene import keys, schema
@@ -245,6 +246,16 @@ def test_the_page_about_the_inside_has_every_room_and_names_what_there_is():
     assert set(steps) <= set(house["ORDER"])
     public = {cells[0].strip("`"): cells[1].strip("`") for cells in rows(page["Public names"])}
     assert {name: resolved(re.sub("^ev", "evfem", name)).__name__ for name in public} == public
+
+
+def test_what_a_capability_touches_is_where_the_page_says():
+    """Rows are those of the table of rooms; every place exists."""
+    page = sections(read("docs/inside.md"))
+    cells = [[one.strip("`") for one in row] for row in rows(page["What a capability touches"])]
+    assert [row[:2] for row in cells] == [[kind.key, kind.module] for kind in KINDS]
+    for _, module, maker, told in cells:
+        for place in (module, maker, f"planning.plan.{told}"):
+            resolved(f"evfem.{place}")
 
 
 def dois(path):
