@@ -92,6 +92,15 @@ class InteractiveMotion(Motion):
         return replace(self, did=did)
 
 
+class LoopRow(SimpleNamespace):
+    """A row with its columns as attributes; one of a room of the package that the scene has not reads 0."""
+
+    def __getattr__(self, name: str) -> float:
+        if name in ROOM_COLUMNS:
+            return 0.0
+        raise AttributeError(f"a row has no column {name}")
+
+
 class Loop:
     """A scene that is stepped interactively, made by `ev.loop`; its own motion is done."""
 
@@ -133,7 +142,7 @@ class Loop:
         force: float | None = None,
         voltage: float | None = None,
         duration: float | None = None,
-    ) -> SimpleNamespace:
+    ) -> LoopRow:
         """One step to an exact target.
 
         Parameters
@@ -183,7 +192,7 @@ class Loop:
         self._reasons += reasons
         if reasons:
             raise StopRun("; ".join(reasons))
-        return SimpleNamespace(**(dict.fromkeys(ROOM_COLUMNS, 0.0) | self._run.rows[-1]))
+        return LoopRow(**self._run.rows[-1])
 
     def result(self) -> Result:
         """All rows so far, with the fields of every n-th step (`Output.every`) and of the last."""
