@@ -640,3 +640,41 @@ def test_memory_that_is_not_kept_shows_where_a_run_goes_on():
     resume = Saved(kept[1], whole.rows[:2])
     again = ev.simulate(base(2, rooms=(Hiding(),), motion=motions(2)[:1]), resume=resume)
     assert "normal_force" in differ(whole, again)
+
+
+class Squeezed(PadTraction):
+    """A film that resists being squeezed: all that it knows of the past is where the step begins."""
+
+    name = "squeezed"
+
+    def begin(self, old, seconds):
+        self.before, self.seconds = old.gap, seconds
+
+    def forces(self, pad):
+        found = np.zeros_like(pad.position)
+        if self.seconds > 0.0:
+            rate = (self.before - pad.gap) / self.seconds
+            found[:, 1] = 1e-7 * rate / (pad.gap + 0.05) ** 3 * pad.lengths
+        return found
+
+
+@pytest.mark.parametrize("stop", [2, 3, 5])
+def test_what_lives_from_the_begin_of_a_step_resumes_to_the_last_bit(stop):
+    """The tangent that the interrupted run had at hand is made again from where its step began."""
+    scene = base(2, rooms=(Squeezed(),), motion=ev.Press(indentation=0.3, steps=6, speed=5.0))
+    seen = Kept(stop)
+    whole = ev.simulate(scene, observers=[seen])
+    again = ev.simulate(scene, resume=Saved(seen.arrays, whole.rows[:stop]))
+    for one, other in zip(whole.rows, again.rows, strict=True):
+        assert {**one, "seconds": 0.0} == {**other, "seconds": 0.0}
+
+
+class Kept:
+    """Keeps the arrays of a checkpoint after a step."""
+
+    def __init__(self, step):
+        self.at = step
+
+    def step(self, row, frame, checkpoint):
+        if row["step"] == self.at:
+            self.arrays = checkpoint()

@@ -178,7 +178,7 @@ class Interface:
         position[touching, 1] -= self.surface_at(state).gap[touching]
         return position
 
-    def pad_state(self, state: State, touching: Any) -> PadState:
+    def pad_state(self, state: Any, touching: Any) -> PadState:
         """The pad in a state as tractions see it, in a step that began with these nodes `touching` (P,); the
         last one is kept, as several ask for it.
         """

@@ -76,7 +76,9 @@ class Linearisation:
         self.stiffest = 0.0
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self._made_at: TangentPoint | None = None
-        self._begin, self._seconds = Beginning(np.zeros((0, 0)), NOTHING), 0.0
+        none = np.zeros((0, 0))
+        self._begin = Beginning(none, none, self.candidates, 0.0, NOTHING)
+        self._seconds = 0.0
         self._outdated = False
         self._may_drop_candidates = True
         self._status: Ints = np.zeros(0, dtype=np.int64)
@@ -96,7 +98,7 @@ class Linearisation:
         self._outdated |= self.body.drag_rate != self._drag_rate
         if self._made_at is not None:
             self._outdated |= dynamics.outdates(self._made_at.duration, duration)
-        self._begin, self._seconds = Beginning(old.u, old.memory), duration
+        self._begin, self._seconds = Beginning.of(old), duration
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
@@ -206,6 +208,8 @@ class Linearisation:
         self.touching = at.touched
         self._begin, self._seconds = at.begin, at.duration
         self.body.begin(at.begin, at.duration)
+        for traction in self.attraction.keeping:
+            traction.begin(self.interface.pad_state(at.begin, at.begin.touching), at.duration)
         self.factorise(at.state)
 
     def _too_old(self, history: list[float]) -> bool:

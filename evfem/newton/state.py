@@ -93,10 +93,25 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """The state at the begin of a step, from which the body's terms take increments: u (N, dim), memory."""
+    """The state at the begin of a step, from which terms and tractions take increments: u (N, dim), contact
+    forces (P, dim), statuses (P,), voltage and memory.
+    """
 
     u: Floats
+    contact_force: Floats
+    status: Ints
+    voltage: float
     memory: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, state: State) -> Beginning:
+        """What is kept of an accepted state."""
+        return cls(state.u, state.contact_force, state.status, state.voltage, state.memory)
+
+    @property
+    def touching(self) -> Any:
+        """Pad nodes in contact, (P,) bool."""
+        return self.status != OPEN
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,6 +35,8 @@ ANOTHER = "a run of another scene"
 LAST_STATUS = 3
 #: name of what was found at the points of all probes after each step (S, P, K)
 PROBES = "probes"
+#: arrays of the state that a factorised step began with, beside its memory
+BEGUN = ("u", "contact_force", "status", "voltage")
 #: arrays whose size a run that has just been set up does not know
 OF_ANY_SIZE = ("candidates", "factor_memory.pressure", "came_off", PROBES)
 
@@ -46,11 +48,12 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """Data of the solver for the next step; of the same shapes with and without a factorisation."""
-    nowhere = TangentPoint(state, state.touching, Beginning(state.u, state.memory), 0.0)
+    nowhere = TangentPoint(state, state.touching, Beginning.of(state), 0.0)
     at = carried.tangent_point or nowhere
     found = {"candidates": carried.candidates, "duration": carried.duration, "factorised": at is not nowhere}
     found |= {f"factor_{name}": value for name, value in state_arrays(at.state).items()}
-    found |= {"touched": at.touched, "factor_seconds": at.duration, "begun_u": at.begin.u}
+    found |= {"touched": at.touched, "factor_seconds": at.duration}
+    found |= {f"begun_{name}": getattr(at.begin, name) for name in BEGUN}
     found |= {f"begun_memory.{name}": kept for name, kept in at.begin.memory.items()}
     return {name: np.asarray(value) for name, value in found.items()}
 
@@ -63,7 +66,8 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
         made = state_of({name: part for name, part in parts.items() if f"factor_{name}" in arrays})
         own = "begun_memory."
         kept = {name.removeprefix(own): part for name, part in arrays.items() if name.startswith(own)}
-        begin = Beginning(arrays["begun_u"], kept)
+        u, force, status, voltage = (arrays[f"begun_{name}"] for name in BEGUN)
+        begin = Beginning(u, force, status, float(voltage), kept)
         at = TangentPoint(made, arrays["touched"], begin, float(arrays["factor_seconds"]))
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
@@ -112,7 +116,12 @@ def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, 
             raise _unusable(name)
     arrays = {name: saved.arrays[name] for name in fresh}
     pad = arrays["status"].size
-    for name, most in (("candidates", pad - 1), ("status", LAST_STATUS), ("factor_status", LAST_STATUS)):
+    for name, most in (
+        ("candidates", pad - 1),
+        ("status", LAST_STATUS),
+        ("factor_status", LAST_STATUS),
+        ("begun_status", LAST_STATUS),
+    ):
         if arrays[name].size and not 0 <= arrays[name].min() <= arrays[name].max() <= most:
             raise _unusable(name)
     if (np.diff(arrays["candidates"]) <= 0).any():
