@@ -166,7 +166,7 @@ def force_on(finger: Any, mesh: Any, skin: Skin, law: Any, voltage: float, gap: 
     points = mesh.points[skin.nodes]
     surface, _ = placed(scene.ground, points)
     attraction = make_attraction(Closing(scene, mesh), skin, surface)
-    forces = attraction.forces(points + np.array([0.0, gap, 0.0]), voltage, None)
+    forces = attraction.forces(attraction.state(points + np.array([0.0, gap, 0.0]), voltage))
     return float(-1e3 * forces[:, 1].sum())
 
 

@@ -166,7 +166,8 @@ def air_share(scene: ev.Scene, result: ev.Result) -> float:
     position = model.mesh.points[pad] + frame.displacement[pad]
     touching = frame.contact_status[pad] > 0
     assert model.attraction is not None
-    pull = model.attraction.forces(position, float(result.voltage[-1]), touching)[:, 1]
+    attraction = model.attraction
+    pull = attraction.forces(attraction.state(position, float(result.voltage[-1]), touching))[:, 1]
     return float(pull[~touching].sum() / pull.sum())
 
 
@@ -215,7 +216,8 @@ def electrode_numbers(quick: bool) -> tuple[dict[str, float], list[Series]]:
     def force(rows: Any, floating: bool = False) -> Any:
         surface = replace(model.surface, electrodes=rows)
         own = {"surface": surface, "floating": floating, "solved": OrderedDict()}
-        return replace(model.attraction, **own).forces(points, 1000.0, None).sum(axis=0)
+        attraction = replace(model.attraction, **own)
+        return attraction.forces(attraction.state(points, 1000.0)).sum(axis=0)
 
     whole = -force(None)[1]
     places = np.linspace(-6.0, 6.0, 7 if quick else 25)

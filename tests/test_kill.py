@@ -156,11 +156,11 @@ DAMAGES = {
     "part 1.5": (lambda p: replaced(p, state__substep=np.array(1.5)), "no usable substep"),
     "column lost": (
         lambda p: row_changed(p, lambda rows: [row.pop("min_gap") for row in rows]),
-        "of another version: with missing or unknown columns min_gap;",
+        "of another version: without the columns min_gap;",
     ),
     "column too many": (
         lambda p: row_changed(p, lambda rows: [row.update(extra=1.0) for row in rows]),
-        "of another version: with missing or unknown columns extra;",
+        "no usable rows",
     ),
     "columns of a row": (lambda p: row_changed(p, lambda rows: rows[1].pop("min_gap")), "columns of row 2"),
     "no rows": (lambda p: row_changed(p, list.clear), "damaged"),

@@ -94,15 +94,19 @@ def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
     return Ledger(model, sums, end, pull_off)
 
 
-def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:
-    """The arrays of a checkpoint, if they fit the `fresh` ones of a run of `most_rows` steps that
-    has just been set up.
+def usable(
+    saved: Saved, fresh: Mapping[str, Any], most_rows: int, columns: Sequence[str]
+) -> dict[str, np.ndarray]:
+    """The arrays of a checkpoint, if they fit the `fresh` ones of a run of `most_rows` steps
+    with these `columns` that has just been set up.
 
     Raises InputError for what is missing, of another shape or kind, not finite, or out of range.
     """
     if len(saved.rows) > most_rows:
         allowed = f"at most the {most_rows} steps of the scene"
         raise InputError("checkpoint", f"{len(saved.rows)} steps", allowed)
+    if saved.rows and set(saved.rows[0]) != set(columns):
+        raise _unusable("rows")
     for name, expected in fresh.items():
         array, fits = saved.arrays.get(name), np.asarray(expected)
         if array is None or array.dtype.kind != fits.dtype.kind:

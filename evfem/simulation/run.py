@@ -390,7 +390,8 @@ class Run:
         }
 
     def _restore(self, saved: Saved) -> None:
-        arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
+        columns = self.model.column_names
+        arrays = usable(saved, self.checkpoint(), self.scene.total_steps, columns)
         self.state = state_of(arrays)
         self.model.equilibrium.body.resume(reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])

@@ -91,6 +91,11 @@ class Attraction(PadTraction):
         """Whether anything attracts at this voltage: charges may without it."""
         return voltage != 0.0 or self.always or self.flows
 
+    def state(self, position: Floats, voltage: float, touching: Any = False) -> PadState:
+        """Its pad at `position` (P, dim) under a voltage (V), not pressed, some nodes `touching` (P,)."""
+        on = np.broadcast_to(np.asarray(touching, dtype=bool), (len(position),))
+        return PadState(self.pad, self.surface, position, voltage, None, on)
+
     # -- charges
 
     def memory(self, state: Any) -> dict[str, Floats]:

@@ -247,7 +247,7 @@ class FieldAttraction(Attraction):
 
     def bare(self, position: Floats) -> PadState:
         """The pad at `position` (P, 2) under 1 V, not pressed."""
-        return PadState(self.pad, self.surface, position, 1.0, None, np.zeros(self._size, dtype=bool))
+        return self.state(position, 1.0)
 
     def solve(self, position: Floats) -> Capacitance:
         """The field under the pad at `position` (P, 2), of smooth faces."""

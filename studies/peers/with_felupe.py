@@ -89,14 +89,14 @@ class Pull:
     def vector(self, field: Any, **_: Any) -> Any:
         """What the attraction adds to the residual."""
         self.position = self.start + field[0].values[self.nodes]
-        self.forces = self.law.forces(self.position, self.voltage, True)
+        self.forces = self.law.forces(self.law.state(self.position, self.voltage, True))
         residual = np.zeros(self.size)
         residual[self.dofs] = -self.forces.ravel()
         return sparse.csr_matrix(residual.reshape(-1, 1))
 
     def matrix(self, **_: Any) -> Any:
         """The derivative of what `vector` computed last."""
-        local = self.law.stiffness(self.position, self.voltage, np.array(True))
+        local = self.law.stiffness(self.law.state(self.position, self.voltage, True))
         places = (self.dofs[local.row], self.dofs[local.column])
         return sparse.csr_matrix((-local.value, places), (self.size, self.size))
 
