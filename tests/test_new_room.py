@@ -646,6 +646,7 @@ class Squeezed(PadTraction):
     """A film that resists being squeezed: all that it knows of the past is where the step begins."""
 
     name = "squeezed"
+    of_rates = True
 
     def begin(self, old, seconds):
         self.before, self.seconds = old.gap, seconds
@@ -667,6 +668,18 @@ def test_what_lives_from_the_begin_of_a_step_resumes_to_the_last_bit(stop):
     again = ev.simulate(scene, resume=Saved(seen.arrays, whole.rows[:stop]))
     for one, other in zip(whole.rows, again.rows, strict=True):
         assert {**one, "seconds": 0.0} == {**other, "seconds": 0.0}
+
+
+def test_the_work_of_a_rate_is_that_of_its_end_forces():
+    """The energy that the steps lose falls with them; from partial rates it tended to -6 %."""
+
+    def lost(steps, rooms):
+        scene = base(2, rooms=rooms, motion=ev.Press(indentation=0.3, steps=steps, speed=20.0))
+        row = ev.simulate(scene).rows[-1]
+        return row["integrator_dissipation"] / row["external_work"]
+
+    coarse, fine = (lost(steps, (Squeezed(),)) - lost(steps, ()) for steps in (8, 32))
+    assert abs(fine) < 0.5 * abs(coarse)
 
 
 class Kept:

@@ -266,9 +266,13 @@ class PadTraction(Room):
         """Factor (P,), or 1, of the derivatives of the `column_law` in the tangent of the forces."""
         return 1.0
 
+    #: whether the forces depend on rates, which are partial between the ends of a substep: the work is then
+    #: that of the mean of the end forces
+    of_rates = False
+
     def work_along(self, path: PadPath) -> float:
         """Work on the finger in a substep (N mm)."""
-        if not path.turned.any():
+        if self.of_rates or not path.turned.any():
             return path.trapezoidal
         return path.trapezoidal + self.power(path, path.turned) - self.power_of_ends(path, path.turned)
 
