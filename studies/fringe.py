@@ -198,7 +198,7 @@ def full_over_columns(participant: str, gap: float) -> float:
         model, position = rigid_pad(finger, gap)
         attraction = model.attraction
         forces = attraction.forces if ridges else attraction.column_law.forces
-        pull[ridges] = forces(position, 1.0, None)[:, 1].sum()
+        pull[ridges] = forces(attraction.state(position, 1.0))[:, 1].sum()
     return float(pull[True] / pull[False])
 
 
