@@ -39,7 +39,7 @@ def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
     )
     error = f"{100.0 * bounds.spread:.2g} %"
     where = "at first touch" if gap == 0.0 else f"at a gap of {gap:g} mm"
-    text = f"{where} the energy of the column law is at most {error} too small"
+    text = f"{where} the column law's energy is at most {error} too small"
     if scene.field == "auto":
         choice = "more than" if bounds.spread > AUTO else "less than"
         text += f", {choice} the limit of {100.0 * AUTO:g} %"

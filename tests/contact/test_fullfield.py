@@ -215,7 +215,7 @@ def test_the_plan_chooses_by_the_bounds():
     assert lifted.terms == ev.plan(scene("auto", SMOOTH, [ev.Press(force=0.05), *motion])).terms
     assert "at a gap of 2 mm" in " ".join(str(lifted).split())
     assert (near.has("full field"), asked.has("full field")) == (True, True)
-    assert "at first touch the energy of the column law is at most" in " ".join(str(near).split())
+    assert "at first touch the column law's energy is at most" in " ".join(str(near).split())
     assert "at a gap of 2 mm" in " ".join(str(far).split())
     model = make_model(scene("auto", ridged, [ev.Press(force=0.05)]))
     assert isinstance(model.attraction, FieldAttraction)
