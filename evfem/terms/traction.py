@@ -234,7 +234,7 @@ class PadTraction(Room):
         return np.maximum(self.by_gap(pad), 0.0)
 
     def varies_over(self, pad: PadState) -> Floats:
-        """Lengths (P,) in mm over which the pull changes with the gap, |f / (df/dg)|: derivatives of a run by
+        """Lengths (P,) in mm over which the pull changes, force over slope: derivatives of a run by
         its parameters are differences over a small share of them.
         """
         pull, rate = np.abs(self.forces(pad)[:, 1]), np.abs(self.by_gap(pad))
