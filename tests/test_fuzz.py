@@ -184,6 +184,18 @@ def test_hostile_meshes_get_a_sentence(name, tmp_path):
     assert "\n" not in str(caught)
 
 
+def test_what_meshio_says_is_not_searched_for_words_to_colour(tmp_path, monkeypatch):
+    """Rich's patterns take time of the message's length squared."""
+    path = tmp_path / "open.msh"
+    path.write_text(MSH.format(1, "1\n1 15 2 1 1 1") + "$Comments\nnever closed\n")
+    searched = []
+    monkeypatch.setattr(
+        "rich.highlighter.ReprHighlighter.highlight", lambda self, text: searched.append(text)
+    )
+    refuses(".", meshfile.read, path, {"a": 0})
+    assert not searched
+
+
 def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
     n = 60_000
     points = np.zeros((n, 2))

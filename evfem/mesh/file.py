@@ -13,6 +13,7 @@ docs/commandline.md, "Nothing is trusted".
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import os
 import re
@@ -118,6 +119,7 @@ def parts(path: Path) -> meshio.Mesh:
     if start.startswith(b"$NOD"):
         raise ValueError("version 1 of Gmsh's format: save as 2.2 or 4.1")
     import meshio
+    import rich.console
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:
         raise ValueError(f"meshio knows no format {path.suffix or 'without an ending'}")
@@ -126,6 +128,8 @@ def parts(path: Path) -> meshio.Mesh:
     meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)
     meshio._mesh.topological_dimension.update(pixel=2, voxel=3)
     meshio.abaqus._abaqus.abaqus_to_meshio_type.update(PLANE_STRAIN)
+    # its messages are not searched for words to colour, which takes long in long ones
+    meshio._common.Console = functools.partial(rich.console.Console, highlighter=None)
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             warnings.simplefilter("ignore")

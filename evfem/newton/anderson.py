@@ -32,6 +32,7 @@ class Anderson:
     """Remembers a step's last iterations under one map: changes of steps and images."""
 
     def __init__(self) -> None:
+        self._names = MIXED
         self.reset()
 
     def reset(self) -> None:
@@ -44,7 +45,10 @@ class Anderson:
         if not np.array_equal(before.status, after.status):
             self.reset()
             return after
-        names = mixed(before, after)
+        names = (*self._names, *(name for name in mixed(before, after) if name not in self._names))
+        if names != self._names:  # an iteration may keep what another changes
+            self.reset()
+        self._names = names
         step, image = (after.u - before.u).ravel(), _vector(after, names)
         last, self._last = self._last, (step, image)
         if last is None:
@@ -56,9 +60,9 @@ class Anderson:
 
 
 def mixed(before: State, after: State) -> tuple[str, ...]:
-    """Names of the fields of a state that iterations change."""
-    kept = (name for name, one in after.memory.items() if one is not before.memory[name])
-    return (*MIXED, *(f"memory.{name}" for name in kept))
+    """Names of the memory of a state that an iteration has changed."""
+    changed = (name for name, one in after.memory.items() if one is not before.memory[name])
+    return tuple(f"memory.{name}" for name in changed)
 
 
 def _vector(state: State, names: tuple[str, ...]) -> Floats:

@@ -87,6 +87,19 @@ def test_a_squared_voltage_below_zero_is_none():
     assert found.voltage == 0.0
 
 
+def test_memory_that_one_iteration_keeps_and_the_next_changes_begins_anew():
+    """The pressure stays where the tangent is no older one's; with it a vector has other numbers."""
+    mixing, q = Anderson(), np.zeros((1, 3))
+    keeps = [state(np.full(4, x)).remembering({"pressure": q}) for x in (0.0, 1.0)]
+    mixing.next_iterate(*keeps)
+    changes = [state(np.full(4, x)).remembering({"pressure": q + x}) for x in (1.0, 1.5, 1.75)]
+    assert mixing.next_iterate(*changes[:2]) is changes[1]
+    found = mixing.next_iterate(*changes[1:])
+    np.testing.assert_allclose(found.memory["pressure"], 2.0, rtol=1e-12)
+    again = state(np.full(4, 3.0)).remembering({"pressure": changes[2].memory["pressure"]})
+    assert mixing.next_iterate(changes[2], again).memory["pressure"].shape == q.shape
+
+
 @pytest.mark.parametrize("how", ["status", "reset"])
 def test_another_map_begins_anew(how):
     mixing = Anderson()
