@@ -32,7 +32,7 @@ class Anderson:
     """Remembers a step's last iterations under one map: changes of steps and images."""
 
     def __init__(self) -> None:
-        self._names = MIXED
+        self._names: tuple[str, ...] = MIXED
         self.reset()
 
     def reset(self) -> None:
