@@ -79,7 +79,7 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
         "sums": np.array(list(ledger.sums.values())),
         "internal_forces": end.forces,
         "given_forces": end.user_forces,
-        "pull": np.array(ledger.pull_off.pull),
+        "lift": ledger.pull_off.lift,
         "came_off": ledger.pull_off.came_off,
         "energies": np.array([end.stored, end.springs, end.kinetic]),
     }
@@ -90,7 +90,7 @@ def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
     sums = dict(zip(Ledger(model).sums, arrays["sums"].tolist(), strict=True))
     end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
     pull_off = pull_off_of(model.attraction)
-    pull_off.pull, pull_off.came_off = float(arrays["pull"]), arrays["came_off"]
+    pull_off.lift, pull_off.came_off = arrays["lift"], arrays["came_off"]
     return Ledger(model, sums, end, pull_off)
 
 

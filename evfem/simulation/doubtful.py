@@ -29,6 +29,8 @@ GAINED = 0.01
 OPEN_WORK = 1e-7
 #: fraction of the energy of a run that is lost in one row where other states are stable too
 SNAPPED = 0.1
+#: fraction by which a pull-off force may be larger than it is said to be
+NARROW = 0.02
 #: strain to which an elastic surface is taken as linear
 STRAINED = 0.1
 #: pressure (MPa) that no fingertip bears: pressing on one begins to hurt at 0.3 to 0.6 MPa over a square
@@ -36,8 +38,9 @@ STRAINED = 0.1
 BORNE = 1.0
 
 
-#: unit of forces by dimension
+#: units of forces and of works by dimension
 FORCES = {2: "N/mm", 3: "N"}
+WORKS = {2: "N mm/mm", 3: "N mm"}
 #: penetration that is worth a warning, relative to the size of the finger
 SUNK = 1e-6
 
@@ -67,10 +70,15 @@ def penetration(model: Model, sunk: Floats) -> Iterator[str]:
 
 
 def pull_offs(found: Floats, dim: int) -> Iterator[str]:
-    """Pull-off of an adhering finger: rows (k, 2) of the step and the pull-off force."""
-    unit = FORCES[dim]
-    for step, pull in found:
-        yield f"in step {int(step)} the finger came off: adhesion held it up to a pull of {pull:.3g} {unit}"
+    """Pull-off of an adhering finger: rows (k, 3) of the step, the largest pull and its bound.
+
+    >>> list(pull_offs(np.array([[12, 0.0052, 0.0073]]), 2))[0].partition("up to ")[2]
+    'a pull of 0.0052 to 0.0073 N/mm; more steps narrow it'
+    """
+    for step, pull, bound in found:
+        open_ = bound > (1.0 + NARROW) * pull
+        said = f"in step {int(step)} the finger came off: adhesion held it up to a pull of {pull:.3g}"
+        yield said + (f" to {bound:.3g} {FORCES[dim]}; more steps narrow it" if open_ else f" {FORCES[dim]}")
 
 
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
@@ -91,6 +99,10 @@ def _column(rows: Sequence[Row], name: str) -> Floats:
     return np.array([row[name] for row in rows], dtype=float)
 
 
+def _dim(rows: Sequence[Row]) -> int:
+    return 3 if "contact_area" in rows[0] else 2
+
+
 def _never_touched(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
     """Slides that touch nothing, unless the finger is pressed later."""
     for i, course in enumerate(scene.courses):
@@ -104,12 +116,13 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
     """An attraction that is larger than the load, or presses as no fingertip can be pressed."""
     names = ("electrostatic_force", "applied_force", "normal_force", "peak_contact_pressure")
     pull, load, normal, peak = (_column(rows, name) for name in names)
-    pull, unit = np.where(normal > 0.0, pull, 0.0), "N" if "contact_area" in rows[0] else "N/mm"
+    pull, unit = np.where(normal > 0.0, pull, 0.0), FORCES[_dim(rows)]
     if not pull.any():
         return
     first, worst, most = int(np.argmax(pull)), int(np.argmax(np.where(pull > 0.0, peak, 0.0))), load.max()
     if any(course.presses for course in scene.courses) and pull[first] > max(most, 0.0):
-        times = f"{pull[first] / most:.3g} times the load, " if most > 0.0 else "more than the load, "
+        pressed = most > SMALLEST_FORCE
+        times = f"{pull[first] / most:.3g} times the load, " if pressed else "more than the load, "
         yield (
             f"the attraction, {pull[first]:.3g} {unit} in step {rows[first]['step']}, is {times}"
             f"which is {most:.3g} {unit} at most"
@@ -151,15 +164,38 @@ def _energy(rows: Sequence[Row]) -> float:
 
 
 def _energy_created(rows: Sequence[Row]) -> Iterator[str]:
+    """Steps whose end has more energy than the forces at both ends can have given it."""
     own, works = _lost(rows, "integrator"), np.abs(_column(rows, "external_work")).max()
     works += SMALLEST_FORCE * np.abs(_column(rows, "indentation")).max()
-    if own.min() < -GAINED * _energy(rows) - OPEN_WORK * works:
-        worst = int(own.argmin())
+    created = -own - _open_works(rows)
+    if created.max() > GAINED * _energy(rows) + OPEN_WORK * works:
+        worst = int(created.argmax())
         yield (
-            f"step {rows[worst]['step']} has {-own[worst] / _energy(rows):.1%} of the energy of the run from "
-            "nowhere (integrator_dissipation): its works are known at its ends alone, or it went over a "
-            "barrier; take more steps there"
+            f"step {rows[worst]['step']} ends with {created[worst]:.2g} {WORKS[_dim(rows)]} of energy from "
+            "nowhere (integrator_dissipation): where it went over a barrier, its forces are those of another "
+            "state; where more steps give the same forces, its works alone are wrong"
         )
+
+
+#: columns of the bone's force and of its path
+BONE = (
+    ("applied_force", "indentation"),
+    ("applied_tangential_force", "position"),
+    ("applied_tangential_force_x", "position"),
+    ("applied_tangential_force_z", "position_z"),
+)
+
+
+def _open_works(rows: Sequence[Row]) -> Floats:
+    """What the forces at the ends of each step (r,) leave open of the work of the bone: half their change
+    times its way.
+    """
+    found = np.zeros(len(rows))
+    for force, path in BONE:
+        if force in rows[0]:
+            change, way = (np.diff(_column(rows, name), prepend=0.0) for name in (force, path))
+            found += 0.5 * np.abs(change * way)
+    return found
 
 
 def _snapped(rows: Sequence[Row]) -> Iterator[str]:

@@ -85,6 +85,7 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.quadrature import PART, SLIDE
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.newton.interface import slipped
@@ -95,7 +96,8 @@ from evfem.terms.traction import PadPath, PadState
 
 #: fraction of the work of the change of internal forces or shear that a small smooth substep cannot set free
 SNAP = 0.5
-#: fraction of the work of the internal forces, absolute values added, that is the solver's tolerance
+#: fraction of the work of the internal forces, absolute values added, that is the solver's tolerance; of
+#: a body without forces `SMALLEST_FORCE` takes their place
 NOISE = 1e-7
 
 
@@ -281,7 +283,8 @@ class SubstepWork:
             return False
         moved = new.u - old.u
         along = moved - (new.bone - old.bone)
-        if not lost > NOISE * float(np.abs(after * moved).sum()):
+        balanced = np.abs(after * moved).sum() + SMALLEST_FORCE * np.abs(moved).max()
+        if not lost > NOISE * float(balanced):
             return False
         work = float(np.sum((after - before) * along))
         changed = np.linalg.norm((new.contact_force - old.contact_force)[:, 1:], axis=1)

@@ -12,33 +12,39 @@ from evfem.common.arrays import Floats
 from evfem.common.rooms import begun, ended, shaped
 from evfem.terms.traction import Entries, NoTraction, PadState, PadTraction
 
-#: a finger that does not touch has come off when the attraction is below this fraction of the last pull
+#: a finger that does not touch has come off when the attraction is below this fraction of its largest pull
 LEFT = 0.01
 
 
 @dataclass
 class PullOff:
-    """Pull-off of a finger under tractions without a voltage: the tension `pull` (N/mm) on it in the last
-    equilibrium, the pull-off force in this step, `let_go`, 0 without a pull-off, and the pull-off events
-    `came_off`, rows (k, 2) of step and force.
+    """Pull-off of a finger under tractions without a voltage. `lift` (4,): the largest tension (N/mm or N) on
+    it in the equilibria since it was last pressed, the height (mm) and tension of the last one, and the
+    slope between the last two. `let_go`: the largest tension and a bound of it, of a pull-off in this step.
+    `came_off`, rows (k, 3): step, largest tension and bound.
     """
 
-    pull: float = 0.0
-    let_go: float = 0.0
-    came_off: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    lift: Floats = field(default_factory=lambda: np.zeros(4))
+    let_go: tuple[float, ...] = ()
+    came_off: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def watch(self, state: Any, forces: dict[str, Floats], rests: bool) -> None:
         """An accepted state under these forces (P, dim) by name; `rests` without drag."""
         holds = -float(sum(force[:, 1].sum() for force in forces.values()))
-        if not state.touching.any() and self.pull > 0.0 and holds < LEFT * self.pull:
-            self.let_go, self.pull = self.pull, 0.0
+        largest, below, last, slope = self.lift
+        height, tension = float(state.bone[1]), float(state.reaction[1])
+        if not state.touching.any() and largest > 0.0 and holds < LEFT * largest:
+            self.let_go = largest, max(largest, last + slope * (height - below))
+            self.lift = np.array([0.0, height, 0.0, 0.0])
         elif rests:
-            self.pull = max(0.0, float(state.reaction[1])) if state.touching.any() or holds > 0.0 else 0.0
+            held = (state.touching.any() or holds > 0.0) and tension > 0.0
+            slope = (tension - last) / (height - below) if height != below else 0.0
+            self.lift = np.array([max(largest, tension) if held else 0.0, height, tension, slope])
 
     def ends(self, step: int) -> None:
         """A step of that number is done."""
         if self.let_go:
-            self.came_off, self.let_go = np.vstack([self.came_off, [step, self.let_go]]), 0.0
+            self.came_off, self.let_go = np.vstack([self.came_off, [step, *self.let_go]]), ()
 
 
 class NoPullOff(PullOff):

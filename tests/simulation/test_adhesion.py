@@ -8,6 +8,7 @@ from simulation.test_core import SCALE, WORK, block
 from simulation.test_spheres import paraboloid
 from tools.builders import left_over, unbalanced
 from tools.domes import Dome, dome_scene
+from tools.meshes import contact_block
 from tools.refusals import refuses
 
 import evfem as ev
@@ -91,8 +92,45 @@ def test_the_pull_off_comes_to_that_of_johnson_kendall_and_roberts():
     assert errors[2] < 0.7 * errors[0]
     assert found[1].contact_width[-1] == 0.0
     (said,) = [one for one in found[1].warnings if "came off" in one]
-    held = found[1].applied_force[found[1].contact_width > 0.0][-1]
-    assert float(said.split("pull of ")[1].split()[0]) == pytest.approx(-held, rel=0.05)
+    assert float(said.split("pull of ")[1].split()[0]) == pytest.approx(
+        -found[1].applied_force.min(), rel=0.01
+    )
+
+
+def test_a_pull_off_between_two_steps_is_told_with_its_bounds():
+    """Those of 4 steps hold what 32 find, and are wider than theirs."""
+    lifted = []
+    for steps in (4, 32):
+        motion = [ev.Press(indentation=0.1, steps=2), ev.Press(indentation=-0.25, steps=steps)]
+        result = ev.simulate(ev.Scene(PAD, ev.Flat(friction=0.0), motion=motion, adhesion=MOIST))
+        (said,) = [one for one in result.warnings if "came off" in one]
+        least, to, most = said.split("pull of ")[1].split()[:3]
+        assert to == "to"
+        assert float(least) == pytest.approx(-result.applied_force.min(), rel=0.01)
+        lifted.append((float(least), float(most)))
+    (least, most), (finer, finest) = lifted
+    assert least < finer < finest
+    assert finer < most
+    assert most - least > 3.0 * (finest - finer)
+
+
+@pytest.mark.parametrize("steps", [20, 80])
+def test_the_pull_off_that_is_told_is_the_largest_pull(steps):
+    """A nearly rigid cylinder, whose pull falls again before it lets go; rigid, at first touch, it is
+    2 s sqrt(2 R h).
+    """
+    radius, stress, reach = 8.0, 0.001, 0.05
+    grid = np.linspace(-3.0, 3.0, 121), np.linspace(0.0, 3.0, 4)
+    mesh = contact_block(*grid, 3.0, lambda x: radius - np.sqrt(radius**2 - x**2), quadratic=False)
+    body = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(E=5e3, nu=0.3)})
+    motion = [ev.Press(indentation=1e-4, steps=1), ev.Press(indentation=-0.08, steps=steps)]
+    scene = ev.Scene(body, ev.Flat(friction=0.0), motion=motion, adhesion=ev.Dugdale(stress, reach))
+    with pytest.warns(UserWarning, match="beyond that of any tissue"):
+        result = ev.simulate(scene)
+    (said,) = [one for one in result.warnings if "came off" in one]
+    told = float(said.split("pull of ")[1].split()[0])
+    assert told == pytest.approx(-result.applied_force.min(), rel=0.005)
+    assert told == pytest.approx(2.0 * stress * np.sqrt(2.0 * radius * reach), rel=0.05)
 
 
 #: a sphere of E = 0.1 MPa, nu = 0.3, R = 50 mm, whose contact by Johnson, Kendall and Roberts has a radius
