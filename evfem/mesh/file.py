@@ -119,7 +119,6 @@ def parts(path: Path) -> meshio.Mesh:
     if start.startswith(b"$NOD"):
         raise ValueError("version 1 of Gmsh's format: save as 2.2 or 4.1")
     import meshio
-    import rich.console
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:
         raise ValueError(f"meshio knows no format {path.suffix or 'without an ending'}")
@@ -129,7 +128,8 @@ def parts(path: Path) -> meshio.Mesh:
     meshio._mesh.topological_dimension.update(pixel=2, voxel=3)
     meshio.abaqus._abaqus.abaqus_to_meshio_type.update(PLANE_STRAIN)
     # its messages are not searched for words to colour, which takes long in long ones
-    meshio._common.Console = functools.partial(rich.console.Console, highlighter=None)
+    console = meshio._common.Console
+    meshio._common.Console = functools.partial(getattr(console, "func", console), highlighter=None)
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             warnings.simplefilter("ignore")

@@ -73,6 +73,11 @@ class Course:
         return self.indentation if self.force is None else math.inf
 
     @property
+    def lift(self) -> float:
+        """Gap (mm) of the undeformed outline at the end of a motion that hovers, else 0: first touch."""
+        return -self.indentation if self.hovers and self.indentation is not None else 0.0
+
+    @property
     def presses(self) -> bool:
         """Whether the motion ends with a load that a later one can hold."""
         return self.depth is not None and not self.hovers
@@ -188,7 +193,8 @@ class Slide(Motion, kind="slide"):
 class Hover(Motion, kind="hover"):
     """Hold the bone so that the undeformed outline is above the surface by a gap: `indentation = -gap`.
 
-    The tissue is free to move under the attraction. Going there takes no time.
+    The tissue is free to move under the attraction. Going there takes no time. A scene's first motion is
+    there from the beginning, as a finger that comes from afar: all of its steps are at the gap.
     """
 
     gap: Annotated[float, _GAP, "of the undeformed outline to the surface"]

@@ -176,7 +176,7 @@ class Loop:
         """
         wanted = StepRequest(position, position_z, indentation, force, voltage, duration)
         self._check(wanted)
-        start = self._start()
+        start = self._start(wanted)
         course = self._course(wanted, start)
         self._check_course(course)
         with self._threads():
@@ -262,8 +262,10 @@ class Loop:
         if self._run.model.mesh.dim == 2:
             raise InputError("position_z", "a way across x", "0 with a finger in the plane")
 
-    def _start(self) -> Start:
+    def _start(self, wanted: StepRequest) -> Start:
         run = self._run
+        if not run.rows:
+            run.begin_at(min(wanted.indentation or 0.0, 0.0))
         start = run.start_of(len(run.rows))
         start |= run.model.drive.place(run.state)
         return start if self._load is None else start | {"applied_force": self._load}
@@ -320,18 +322,21 @@ class Loop:
         set_frozen(self._run.scene, motion=(*self._own, at_will))
 
     def _make_for(self, course: Course) -> None:
-        """Make the model anew where a voltage is larger than any before and changes what it needs."""
+        """Make the model anew where a voltage is larger than any before, or the finger hovers first, and that
+        changes what it needs.
+        """
         run, voltage = self._run, abs(course.voltage or 0.0)
-        if voltage <= self._largest:
+        more, above = voltage > self._largest, course.hovers and not self._run.rows
+        if not (more or above):
             return
-        if self._true is not None:
+        if more and self._true is not None:
             raise InputError("voltage", voltage, "at most `largest_voltage` of a loop that is linearised")
         scene = self._moved(self._interactive.and_then(course))
         cored = (Closing(scene, run.model.mesh).core is None) != (run.model.closing.core is None)
         if cored or not run.scene.electrics.acts:
             self._run = Run(scene, Saved(run.checkpoint(), run.rows) if run.rows else None)
             self._run.frames = run.frames
-        self._largest = voltage
+        self._largest = max(voltage, self._largest)
 
     def _threads(self) -> Any:
         """The BLAS has the scene's threads in three dimensions, else one: as in `simulate`."""

@@ -193,12 +193,20 @@ class Run:
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
-        self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.source.start)
-        self.state = self.state.remembering(
-            begun(self.model.drive, self.state.memory, self.model.drive.memory(self.state))
-        )
+        first = next(iter(scene.courses), Course())
+        self.begin_at(-first.lift)
         if resume is not None:
             self._restore(resume)
+
+    def begin_at(self, indentation: float) -> None:
+        """Place the finger at rest before the first row. One that hovers first comes from afar, where nothing
+        acts: it is at its gap before the voltage acts, and not at first touch.
+        """
+        rest = self.model.equilibrium.rest(self.model.bone(0.0, indentation), self.source.start)
+        self.first_indentation = indentation
+        self.state: State = rest.remembering(
+            begun(self.model.drive, rest.memory, self.model.drive.memory(rest))
+        )
 
     def linearised(self) -> Run:
         """Another run that goes on from here with tissue that is linear about the present state."""
@@ -257,7 +265,7 @@ class Run:
         """Initial state of a motion: bone, indentation, force, voltage, and whether it is unloaded."""
         start = dict.fromkeys(START_COLUMNS, 0.0)
         if rows_before == 0:
-            return start | {"voltage": self.source.start}
+            return start | {"voltage": self.source.start, "indentation": self.first_indentation}
         row = self.rows[rows_before - 1]
         start |= {name: row[name] for name in START_COLUMNS if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE

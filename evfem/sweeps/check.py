@@ -1,10 +1,12 @@
 r"""Check of uniqueness: final forces of a scene with other steps and solvers, which should not matter.
 
 A scene is run as it is, in twice the steps, with other drag where an energy barrier was met
-(`evfem.solver.hold`), with the other sparse solver, and with one input changed by 1e-9. Each final state is
-compared with the scene's own: the largest difference of forces, relative to the largest force, and of
-indentation. Agreement does not prove the answer: twice as many steps may miss the same branch. Disagreement
-shows that it depends on the solution path.
+(`evfem.solver.hold`), with the other sparse solver, and with one input changed by 1e-9. Where an
+attraction acts from the first row on, a finger that is pressed comes from afar too, and one that hovers,
+which does, from first touch: between its release and its pull-in voltage it rests open or shut. Each final
+state is compared with the scene's own: the largest difference of forces, relative to the largest force,
+and of indentation. Agreement does not prove the answer: twice as many steps may miss the same branch.
+Disagreement shows that it depends on the solution path.
 """
 
 from __future__ import annotations
@@ -22,15 +24,19 @@ from evfem.common import notices
 from evfem.errors import NotConverged
 from evfem.newton.condensation import other_solver
 from evfem.scene.file import load
+from evfem.scene.motion import Hover, Press
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
+from evfem.terms.sources import source_of
 
 #: what is compared, and by how much it may differ
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
 AGREE = 1e-3
 #: initial rates of drag relative to the scene's own, and the relative change of an input
 HOLDS, PERTURBATION = (0.25, 4.0), 1e-9
+#: gaps (mm) from which a finger comes, and from which it lands, and steps between them
+AFAR, NEAR, APPROACH = 2.0, 0.01, 8
 #: an indentation (mm) below which differences are no longer relative to it
 SMALL = 0.01
 
@@ -124,12 +130,26 @@ def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
     for ratio in HOLDS if own.provenance["solver"]["barriers"] else ():
         hold = replace(strategy, hold=ratio * strategy.hold)
         yield f"held by {ratio:g} of the drag", replace(scene, solver=replace(scene.solver, strategy=hold))
+    if acts_at_once(scene):
+        first, rest = motions[0], motions[1:]
+        if first.course.hovers:
+            again = replace(first, steps=max(first.steps, APPROACH))
+            yield "from first touch", replace(scene, motion=[Press(indentation=0.0, steps=1), again, *rest])
+        else:
+            yield "from afar", replace(scene, motion=[Hover(AFAR), Hover(NEAR, steps=APPROACH), *motions])
     for i, name in product(range(len(motions)), ("indentation", "force", "gap", "distance", "voltage")):
         if isinstance(value := getattr(motions[i], name, None), float | int) and value:
             other = replace(motions[i], **{name: value * (1.0 + PERTURBATION)})
             changed = replace(scene, motion=(*motions[:i], other, *motions[i + 1 :]))
             yield f"an input changed by {PERTURBATION:g}", changed
             return
+
+
+def acts_at_once(scene: Scene) -> bool:
+    """Whether something attracts a finger from the first row on."""
+    return bool(scene.motion) and (
+        scene.adhesion is not None or source_of(scene.electrics.voltage).start != 0.0
+    )
 
 
 def _row(variant: str, found: Result, own: Result) -> dict[str, Any]:
