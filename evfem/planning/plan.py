@@ -23,7 +23,7 @@ from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_components
 from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
-from evfem.planning.resolution import oscillating, steps_line, too_fast, unresolved
+from evfem.planning.resolution import oscillating, skipped, steps_line, too_fast, unresolved
 from evfem.planning.rooms import rooms_of
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
@@ -176,6 +176,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         too_fast(scene),
         left_out(scene),
         unseen(closing),
+        *skipped(scene),
         *oscillating(scene, mesh),
         *drifting(scene, mesh, moduli),
     )

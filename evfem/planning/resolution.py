@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
@@ -34,6 +35,8 @@ PER_SPACING, MOST = 8, 200_000
 AUTO = "auto"
 #: steps in a period of the voltage, at least: 10 in one of its square, which the attraction follows
 PER_PERIOD = 20.0
+#: fraction of its range by which a profile may vary between two rows
+SKIPPED = 0.2
 
 
 def unresolved(scene: Scene, mesh: Mesh) -> str | None:
@@ -114,6 +117,31 @@ def too_fast(scene: Scene) -> str | None:
     return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{instead}"
 
 
+def skipped(scene: Scene) -> Iterator[str]:
+    """A sentence for a slide between whose rows a voltage or a force over the position varies by more than
+    `SKIPPED` of its range, beyond the straight line from row to row.
+    """
+    signal = scene.electrics.voltage
+    if not isinstance(signal, VoltageProfile | FollowForce):
+        return
+    x = 0.0
+    for i, motion in enumerate(scene.motion):
+        way = motion.course.travel[0]
+        rows = x + way * np.arange(motion.steps + 1) / motion.steps
+        x = float(rows[-1])
+        within = signal.position[(signal.position > rows.min()) & (signal.position < rows.max())]
+        if not way or not within.size:
+            continue
+        ends, seen = np.sort(rows), np.asarray(signal(np.sort(rows)))
+        off = float(np.abs(np.interp(within, ends, seen) - signal(within)).max())
+        whole = float(np.ptp(signal(np.union1d(within, ends))))
+        if off > SKIPPED * whole > 0.0:
+            yield (
+                f"motion {i} has rows {abs(way) / motion.steps:.3g} mm apart, and between them what is "
+                f"prescribed over x varies by {off / whole:.0%} of its range: more steps show it"
+            )
+
+
 def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
     """A sentence for hand and tissue if a motion's steps are longer than their period: of its mass on its
     spring; of the softest layer in shear, about 4 h sqrt(rho / G). Overdamped, neither has one.
@@ -159,6 +187,24 @@ def path_line(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:
     path_points = np.zeros((int(np.clip((last - first) / step, 2, MOST)), mesh.dim - 1))
     path_points[:, axis] = np.linspace(first, last, len(path_points))
     return path_points
+
+
+def slip_scale(scene: Scene, mesh: Mesh) -> float:
+    """Length (mm) of slip in which height or friction of the surface can change by all of their range: that
+    range over the steepest slope, and no less than two spacings of the pad's nodes; inf of what is alike everywhere.
+    """
+    surface: Any = scene.ground
+    edges = mesh.points[_pad_edges(mesh, 0)]
+    spacing = float(np.median(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1))) / mesh.order
+    found = [np.inf]
+    for axis in range(mesh.dim - 1):
+        line = path_line(scene, mesh, spacing / PER_SPACING, axis)
+        step = float(line[1, axis] - line[0, axis])
+        for values in (surface.relief(line)[0], surface.friction_coefficient(line[:, 0])):
+            steepest = float(np.abs(np.diff(values)).max()) / step
+            if steepest > 0.0:
+                found.append(max(2.0 * spacing, float(np.ptp(values)) / steepest))
+    return min(found)
 
 
 def path_depth(scene: Scene, mesh: Mesh, step: float) -> float:

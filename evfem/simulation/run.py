@@ -8,7 +8,7 @@ import time as clock
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -32,7 +32,7 @@ from evfem.newton.control import (
     VoltageControl,
 )
 from evfem.newton.state import State, StepFailed
-from evfem.planning.resolution import allowed_error
+from evfem.planning.resolution import allowed_error, slip_scale
 from evfem.protocols import Observer
 from evfem.scene.file import scene_at
 from evfem.scene.motion import Course
@@ -80,13 +80,16 @@ FIRST_PART = 0.125
 
 @dataclass(frozen=True)
 class Request:
-    """One requested step: its number in the run, its motion, and the path to its exact target."""
+    """One requested step: its number in the run, its motion, and the path to its exact target; fractions (k,)
+    of it at which parts with an admissible error end, for what is prescribed turns there.
+    """
 
     step: int
     motion_index: int
     kind: str
     path: Path
     duration: float
+    turns: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 def simulate(
@@ -169,6 +172,11 @@ def climb(model: Model, old: State, new: State, target: Target) -> float:
     return rise(SubstepWork(model, old, new), target)
 
 
+def _towards(begin: float, end: float | None, fraction: float) -> float:
+    """The value at a fraction (0 to 1) of the way to the end, if there is one; exactly the end at 1."""
+    return begin if end is None else end if fraction == 1.0 else begin + fraction * (end - begin)
+
+
 class Run:
     """A simulation in progress: the model, the present state, the rows and frames so far."""
 
@@ -179,6 +187,7 @@ class Run:
         self.ledger = Ledger(self.model, pull_off=pull_off_of(self.model.attraction))
         allowed, body = allowed_error(scene), self.model.body
         scheme = Whole() if allowed is None else Halves(allowed)
+        self.slip_scale = np.inf if allowed is None else slip_scale(scene, self.model.mesh)
         equilibrium = self.model.equilibrium
         self.stepper = Stepper(equilibrium, body=body, scheme=scheme, rise=partial(climb, self.model))
         if self.model.closing.trapped and self.source.start != 0.0:
@@ -241,7 +250,8 @@ class Run:
                 begun, reached, steps = motion.part(k)
                 seconds = course.seconds(steps, start["indentation"])
                 path = self.path(course, start, (begun, reached), seconds)
-                yield Request(first + k, index, motion.kind, path, seconds)
+                turns = self.turns(course, start, (begun, reached), seconds)
+                yield Request(first + k, index, motion.kind, path, seconds, turns)
 
     def path(self, course: Course, start: Start, fractions: tuple[float, float], seconds: float) -> Path:
         """The path of the next step, between two `fractions` (0 to 1) of a motion that began at `start`.
@@ -260,6 +270,20 @@ class Run:
             return replace(at, duration=(fraction - done) * seconds)
 
         return target
+
+    def turns(self, course: Course, start: Start, fractions: tuple[float, float], seconds: float) -> Floats:
+        """Fractions (k,) of the next step at which the voltage turns, and so many that surface and friction
+        do not turn unseen in between; none with prescribed steps.
+        """
+        if not self.stepper.scheme.measures:
+            return np.zeros(0)
+        ends = [
+            self._moment(course, start, part, self.time + spent)
+            for part, spent in zip(fractions, (0.0, seconds), strict=True)
+        ]
+        way = abs(course.distance) * (fractions[1] - fractions[0])
+        parts = int(np.ceil(way / self.slip_scale)) if way else 1
+        return np.union1d(self.source.turns(*ends), np.arange(1, parts) / parts)
 
     def start_of(self, rows_before: int) -> Start:
         """Initial state of a motion: bone, indentation, force, voltage, and whether it is unloaded."""
@@ -284,20 +308,26 @@ class Run:
                 x, z = x + motion.course.travel[0], z + motion.course.travel[1]
         return x, z
 
+    def _moment(self, course: Course, start: Start, fraction: float, time: float) -> Moment:
+        """What a source is asked at `fraction` (0 to 1) of a motion, at `time` (s)."""
+        x, z = (
+            _towards(start[name], start[name] + way, fraction)
+            for name, way in zip(("position", "position_z"), course.travel, strict=True)
+        )
+        heading = course.direction[: self.model.mesh.dim - 1]
+        along = float(np.dot((x, z)[: len(heading)], heading))
+        voltage = _towards(start["voltage"], course.voltage, fraction)
+        return Moment(voltage, time, self.time, x, along, heading, bool(course.distance))
+
     def _target(self, course: Course, start: Start, fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
 
         def towards(name: str, end: float | None) -> float:
-            begin = start[name]
-            return begin if end is None else end if fraction == 1.0 else begin + fraction * (end - begin)
+            return _towards(start[name], end, fraction)
 
-        position = towards("position", start["position"] + course.travel[0])
+        moment = self._moment(course, start, fraction, time)
         position_z = towards("position_z", start["position_z"] + course.travel[1])
-        bone = self.model.bone(position, towards("indentation", course.indentation), position_z)
-        heading = course.direction[: bone.size - 1]
-        along = float(np.dot((position, position_z)[: bone.size - 1], heading))
-        slides, ramp = bool(course.distance), towards("voltage", course.voltage)
-        moment = Moment(ramp, time, self.time, position, along, heading, slides)
+        bone = self.model.bone(moment.x, towards("indentation", course.indentation), position_z)
         height: HeightControl = Indentation(float(bone[1]))
         if course.force is not None:
             height = Force(towards("applied_force", course.force))
@@ -307,7 +337,7 @@ class Run:
         voltage: VoltageControl = self.source.control(moment, control)
         if course.gap is not None:
             voltage = GivenGap(towards("min_gap", course.gap))
-        return Target(position, height, voltage, z=tuple(bone[2:].tolist()), drive=self.model.drive)
+        return Target(moment.x, height, voltage, z=tuple(bone[2:].tolist()), drive=self.model.drive)
 
     # -- one requested step
 
@@ -319,7 +349,7 @@ class Run:
             self.state, self.model.mesh.node_sets["bone"][0]
         )
         try:
-            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
+            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger, request.turns)
         except StepFailed as error:
             said = advice(self.scene, self.model, error)
             raise NotConverged(request.step, error.residuals, said, self.result()) from None

@@ -5,7 +5,8 @@ length h has the local error :math:`c h^2`: one substep from a to b ends at anot
 their difference :math:`c h^2 - 2 c (h/2)^2 = c h^2 / 2` is the error of the two halves, which are accepted.
 With inertia, of second order in time, that overestimates the error. The largest admissible substep is
 :math:`\sqrt{e_{allowed} / e}` times as long. Iterations of the one substep begin at the end of the two, so
-that the estimate costs little. The first substep of a scene is short: from the undeformed state, one substep
+that the estimate costs little. Substeps end where what is prescribed turns: a pulse between their ends is
+seen neither by one nor by two. The first substep of a scene is short: from the undeformed state, one substep
 and two halves agree where every node slips in both, and neither has the nodes that stick with finer steps.
 
 The error is that of the forces on the bone, relative to the largest, and of the bone's translation, relative
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,6 +38,9 @@ Solved = list[tuple[Target, State]]
 
 class Whole:
     """A substep is one equilibrium; its length follows how many iterations that takes."""
+
+    #: whether errors of substeps are measured
+    measures: ClassVar[bool] = False
 
     def first(self, substep: float) -> float:
         """The first substep of a run, as a fraction of its step."""
@@ -76,6 +81,7 @@ class Halves(Whole):
 
     allowed: float
     largest: float = 0.0
+    measures = True
 
     def first(self, substep: float) -> float:
         return PATH_FIRST

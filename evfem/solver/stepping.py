@@ -12,7 +12,7 @@ close enough to them; its length follows that error (`evfem.solver.path`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -25,6 +25,8 @@ from evfem.solver.path import Path, Whole
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.tissue.body import Body
 
+#: fractions of a step closer than this are the same
+SAME = 1e-12
 #: why an equilibrium is refused that lies behind a barrier
 BARRIER = "the equilibrium that was found lies behind a barrier, which the finger would not climb"
 #: energy barriers below this fraction of the stored energy are rounding
@@ -80,16 +82,19 @@ class Stepper:
         self._release = Release(RELEASED, self.substep)
         self.substep = self.scheme.first(self.substep)
 
-    def follow(self, state: State, path: Path, accounts: Accounts) -> tuple[State, int]:
-        """From `state` to the end of `path`; every converged substep is added to the accounts. Returns the
-        last state and the number of substeps.
+    def follow(
+        self, state: State, path: Path, accounts: Accounts, turns: Iterable[float] = ()
+    ) -> tuple[State, int]:
+        """From `state` to the end of `path`, in substeps that end at the fractions `turns` too. Every
+        converged one is added to the accounts. Returns the last state and the number of substeps.
 
         Raises `StepFailed` when the smallest substep fails; what was accepted before stays accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
         self._release = Release(max(RELEASED, strategy.smallest_part), self.substep)
         while done < 1.0:
-            fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
+            end = next((one for one in turns if one > done + SAME), 1.0)
+            fraction = end if self.substep >= end - done - SAME else done + self.substep
             before = self.equilibrium.record.iterations
             try:
                 solved, error = self.scheme.solve(self.solve, state, path, (done, fraction))

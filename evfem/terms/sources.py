@@ -19,12 +19,17 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import Layers, eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError
 from evfem.protocols import TimeSignal
 
+#: fraction of its range by which what is prescribed may leave the straight line in a substep
+TURNED = 0.02
+#: parts of the way between two rows of a table, samples of a signal in a period and their largest number
+PARTS, SAMPLES, MOST = 4, 32, 100_000
 #: coulombs per metre of depth in a nanocoulomb per millimetre
 NANO = 1e-6
 
@@ -42,6 +47,41 @@ class Moment:
     along: float = 0.0
     direction: tuple[float, ...] = (1.0,)
     slides: bool = False
+
+
+def chords(place: Floats, value: Floats, whole: float) -> Floats:
+    """Fractions (k,) of the way over the places (n,) at which to stop for the values (n,) to differ by no
+    more than `TURNED` of `whole` from the straight line between two stops: those of Ramer, Douglas and
+    Peucker (doi:10.1016/S0146-664X(72)80017-0).
+
+    >>> chords(np.linspace(0.0, 2.0, 5), np.array([0.0, 1.0, 2.0, 1.0, 0.0]), 2.0).tolist()
+    [0.5]
+    """
+    kept, open_ = [], [(0, len(place) - 1)]
+    while open_:
+        first, last = open_.pop()
+        ends = [first, last]
+        off = np.abs(value[first : last + 1] - np.interp(place[first : last + 1], place[ends], value[ends]))
+        worst = first + int(off.argmax())
+        if last - first > 1 and off.max() > TURNED * whole:
+            kept.append(worst)
+            open_ += [(first, worst), (worst, last)]
+    return np.sort((place[kept] - place[0]) / (place[-1] - place[0]))
+
+
+def over_places(signal: Any, begin: float, end: float, power: int) -> Floats:
+    """Stops on the way from `begin` to `end` along a table over the position; of a power of its values, that
+    which acts.
+    """
+    low, high = min(begin, end), max(begin, end)
+    if low == high:
+        return np.zeros(0)
+    knots = signal.position[(signal.position > low) & (signal.position < high)]
+    edges = np.unique(np.concatenate([[low], knots, [high]]))
+    place = np.interp(np.arange(PARTS * (len(edges) - 1) + 1) / PARTS, np.arange(len(edges)), edges)
+    value = np.asarray(signal(place)) ** power
+    found = chords(place, value, float(np.ptp(np.asarray(signal(signal.position)) ** power)))
+    return found if end > begin else np.sort(1.0 - found)
 
 
 @dataclass(frozen=True)
@@ -67,6 +107,10 @@ class Source:
         """Whether the voltage has a course of its own in a step of so many seconds."""
         return False
 
+    def turns(self, begin: Moment, end: Moment) -> Floats:
+        """Fractions (k,) of a step from `begin` to `end` at which what is prescribed turns."""
+        return np.zeros(0)
+
     def pulls(self, moment: Moment) -> bool:
         """Whether anything may attract an unloaded finger at a moment."""
         return self.at(moment) != 0.0
@@ -88,6 +132,9 @@ class ProfileSource(Source):
     def prescribed(self, seconds: float) -> bool:
         return True
 
+    def turns(self, begin: Moment, end: Moment) -> Floats:
+        return over_places(self.signal, begin.x, end.x, 2)
+
 
 class SignalSource(Source):
     """A voltage over time."""
@@ -101,6 +148,15 @@ class SignalSource(Source):
 
     def prescribed(self, seconds: float) -> bool:
         return seconds > 0.0
+
+    def turns(self, begin: Moment, end: Moment) -> Floats:
+        frequency = max(self.signal.highest_frequency, getattr(self.signal, "rate", 0.0) / 4.0)
+        count = (end.time - begin.time) * frequency * SAMPLES
+        if not count:
+            return np.zeros(0)
+        times = np.linspace(begin.time, end.time, 2 + min(int(np.ceil(count)), MOST))
+        value = np.asarray(self.signal(times)) ** 2
+        return chords(times, value, float(np.ptp(value)))
 
 
 class ChargeSource(SignalSource):
@@ -133,6 +189,9 @@ class ForceSource(Source):
             return super().control(moment, controls)
         target, largest = float(self.signal(moment.along)), self.signal.largest_voltage
         return controls.FollowFriction(target, largest, moment.direction)
+
+    def turns(self, begin: Moment, end: Moment) -> Floats:
+        return over_places(self.signal, begin.along, end.along, 1) if end.slides else np.zeros(0)
 
     def pulls(self, moment: Moment) -> bool:
         return True

@@ -1,0 +1,58 @@
+"""Adaptive steps end where what is prescribed turns: nothing is passed over between their ends."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from tools.meshes import block
+
+import evfem as ev
+
+PULSE = ev.VoltageProfile([0.0, 1.1, 1.2, 1.3, 4.0], [0.0, 0.0, 3000.0, 0.0, 0.0])
+RUBBER = ev.Display(friction=0.3)
+AUTO = ev.Solver(strategy=ev.Strategy(steps="auto", path_error=2e-4))
+
+
+def slid(steps, surface=RUBBER, solver=AUTO, slip=4.0, speed=None, width=4.0, **options):
+    """A block that slips all the time under 0.02 N/mm."""
+    law, skin = {"tissue": ev.NeoHookean(E=0.5, nu=0.3)}, ev.Electrical(0.2, 100.0)
+    body = ev.MeshedFinger(block(12, 4, width=width, height=2.0), law, electrical=skin)
+    options.setdefault("law", ev.Kaczmarek())
+    motion = [ev.Press(force=0.02, steps=2), ev.Slide(slip, steps=steps, hold="force", speed=speed)]
+    return ev.simulate(ev.Scene(body, surface, motion=motion, solver=solver, **options))
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+@pytest.mark.filterwarnings("ignore:motion 1 has rows")
+def test_a_pulse_over_the_position_is_not_passed_over(steps):
+    """As 200 prescribed steps have it, 400 to 3e-4."""
+    assert slid(steps, voltage=PULSE).friction_dissipation[-1] == pytest.approx(expected(), rel=4e-3)
+
+
+@cache
+def expected():
+    return slid(200, voltage=PULSE, solver=ev.Solver()).friction_dissipation[-1]
+
+
+@pytest.mark.filterwarnings("ignore:motion 1 has .* steps in a period")
+def test_a_pulse_over_time_is_not_passed_over():
+    """At 10 mm/s the same voltages in hundredths of a second, in samples."""
+    samples = np.zeros(41)
+    samples[12] = 3000.0
+    signal = ev.Sampled(samples, rate=100.0, start=-0.0)
+    found = slid(1, voltage=signal, speed=10.0)
+    assert found.friction_dissipation[-1] == pytest.approx(expected(), rel=4e-3)
+
+
+def test_friction_narrower_than_a_step_is_not_passed_over():
+    """A stripe 0.3 mm wide of twice the friction, below a block 1 mm wide."""
+    edges = [-9.0, 5.2, 5.2, 5.5, 5.5, 99.0]
+    stripe = ev.Flat(friction=[[x, mu] for x, mu in zip(edges, [0.1, 0.1, 0.2, 0.2, 0.1, 0.1], strict=True)])
+    ways = (160, ev.Solver()), (1, AUTO)
+    fine, coarse = (slid(n, stripe, slip=8.0, width=1.0, law=None, solver=one) for n, one in ways)
+    assert coarse.friction_dissipation[-1] == pytest.approx(fine.friction_dissipation[-1], rel=2e-3)
+
+
+def test_rows_that_do_not_show_a_pulse_are_told():
+    with pytest.warns(UserWarning, match=r"motion 1 has rows 0\.8 mm apart, .* varies by 100% of its range"):
+        slid(5, voltage=PULSE)
