@@ -191,7 +191,7 @@ def path_line(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:
 
 def slip_scale(scene: Scene, mesh: Mesh) -> float:
     """Length (mm) of slip in which height or friction of the surface can change by all of their range: that
-    range over the steepest slope, and no less than two spacings of the pad's nodes; inf of what is alike everywhere.
+    range over the steepest slope, and no less than two spacings of the pad's nodes; inf where both are even.
     """
     surface: Any = scene.ground
     edges = mesh.points[_pad_edges(mesh, 0)]

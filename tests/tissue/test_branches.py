@@ -111,6 +111,22 @@ def test_force_of_a_held_block(solid_too):
     np.testing.assert_allclose(np.diff(np.log(waited[1:7, 0])), np.log(1000.0) / 6.0, rtol=1e-9)
 
 
+@pytest.mark.parametrize(("depth", "most"), [(0.15, 0.004), (0.3, 0.015), (0.5, 0.035)])
+@pytest.mark.parametrize("times", [1.0, 2.0, 4.0])
+def test_what_one_long_step_misses_of_a_held_overstress(depth, most, times):
+    """As the plan says, of the first overstress; 64 steps have no error to compare with."""
+
+    def force(*motion):
+        scene = flat(tissue(relaxation=((1.0, 1.0),)), [*motion])
+        return -column(ev.simulate(scene), "applied_force")
+
+    pressed = ev.Press(indentation=depth, speed=1e6, steps=1)
+    one, many = (force(pressed, ev.Wait(times, steps=n)) for n in (1, 64))
+    (rest,) = force(ev.Press(indentation=depth, steps=1))
+    missed = abs(one[-1] - many[-1]) / abs(many[0] - rest)
+    assert 0.02 * most < missed < most
+
+
 def test_creep_under_a_held_force():
     """With one branch the way left falls as exp(-t/(tau (1 + r)))."""
     share, tau = 1.5, 0.05
