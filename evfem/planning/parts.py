@@ -39,10 +39,13 @@ PLACES = np.linspace(0.0371, 0.9643, 12)
 #: steps (mm) of differences of a height, the largest slope that counts as none, and the median relative
 #: error of a slope, at most: heights have kinks and noise
 STEPS, LEVEL, SLOPE = (1e-4, 1e-2), 1e-4, 0.3
-#: strain at which a user's material is evaluated beside rest, and the step of differences there
-STRAIN, STRAIN_STEP = 0.02, 1e-3
+#: strain at which a user's material is evaluated beside rest, the step of differences, and the strains at
+#: which its derivative is tried
+STRAIN, STRAIN_STEP, STRAINS = 0.02, 1e-3, (0.02, 0.1, 0.3, 1.0, -0.1, -0.3)
 #: some displacement gradient in the plane: stretch, shear and rotation
 DIRECTION = np.array([[1.0, 0.4, 0.0], [-0.2, 0.6, 0.0], [0.0, 0.0, 0.0]])
+#: and one that shortens where it stretches
+ACROSS = np.array([[-0.5, 0.2, 0.0], [0.3, 0.9, 0.0], [0.0, 0.0, 0.0]])
 #: stress at rest over stiffness, and relative error of a derivative by complex step, at most
 REST, DERIVATIVE = 1e-6, 1e-4
 #: stiffness at rest over the largest one that counts as none: rounding
@@ -50,6 +53,8 @@ NO_STIFFNESS = 1e-11
 #: shear and widening in the plane, (3, 3, 2, 2): which of them, and with either sign
 WAYS = np.zeros((3, 3, 2, 2))
 WAYS[0, 1, 0] = WAYS[0, 0, 1] = WAYS[1, 1, 1] = 1.0, -1.0
+#: what a function must be for its derivative by complex steps
+COMPLEX_SAFE = "functions of numpy and evfem.tensor that take complex numbers: no abs, sign, float or maximum"
 #: gaps (mm) at which a user's force law is evaluated, and attraction over that of rigid plates, at most
 GAPS, STRONGEST = np.array([0.0, 0.1, 1.0]), 1e4
 #: step (mm) of differences by the gap, far below the thinnest insulator, and median relative error of a
@@ -118,7 +123,8 @@ def _check_material(key: str, law: Any, dim: int) -> None:
     name, method = next(iter(methods.items()), ("", law))  # P where there are both
     if not name:
         split(law, dim, key)  # says what a material is
-    _check_complex(key, f"{name}(F)", method, F[..., 1:, :])
+    tried = [np.eye(3) + strain * way for strain in STRAINS for way in (DIRECTION, ACROSS)]
+    _check_complex(key, f"{name}(F)", method, np.stack(tried, axis=-1)[..., None])
     P = np.asarray(method(F)) if name == "P" else complex_step(method, F, rank=2)
     _check_rest(key, P[..., 0, 0], float(np.abs(P[..., 1, 0] - P[..., 0, 0]).max()) / STRAIN)
 
@@ -150,19 +156,34 @@ def _split_stress(law: SplitLaw, F: Array) -> Array:
 
 
 def _check_complex(key: str, what: str, function: Callable[[Array], Any], F: Array) -> None:
-    """Whether a complex step along `DIRECTION` gives the derivative that differences give."""
-    along = DIRECTION[..., None, None]
-    allowed = "functions of numpy and evfem.tensor that take complex numbers: no abs, float, math or maximum"
+    """Whether complex steps along two directions give the derivatives that differences give, at F
+    (3, 3, n, 1).
+    """
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            exact = np.imag(np.asarray(function(F + 1j * STEP * along))) / STEP
+        lost = lost_derivatives(function, F)
     except Exception as error:  # whatever a user's code raises
         problem = f"{what} that raises {type(error).__name__} on complex numbers: {error}"
-        raise InputError(key, problem, allowed) from error
-    near = difference(lambda t: np.asarray(function(F + t * along)), np.zeros(()), STRAIN_STEP)
-    if not np.abs(exact - near).max() <= DERIVATIVE * np.abs(near).max():
-        raise InputError(key, f"{what} whose derivative is lost in a complex step", allowed)
+        raise InputError(key, problem, COMPLEX_SAFE) from error
+    if lost.any():
+        strain = np.abs(F - np.eye(3)[..., None, None]).max(axis=(0, 1))[lost].min()
+        where = "" if strain <= STRAIN else f" at a strain of {strain:.0%}"
+        raise InputError(key, f"{what} whose derivative is lost in a complex step{where}", COMPLEX_SAFE)
+
+
+def lost_derivatives(function: Callable[[Array], Any], F: Array) -> Array:
+    """Places (n, 1) of F (3, 3, n, 1) where a complex step along `DIRECTION` or `ACROSS` does not give the
+    derivative that differences give; those where these are not finite do not count.
+    """
+    lost = np.zeros(F.shape[2:], dtype=bool)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        for way in (DIRECTION, ACROSS):
+            along = way[..., None, None]
+            exact = np.imag(np.asarray(function(F + 1j * STEP * along))) / STEP
+            near = difference(lambda t, a=along: np.asarray(function(F + t * a)), np.zeros(()), STRAIN_STEP)
+            off, size = (np.abs(one).reshape(-1, *lost.shape).max(axis=0) for one in (exact - near, near))
+            lost |= np.isfinite(size) & ~(off <= DERIVATIVE * size)
+    return lost
 
 
 def _check_rest(key: str, stress: Array, stiffness: float) -> None:

@@ -14,12 +14,15 @@ from evfem.common.constants import CRITICAL, SMALLEST_FORCE, SOFTENED
 from evfem.errors import InputError
 from evfem.newton.control import Target
 from evfem.newton.state import Folded, LiftedOff, State, StepFailed
+from evfem.planning.parts import COMPLEX_SAFE, lost_derivatives
 from evfem.planning.plausibility import weakens
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 from evfem.simulation.model import Model
 from evfem.surface.pad import surface_state
 from evfem.terms.hand import drive_of
+from evfem.tissue.forms import deformation_gradient, embed
+from evfem.tissue.splitlaw import UserLaw
 
 #: fraction of the energy of motions in time that numerical dissipation may take
 DISSIPATED = 0.05
@@ -38,6 +41,8 @@ STRAINED = 0.1
 BORNE = 1.0
 
 
+#: points of the largest strain where materials of one's own are tried after a run
+STRAINED_POINTS = 32
 #: units of forces and of works by dimension
 FORCES = {2: "N/mm", 3: "N"}
 WORKS = {2: "N mm/mm", 3: "N mm"}
@@ -67,6 +72,23 @@ def penetration(model: Model, sunk: Floats) -> Iterator[str]:
             f"the boundary outside `pad` passed through the surface, by {sunk[0]:.3g} mm at ({at}) of the "
             "undeformed mesh: nothing holds it there, and contact forces are too small; extend `pad`"
         )
+
+
+def lost_stresses(model: Model, u: Floats) -> Iterator[str]:
+    """Own materials whose derivatives are lost in the most strained points of a state u (N, dim)."""
+    for law, integral in model.body.tissue.regions:
+        if not isinstance(law, UserLaw):
+            continue
+        F = embed(deformation_gradient(integral.field(u))).reshape(3, 3, -1)
+        strain = np.abs(F - np.eye(3)[..., None]).max(axis=(0, 1))
+        most = np.argsort(strain)[-STRAINED_POINTS:]
+        name, method = ("P", law.law.P) if hasattr(law.law, "P") else ("psi", law.law.psi)
+        lost = lost_derivatives(method, F[..., most, None])[:, 0]
+        if lost.any():
+            yield (
+                f"{name}(F) of {type(law.law).__name__} loses its derivative in a complex step at a strain "
+                f"of {strain[most][lost].min():.0%}: stresses are wrong there; it must be of {COMPLEX_SAFE}"
+            )
 
 
 def pull_offs(found: Floats, dim: int) -> Iterator[str]:

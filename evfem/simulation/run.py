@@ -53,6 +53,7 @@ from evfem.simulation.doubtful import (
     deepest_penetration,
     doubtful,
     free_nodes,
+    lost_stresses,
     penetration,
     pull_offs,
     unstable_alone,
@@ -405,6 +406,7 @@ class Run:
             about["core"] = core.told
         said = (
             *penetration(self.model, self.sunk),
+            *lost_stresses(self.model, self.state.u),
             *pull_offs(self.ledger.pull_off.came_off, self.model.mesh.dim),
         )
         if further := [one for one in self.model.columns if one.name not in ROOM_COLUMNS]:

@@ -103,6 +103,11 @@ class UserLaw:
         F = np.eye(2)
         return float(self.split_tangent(F, np.zeros(()))[0][0, 1, 0, 1])
 
+    @cached_property
+    def _rest_energy(self) -> float:
+        """Energy at rest (MPa), which a user's constants may leave and no balance has."""
+        return float(np.ravel(self.law.psi(np.eye(3)[..., None, None]))[0])
+
     def _stress(self, Fbar: Array) -> Array:
         """P (3, 3, ...) of the user's law at Fbar (3, 3, ...)."""
         if hasattr(self.law, "P"):
@@ -113,7 +118,7 @@ class UserLaw:
         """W(F, theta) (...) at real F; without `psi`, the work of P along a path from rest to Fbar."""
         Fbar = _scaled(F, theta)
         if hasattr(self.law, "psi"):
-            return np.asarray(self.law.psi(embed(Fbar)))
+            return np.asarray(self.law.psi(embed(Fbar))) - self._rest_energy
         return _work(lambda F, _: (self._within(F), np.zeros(())), Fbar, np.zeros(()))
 
     def _within(self, Fbar: Array) -> Array:

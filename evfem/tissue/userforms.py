@@ -25,8 +25,9 @@ from evfem.tissue.assembly import Points, UserIntegral, points_of
 from evfem.tissue.forms import Field, Integrand, Parts, fluxes
 from evfem.tissue.space import Space, jacobians, quadrature, shape_functions
 
-#: cells or facets that a form is tried on, size of the trial's random displacements and gradients
-PLACES, SIZE = 16, 0.1
+#: cells or facets that a form is tried on, and the sizes of the trial's random displacements and gradients
+#: from the first to the last
+PLACES, SIZES = 16, (0.02, 0.4)
 #: relative error of an integrand's linearity in v, and of its derivative by complex step, at most; the step
 #: of differences
 LINEAR, DERIVATIVE, DIFFERENCE = 1e-9, 1e-4, 1e-5
@@ -73,7 +74,8 @@ def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None)
     x, n = _facet_places(mesh, on) if boundary else _cell_places(mesh, on)
     w = SimpleNamespace(x=x, n=n, law=law)
     all_parts = Parts(len(x), value=True, grad=True, theta=not boundary)
-    state, *tests = np.random.default_rng(1).uniform(-SIZE, SIZE, (3, all_parts.size, *x.shape[1:]))
+    size = np.linspace(*SIZES, x.shape[1])[:, None]
+    state, *tests = size * np.random.default_rng(1).uniform(-1.0, 1.0, (3, all_parts.size, *x.shape[1:]))
     used: set[str] = set()
 
     def integrand(stacked: Array, test: Array) -> Array:
@@ -122,7 +124,9 @@ def _derivative(form: Integrand, parts: Parts, state: Array, w: Any) -> Array:
     D = complex_step(lambda x: fluxes(form, parts, x, w), state, rank=1)
     near = difference(lambda x: fluxes(form, parts, x, w), state, DIFFERENCE, rank=1)
     if not np.abs(D - near).max() <= DERIVATIVE * max(np.abs(near).max(), np.abs(D).max()):
-        allowed = "functions of numpy and evfem.tensor that take complex numbers: no abs, float or maximum"
+        allowed = (
+            "functions of numpy and evfem.tensor that take complex numbers: no abs, sign, float or maximum"
+        )
         raise _refused(form, "an integrand whose derivative is lost in a complex step", allowed)
     return D
 

@@ -77,6 +77,11 @@ class SplitShrinking(ev.NeoHookean):
         return S, q - 0.2 * theta
 
 
+def fibres(stretched):
+    """Fibres across the display that resist from a squared stretch of 1.05 on; beyond 2 % of strain alone."""
+    return material(lambda F: psi(F) + 0.025 * stretched(F[0, 1] ** 2 + F[1, 1] ** 2 - 1.05) ** 2)
+
+
 @ev.form
 def prestressed(u, v, w):
     return 0.04 * ddot(grad(u), grad(v)) + (u.theta + 0.01) * v.theta
@@ -91,6 +96,11 @@ MATERIALS = [
     (prestressed, "a stress of 0.01 MPa at rest"),
     (material(lambda F: psi(F) + 0.1 * np.abs(np.log(det(F))) ** 2), f"psi(F) {LOST}"),
     (by_stress(lambda F: stress(F) * np.abs(det(F))), f"P(F) {LOST}"),
+    (
+        fibres(lambda e: 0.5 * (e + np.abs(e))),
+        "psi(F) whose derivative is lost in a complex step at a strain of 9%",
+    ),
+    (fibres(lambda e: 0.5 * (e + e * np.sign(e))), "take complex numbers: no abs, sign, float or maximum"),
     (material(lambda F: psi(np.array(F, dtype=float))), f"psi(F) {LOST}"),
     (material(lambda F: psi(F) + 0.0 * np.floor(F[0, 0])), "psi(F) that raises TypeError on complex numbers"),
     (material(lambda F: math.log(np.linalg.det(F))), "psi(F) that raises LinAlgError"),

@@ -1,6 +1,7 @@
 """`Result.warnings`: what a run shows that its numbers may not be worth."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,6 +116,34 @@ def test_steps_in_time_that_dissipate_by_themselves_are_told():
     (said,) = told(20)
     assert "dissipate" in said
     assert told(2000) == []
+
+
+def folding(F):
+    """Energy that resists below a squared stretch of 0.35 across the display, its derivative lost there."""
+    short = 0.35 - F[0, 1] ** 2 - F[1, 1] ** 2
+    return ev.NeoHookean(E=0.1, nu=0.3).psi(F) + 0.1 * (0.5 * (short + np.abs(short))) ** 2
+
+
+@pytest.mark.parametrize(("depth", "lost"), [(0.2, False), (0.45, True)])
+def test_a_derivative_that_is_lost_deep_in_a_run_is_told(depth, lost):
+    """No strain that is tried before the run is so short."""
+    own = SimpleNamespace(psi=folding)
+    body = ev.MeshedFinger(block(4, 4, width=2.0, height=1.0), {"tissue": own})
+    motion = ev.Press(indentation=depth, steps=4)
+    result = ev.simulate(ev.Scene(body, ev.Flat(friction=0.0), motion=motion))
+    assert any("loses its derivative in a complex step" in said for said in result.warnings) is lost
+
+
+def test_a_constant_in_an_energy_is_no_energy_from_nowhere():
+    plain = SimpleNamespace(psi=lambda F: ev.NeoHookean(E=0.1, nu=0.3).psi(F))
+    own = SimpleNamespace(psi=lambda F: plain.psi(F) + 5.0)
+    motion = ev.Press(indentation=0.1, steps=2)
+    found = []
+    for law in (own, plain):
+        body = ev.MeshedFinger(block(4, 4, width=2.0, height=1.0), {"tissue": law})
+        found.append(ev.simulate(ev.Scene(body, ev.Flat(friction=0.0), motion=motion)))
+    assert found[0].warnings == []
+    np.testing.assert_allclose(found[0].stored_energy, found[1].stored_energy, rtol=1e-9)
 
 
 def test_a_snap_is_told_with_its_share():
