@@ -48,7 +48,7 @@ ROOMS = {
         {"numpy", "scipy"},
         "ways friction adhesion patches elastic surfaces relief textures usersurface pad skin",
     ),
-    "contact": ({"numpy", "scipy"}, "below signorini solve follower condensed stability"),
+    "contact": ({"numpy", "scipy"}, "below byforce signorini solve follower condensed stability"),
     "terms": (
         {"numpy", "scipy"},
         "traction tractions charging attraction chargebooks fullfield drivenfield foundation slipping "

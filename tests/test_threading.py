@@ -20,7 +20,7 @@ FILES = {
     "adhesion": 4,
     "charges, drive, leakage": 5,
     "viscosity, inertia, branches": 15,
-    "roughness": 8,
+    "roughness": 0,
 }
 #: lines of heart and `response` that ask whether one of `ASKED` is None
 NONES = 0

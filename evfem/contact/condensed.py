@@ -219,22 +219,18 @@ class LinearContactStep:
         if (settle := contact_loop()) is None or active.sum() > LARGE_SYSTEM:
             return None
         known, c, p = self.candidates, len(active), len(self.unknowns)
-        none, rough = np.zeros((c, 2)), known.roughness
+        none = np.zeros(c)
         columns = (
             known.surface.normal_gap,
             known.slip,
             known.friction,
-            none[:, 0] if known.cohesion is None else known.cohesion,
+            none if known.cohesion is None else known.cohesion,
             known.interface_compliance,
             known.surface.axes[:, :, ::-1].reshape(c, -1),
             known.follower_rate(self._own)[:, ::-1, 0],
             known.negative_stiffness,
             known.gain_on_closing,
-            *(
-                (none, none, none[:, 0])
-                if rough is None
-                else (rough.gain, rough.loss_on_opening, rough.present)
-            ),
+            *known.by_force.columns(c),
             -ROUNDING * (1.0 + np.abs(known.surface.gap)),
         )
         equations = np.column_stack(self._far_balance(body_motion)) if p else np.zeros((0, 2 * c + 2))
@@ -247,7 +243,7 @@ class LinearContactStep:
             marks,
             found,
         )
-        solves = settle(c, p, rough is not None, self.tolerance, STABLE, DISC_OWN, arrays)
+        solves = settle(c, p, known.by_force.acts, self.tolerance, STABLE, DISC_OWN, arrays)
         moved, whole, acts, extra = np.split(found, [2 * c, 4 * c, 8 * c])
         status = marks[0].astype(np.int64)
         return None if solves < 0 else (moved, whole, acts.reshape(c, 4)[:, :2], status, extra, solves, False)
@@ -307,7 +303,7 @@ class LinearContactStep:
         W[:, 0] -= C @ present  # the unknowns are whole forces again, not increments
         problem = self._problem(known, (C, W), self._bone_balance(rows, body_motion, (C, W), follower))
         attraction = AttractionStiffness(
-            known.negative_stiffness, known.surface.normal_gap, known.gain_on_closing, known.roughness
+            known.negative_stiffness, known.surface.normal_gap, known.gain_on_closing, known.by_force
         )
         touching = np.where((status != OPEN)[:, None], known.force, 0.0).ravel()
         try:

@@ -18,7 +18,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import STABLE
-from evfem.contact.signorini import SLIP, Roughness, side
+from evfem.contact.byforce import OF_GAP_ALONE, OfGapAlone
+from evfem.contact.signorini import SLIP, side
 from evfem.surface.pad import SurfaceState
 
 
@@ -42,7 +43,7 @@ class Candidates:
     negative_stiffness: Floats
     gain_on_closing: Floats
     friction_slope: Floats
-    roughness: Roughness | None = None
+    by_force: OfGapAlone = OF_GAP_ALONE
     cohesion: Floats | None = None
     slip_stiffness: Floats | None = None
 

@@ -24,8 +24,8 @@ for any positive r; here the inverse of the node's own compliance, bounded by a 
 nodes where it vanishes or is negative.
 
 The attraction of an open node decreases with its gap, a negative stiffness k_e: the loss of attraction is one
-more unknown, f = k_e (g - g_ref). A closed node needs none, as its gap is known. Between rough faces the
-attraction also grows with the contact force (`Roughness`): a closed node loads the body with
+more unknown, f = k_e (g - g_ref). A closed node needs none, as its gap is known. An attraction may
+also grow with the contact force (`evfem.contact.byforce`): a closed node then loads the body with
 (1 - kappa) lam_n, and one that opens loses the gain by its contact force.
 
 A bound of friction that is not proportional to the contact force (`evfem.surface.friction`) is linearised:
@@ -46,21 +46,7 @@ import numpy as np
 
 from evfem.common.arrays import DenseSolver, Floats, Ints
 from evfem.common.constants import BLOCK, DISC_OWN, ROUNDING
-
-
-@dataclass(frozen=True)
-class Roughness:
-    """Attraction between rough faces, along normal and tangent: increased by `gain` (k, 1 + d) times the
-    contact force beyond `present` (k,), reduced by `loss_on_opening` (k, 1 + d) N/mm where open.
-    """
-
-    gain: Floats
-    loss_on_opening: Floats
-    present: Floats
-
-    def __getitem__(self, nodes: Ints) -> Roughness:
-        """The same of these nodes alone."""
-        return Roughness(self.gain[nodes], self.loss_on_opening[nodes], self.present[nodes])
+from evfem.contact.byforce import OF_GAP_ALONE, OfGapAlone
 
 
 @dataclass(frozen=True)
@@ -72,7 +58,7 @@ class AttractionStiffness:
     negative_stiffness: Floats
     reference_gap: Floats
     gain_on_closing: Floats
-    roughness: Roughness | None = None
+    by_force: OfGapAlone = OF_GAP_ALONE
 
 
 #: of a node; `FORWARD` or `BACKWARD` in the plane where it slips, `SLIP` in three dimensions
@@ -176,8 +162,8 @@ class ContactProblem:
     @property
     def resists(self) -> Any:
         """Nodes with friction, (k,) bool."""
-        rough = self.friction > 0.0
-        return rough if self.cohesion is None else rough | (self.cohesion > 0.0)
+        rubs = self.friction > 0.0
+        return rubs if self.cohesion is None else rubs | (self.cohesion > 0.0)
 
     def limit(self, normal: Floats) -> Floats:
         """Largest shear force (k,) under pressing forces (k,)."""
@@ -286,11 +272,8 @@ class _Equations:
         if (attraction := problem.attraction) is not None:
             attracted = np.flatnonzero(opened[:, 0] & (attraction.negative_stiffness > 0.0))
             self.attraction_loss[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
-            if (rough := attraction.roughness) is not None:
-                self.gain = rough.gain
-                self.attraction_loss += np.where(
-                    opened, rough.loss_on_opening, rough.gain * rough.present[:, None]
-                )
+            self.gain = self.gain + attraction.by_force.gain
+            self.attraction_loss += attraction.by_force.loss(opened)
         turned = np.flatnonzero((status == SLIP) & resists & (turning is not None))
         m = np.ones(status.size) if turning is None else turning
         self.attracted, self.turned, self.closed = attracted, turned, np.flatnonzero(status != OPEN)

@@ -126,7 +126,7 @@ def solve_with_attraction(
     then by secants: the tangent of a law that levels off soon may be too steep.
     """
     laws = (problem,) if problem.secants is None else (problem, problem.with_secants)
-    if not attraction.negative_stiffness.any() and attraction.roughness is None:
+    if not attraction.negative_stiffness.any() and not attraction.by_force.acts:
         return _first(laws, status, force)
     root, n = np.sqrt(attraction.negative_stiffness), problem.dim
     gain = root[:, None] * problem.compliance[::n, ::n] * root

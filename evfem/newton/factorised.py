@@ -222,9 +222,8 @@ class FactorisedBody:
         """The linear contact problem at an iterate."""
         linearisation, tangent = self.linearisation, self.linearisation.tangent
         weakening, gain = linearisation.weakening(state), linearisation.gain_on_closing(state)
-        c, rough = linearisation.candidates, linearisation.roughness(state)
-        known = self.interface.candidates(old, state, c, weakening, gain)
-        known = known if rough is None else replace(known, roughness=rough[c])
+        known = self.interface.candidates(old, state, c := linearisation.candidates, weakening, gain)
+        known = replace(known, by_force=linearisation.by_force(state)[c])
         # inexact where contact takes many solves: a fraction of the residual
         inner = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
         return LinearContactStep(

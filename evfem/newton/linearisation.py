@@ -22,8 +22,9 @@ import numpy as np
 
 from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
+from evfem.contact.byforce import OF_GAP_ALONE, OfGapAlone
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
-from evfem.contact.signorini import OPEN, STICK, Roughness
+from evfem.contact.signorini import OPEN, STICK
 from evfem.newton.condensation import Singular, make_condensation
 from evfem.newton.interface import Interface
 from evfem.newton.state import NOTHING, Beginning, Limits, Record, State, StepFailed, TangentPoint
@@ -42,20 +43,6 @@ def no_progress(residuals: list[float], same: bool) -> bool:
     if same and len(residuals) > 2 and min(residuals[-2:]) > residuals[-3]:
         return True
     return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
-
-
-def limited_gain(gain: Floats) -> Floats:
-    """Gains of the attraction per contact force (P,), limited for the tangent.
-
-    At a gain of 1 the node's equilibrium has a fold; above, the force grows by itself until the rough faces
-    are close. Iterations shall leave such a point, and converge to one with a gain below 1 by its exact
-    tangent: above `STABLE` the tangent has abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
-
-    >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
-    [0.5, 0.95, 0.99, 0.95, 0.9]
-    """
-    left = np.clip(np.abs(1.0 - gain), constants.LEFT_OVER, 1.0 - constants.STABLE)
-    return np.where(gain > constants.STABLE, 1.0 - left, gain)
 
 
 class Linearisation:
@@ -246,28 +233,10 @@ class Linearisation:
         pull, closed = (attraction.column_law.forces(pad)[:, 1] for pad in (now, everywhere))
         return np.asarray(attraction.tangent_factor(now) * np.maximum(pull - closed, 0.0))
 
-    def roughness(self, state: State) -> Roughness | None:
-        """Derivatives of the attraction of every pad node by its contact force, along normal and tangent,
-        where contact pressure closes the roughness gap; None for smooth faces.
-        """
+    def by_force(self, state: State) -> OfGapAlone:
+        """How the attraction of every pad node depends on its contact force."""
         attraction = self.attraction
-        if not (attraction.rough and attraction.acts(state.voltage)):
-            return None
-        pad, pressing = self.pad_state(state), state.contact_force[:, 0]
-        unpressed, pressed = (
-            attraction.column_law.forces(one)[:, 1] for one in (replace(pad, pressing=None), pad)
-        )
-        lost = attraction.tangent_factor(pad) * (unpressed - pressed)
-        surface = self.interface.surface_at(state)
-        along = surface.axes[:, :, 0]  # of a pull straight down
-        if attraction.direction == "normal":
-            along = np.zeros_like(state.contact_force)
-            along[:, 0] = surface.stretch
-        gain = attraction.gain_on_pressing(pad)[:, None] * along
-        # the full tangential gain could close a node on a slope by more than the limited normal gain holds
-        gain[:, 1:] = np.where(gain[:, :1] > constants.STABLE, 0.0, gain[:, 1:])
-        gain[:, 0] = limited_gain(gain[:, 0])
-        return Roughness(gain, lost[:, None] * along, pressing)
+        return attraction.by_force(self.pad_state(state)) if attraction.acts(state.voltage) else OF_GAP_ALONE
 
     def _coupling(self, state: State) -> Floats | None:
         """Off-diagonal stiffness of the attraction between neighbouring candidates, from the change of

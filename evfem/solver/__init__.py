@@ -92,7 +92,7 @@ safeguard                              scenes  without it
 slope of friction in the compliance    8       iterations x12.6, factorisations x51
 turning contact forces (`follower`)    23      iterations x2.2, factorisations x4.6
 softening scaled below critical        8       iterations x1.9, factorisations x3.8
-gain between rough faces limited       49      4 scenes do not end (`linearisation.limited_gain`)
+gain between rough faces limited       49      4 scenes do not end (`traction.limited_gain`)
 bracketed friction (`terms.slipping`)  12      iterations x1.2, factorisations x1.5
 pins at jumps of friction              1       1 scene does not end (`interface.FrictionJumps`)
 release (`relaxation`)                 2       1 scene does not end

@@ -72,10 +72,6 @@ class Attraction(PadTraction):
     label: str = field(default="attraction", kw_only=True)
 
     @property
-    def rough(self) -> bool:  # type: ignore[override]
-        return self.roughness is not None
-
-    @property
     def flows(self) -> bool:  # type: ignore[override]
         return bool(self.charging.flows)
 

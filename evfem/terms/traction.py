@@ -18,8 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import LEFT_OVER, STABLE
 from evfem.common.quadrature import FINE_SHARE, FINE_WAY, LEGENDRE, SEEN, SHARE, WAY
 from evfem.common.rooms import Column, Room
+from evfem.contact.byforce import OF_GAP_ALONE, ByForce, OfGapAlone
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 
@@ -164,6 +166,20 @@ def force_columns(name: str, label: str, dim: int = 3) -> tuple[Column, ...]:
     return force, *along, Column(f"{name}_work", "N", f"done by {label}")
 
 
+def limited_gain(gain: Floats) -> Floats:
+    """Gains of the attraction per contact force (P,), limited for the tangent.
+
+    At a gain of 1 the node's equilibrium has a fold; above, the force grows by itself until rough faces,
+    say, are close. Iterations shall leave such a point, and converge to one with a gain below 1 by its exact
+    tangent: above `STABLE` the tangent has abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
+
+    >>> limited_gain(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
+    [0.5, 0.95, 0.99, 0.95, 0.9]
+    """
+    left = np.clip(np.abs(1.0 - gain), LEFT_OVER, 1.0 - STABLE)
+    return np.where(gain > STABLE, 1.0 - left, gain)
+
+
 class PadTraction(Room):
     """Forces on the pad's nodes that depend on their positions; here none.
 
@@ -182,8 +198,6 @@ class PadTraction(Room):
     #: whether `work` is known from an energy; whether forces are more than those of columns; what rounding
     #: does to them, as a fraction of the largest nodal one; whether charge flows in a step
     has_energy, has_fringes, rounding, flows = False, False, 0.0, False
-    #: whether rough faces come closer under contact forces
-    rough = False
 
     @property
     def parts(self) -> tuple[Any, ...]:
@@ -243,6 +257,24 @@ class PadTraction(Room):
     def gain_on_pressing(self, pad: PadState) -> Floats:
         """Growth of a node's pull per contact force (P,)."""
         return np.zeros(len(pad.position))
+
+    def by_force(self, pad: PadState) -> OfGapAlone:
+        """How the forces depend on the contact forces, along the axes of the surface."""
+        gain, law, surface = self.gain_on_pressing(pad), self.column_law, pad.below
+        if not gain.any():
+            return OF_GAP_ALONE
+        assert surface is not None
+        without, now = (law.forces(one)[:, 1] for one in (replace(pad, pressing=None), pad))
+        lost = self.tangent_factor(pad) * (without - now)
+        along = surface.axes[:, :, 0]  # of a pull straight down
+        if self.direction == "normal":
+            along = np.zeros_like(along)
+            along[:, 0] = surface.stretch
+        by_axis = gain[:, None] * along
+        # the full tangential gain could close a node on a slope by more than the limited normal gain holds
+        by_axis[:, 1:] = np.where(by_axis[:, :1] > STABLE, 0.0, by_axis[:, 1:])
+        by_axis[:, 0] = limited_gain(by_axis[:, 0])
+        return ByForce(by_axis, lost[:, None] * along, pad.pressed)
 
     def stiffness(self, pad: PadState) -> Entries:
         """Derivative of `forces` by node positions (dim P, dim P), ordered (node, component)."""

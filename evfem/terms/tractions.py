@@ -72,7 +72,6 @@ class Tractions(PadTraction):
     def __init__(self, parts: Sequence[Any]) -> None:
         self._parts = tuple(parts)
         self.always = any(part.always for part in parts)
-        self.rough = any(part.rough for part in parts)
         self.flows = any(part.flows for part in parts)
         self.direction = parts[0].direction
 

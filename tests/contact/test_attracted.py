@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evfem.contact.byforce import ByForce
 from evfem.contact.signorini import (
     FORWARD,
     OPEN,
@@ -14,7 +15,6 @@ from evfem.contact.signorini import (
     AttractionStiffness,
     ContactProblem,
     ExtraUnknowns,
-    Roughness,
 )
 from evfem.contact.solve import solve_with_attraction
 
@@ -119,7 +119,7 @@ def rough_node(gap, gain, loss=0.0, aside=(0.0, 0.0)):
     """
     problem = ContactProblem(np.array([gap, 0.02]), 0.1 * np.eye(2), np.array([0.5]))
     gains, losses = np.array([[gain, aside[0]]]), np.array([[loss, aside[1]]])
-    rough = Roughness(gains, losses, np.array([2.0]))
+    rough = ByForce(gains, losses, np.array([2.0]))
     return problem, AttractionStiffness(np.zeros(1), np.zeros(1), np.array([2.0 * gain]), rough)
 
 

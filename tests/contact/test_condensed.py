@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from evfem.contact import condensed
+from evfem.contact.byforce import ByForce
 from evfem.contact.condensed import (
     Candidates,
     CondensedTangent,
@@ -18,7 +19,6 @@ from evfem.contact.signorini import (
     OPEN,
     STICK,
     ContactNotSolved,
-    Roughness,
     Unstable,
 )
 from evfem.surface.pad import SurfaceState
@@ -288,7 +288,7 @@ def test_a_body_that_nothing_holds_falls_under_its_load_whatever_the_rounding(ro
 
 def rough(rng):
     """Gains, losses and present forces of the attraction between rough faces."""
-    return Roughness(rng.uniform(0.0, 0.4, (K, 2)), rng.uniform(0.0, 0.1, (K, 2)), rng.uniform(1.0, 2.0, K))
+    return ByForce(rng.uniform(0.0, 0.4, (K, 2)), rng.uniform(0.0, 0.1, (K, 2)), rng.uniform(1.0, 2.0, K))
 
 
 #: what may act on the candidates, random numbers of it
@@ -298,7 +298,7 @@ ACTS = {
         "negative_stiffness": rng.uniform(0.0, [0.5, 0.5, 0.5, 0.5, 9.0]),  # an open node may snap
         "gain_on_closing": rng.uniform(0.0, 1.0, K),
     },
-    "rough faces": lambda rng: {"negative_stiffness": rng.uniform(0.0, 0.5, K), "roughness": rough(rng)},
+    "rough faces": lambda rng: {"negative_stiffness": rng.uniform(0.0, 0.5, K), "by_force": rough(rng)},
     "cohesion": lambda rng: {
         "cohesion": rng.uniform(0.0, 0.5, K),
         "slip_stiffness": rng.uniform(0.0, 0.5, K),

@@ -97,7 +97,7 @@ def test_what_a_summit_gains_on_closing_and_loses_on_opening_is_the_fields():
     field, columns = model.attraction.forces, model.attraction.column_law.forces
     for start, end, known in (
         (state, closed, linear.gain_on_closing(state)[summit]),
-        (closed, pressed, linear.roughness(pressed).loss_on_opening[summit, 0]),
+        (closed, pressed, linear.by_force(pressed).on_opening[summit, 0]),
     ):
         true, wrong = (pulled(by, start) - pulled(by, end) for by in (field, columns))
         assert true > 0.0

@@ -18,6 +18,7 @@ from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.surface.surfaces import Display, Sinusoid
+from evfem.terms.traction import PadTraction
 
 #: voltages that no insulator stands, to see far attractions from near
 pytestmark = pytest.mark.filterwarnings("ignore:.* V make a field")
@@ -149,14 +150,39 @@ def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_a
         along_normal, along_tangent = y - slope * x, x + slope * y
         return np.stack([along_normal, along_tangent], axis=1) / surface.stretch[:, None]
 
-    found, h = linear.roughness(state), 1e-6
+    found, h = linear.by_force(state), 1e-6
     assert np.abs(slope).max() > 0.1
     gain = -(pull(pressing + h) - pull(pressing - h)) / (2.0 * h)
     np.testing.assert_allclose(found.gain, gain, atol=neighbours * gain.max())
     loss = pull(0.0 * pressing) - pull(pressing)
-    np.testing.assert_allclose(found.loss_on_opening, loss, atol=neighbours * loss.max())
+    np.testing.assert_allclose(found.on_opening, loss, atol=neighbours * loss.max())
     np.testing.assert_array_equal(found.present, pressing)
     assert 0.01 < found.gain.max() < STABLE
+
+
+class Suction(PadTraction):
+    """Pulls with a share of what presses."""
+
+    name, share = "suction", 0.3
+
+    def forces(self, pad):
+        found = np.zeros_like(pad.position)
+        found[:, 1] = -self.share * pad.pressed
+        return found
+
+    def gain_on_pressing(self, pad):
+        return np.full(len(pad.position), self.share)
+
+
+def test_contact_knows_of_a_pull_by_contact_forces_whatever_it_comes_from():
+    """Of a room of one's own on a flat surface: 0.3 of the normal force, all of it lost as the node opens."""
+    linear, _, state = made(rooms=[Suction()])
+    pressing = 0.002 + 0.001 * np.arange(state.status.size)
+    force = np.column_stack([pressing, np.zeros_like(pressing)])
+    found = linear.by_force(replace(state, status=np.full_like(state.status, STICK), contact_force=force))
+    assert found.acts
+    np.testing.assert_allclose(found.gain, [[0.3, 0.0]] * pressing.size, rtol=1e-12)
+    np.testing.assert_allclose(found.on_opening, 0.3 * force, rtol=1e-12)
 
 
 def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_it():
@@ -169,7 +195,7 @@ def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_i
     state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
     slope = linear.interface.surface_at(state).slope[:, 0]
     whole = linear.attraction.gain_on_pressing(linear.pad_state(state))
-    normal, tangent = linear.roughness(state).gain.T
+    normal, tangent = linear.by_force(state).gain.T
     folded = whole > STABLE * np.hypot(1.0, slope)
     assert folded.any()
     assert (slope[folded] != 0.0).all()

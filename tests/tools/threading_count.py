@@ -67,7 +67,7 @@ CAPABILITIES = (
         |Closing\.core""",
         own="planning/core",
     ),
-    capability("roughness", r"rough|gain_on_pressing|loss_on_opening|separation|limited_gain"),
+    capability("roughness", r"(?<!th)rough|gain_on_pressing|loss_on_opening|separation|limited_gain"),
     capability("adhesion", r"adhes|adher|came_off|\bON\b|self\.let_go|ledger\.let_go|self\.pull\b"),
     capability(
         "elastic surface",
