@@ -51,8 +51,8 @@ ROOMS = {
     "contact": ({"numpy", "scipy"}, "below byforce signorini solve follower condensed stability"),
     "terms": (
         {"numpy", "scipy"},
-        "traction tractions charging attraction chargebooks fullfield drivenfield foundation slipping "
-        "friction hand sources",
+        "traction tractions charging attraction fullfield drivenfield foundation slipping "
+        "friction hand sources columns",
     ),
     "newton": (
         {"numpy", "scipy"},

@@ -1,13 +1,10 @@
-"""The surface below the candidates of a linear contact step: rigid, or a compliance in series."""
+"""The foundation below the candidates of a linear contact step: rigid here, else a compliance in series."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from evfem.common.arrays import Floats, Ints, block
+from evfem.common.arrays import Floats, Ints
 
 
 class RigidBelow:
@@ -31,26 +28,3 @@ class RigidBelow:
 
 
 RIGID_BELOW = RigidBelow()
-
-
-@dataclass(frozen=True, eq=False)
-class BelowCandidates(RigidBelow):
-    """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
-    its increment without contact forces towards its displacement under the present attraction, `pulled`
-    (2 c,) in mm.
-    """
-
-    compliance: Floats
-    pulled: Floats
-
-    def relative(self, compliance: Floats) -> Floats:
-        return compliance + self.compliance
-
-    def among(self, among: Floats, rows: Ints) -> Floats:
-        return among + block(self.compliance, rows, rows)
-
-    def unloaded(self, free: Floats) -> Floats:
-        return free + np.pad(self.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
-
-    def displacement(self, whole: Floats) -> Any:
-        return self.pulled + self.compliance @ whole

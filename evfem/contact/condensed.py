@@ -54,7 +54,7 @@ ContactOfCandidates = tuple[Floats, Floats, Floats, Ints, Floats, int, bool]
 @dataclass(frozen=True, eq=False)
 class StepSolution:
     """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns; the
-    increment of the `surface_displacement` of an elastic surface (dim c,), 0 of a rigid one.
+    increment of the displacement of the `foundation` (dim c,), 0 of a rigid one.
     """
 
     moved: Floats
@@ -63,7 +63,7 @@ class StepSolution:
     extra: Floats
     solves: int
     reduced: bool
-    surface_displacement: Any = 0.0
+    foundation: Any = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,18 +145,18 @@ class LinearContactStep:
     residual: Floats
     bone: Floats
     unknowns: tuple[ExtraUnknown, ...] = ()
-    bed: RigidBelow = RIGID_BELOW
+    below: RigidBelow = RIGID_BELOW
     tolerance: float = ROUNDING
 
     @cached_property
     def relative_compliance(self) -> Floats:
         """Compliance of the candidates' positions relative to the surface."""
-        return self.bed.relative(self.body.compliance)
+        return self.below.relative(self.body.compliance)
 
     def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
         body_motion = self._free_motion()
-        unloaded_motion = self.bed.unloaded(body_motion)
+        unloaded_motion = self.below.unloaded(body_motion)
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(
@@ -176,10 +176,8 @@ class LinearContactStep:
         horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
-        surface_displacement = self.bed.displacement(whole)
-        return StepSolution(
-            moved - surface_displacement, force, status, extra, solves, reduced, surface_displacement
-        )
+        foundation = self.below.displacement(whole)
+        return StepSolution(moved - foundation, force, status, extra, solves, reduced, foundation)
 
     def _settled(self, active: Any, unloaded_motion: Floats, body_motion: Floats) -> ContactOfCandidates:
         """Contact of the `active` nodes (c,) bool, to which penetrating ones are added until none is left."""
@@ -250,7 +248,7 @@ class LinearContactStep:
 
     def among(self, nodes: Ints) -> Floats:
         """`relative_compliance` among these candidates, in the order of `CondensedTangent.rows`."""
-        return self.bed.among(self.body.among(nodes), self.body.rows(nodes))
+        return self.below.among(self.body.among(nodes), self.body.rows(nodes))
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
         """Force residual (N/mm) of the bone along the first unknown's axis for a prescribed `travel`."""

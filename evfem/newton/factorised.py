@@ -117,7 +117,7 @@ class FactorisedBody:
         forces = self.body.reduce(nodal)
         state = replace(state, attraction=attraction, reaction=forces[self.body.bone])
         largest = lambda other: self._largest(state, target, other)  # noqa: E731
-        missed = self.interface.bed.missed(self.interface.positions(state.u), state, pad)
+        missed = self.interface.foundation.missed(self.interface.positions(state.u), state, pad)
         residual = max(largest(forces), missed)
         mixed = self.pressure.balance(state, Unbalanced(forces, residual, largest, self.body.reduce))
         return state, Balance(forces, residual, attraction, mixed)
@@ -232,7 +232,7 @@ class FactorisedBody:
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
             unknowns=target.unknowns(tangent, state.bone),
-            bed=self.interface.bed.of(self.interface.positions(state.u), state, c),
+            below=self.interface.foundation.of(self.interface.positions(state.u), state, c),
             tolerance=max(constants.ROUNDING, inner),
         )
 
@@ -278,12 +278,12 @@ class FactorisedBody:
             bone=target.bone(state.bone) if whole else state.bone + fraction * update.bone,
             voltage=voltage,
         )
-        # below the candidates an elastic surface moves as the linear step found, which includes the change
+        # below the candidates the foundation moves as the linear step found, which includes the change
         # of the attraction
         push = lambda: self.interface.contact_forces(replace(after, u=state.u)) + state.attraction  # noqa: E731
-        found = c, update.contact.surface_displacement, fraction
+        found = c, update.contact.foundation, fraction
         return after.remembering(
-            self.interface.bed.sunk(self.interface.positions(state.u), state, push, found)
+            self.interface.foundation.sunk(self.interface.positions(state.u), state, push, found)
         )
 
     def _largest_fraction(self, u: Floats, delta: Floats) -> float:

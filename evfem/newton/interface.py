@@ -7,8 +7,8 @@ along the surface's normal and tangents at the node's position (`evfem.surface.p
 counted along the tangents, in the plane :math:`r\,\Delta x` with the profile's stretch r, from the last
 accepted position, or from the discontinuity of friction at which the node is pinned (`FrictionJumps`). With
 penalties the interface has a compliance, g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t A) = 0
-instead of g = 0 and s = 0. General friction laws and elastic foundations enter through `bounds`
-(`evfem.terms.friction`) and `bed` (`evfem.terms.foundation`).
+instead of g = 0 and s = 0. They enter through `faces`, general friction laws through `bounds`
+(`evfem.terms.friction`), what is below the faces through `foundation` (`evfem.terms.foundation`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from evfem.surface.friction import with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
 from evfem.surface.ways import Steps
-from evfem.terms.foundation import bed_of, in_laboratory
+from evfem.terms.foundation import Exact, Rigid, in_laboratory
 from evfem.terms.friction import ProportionalFriction
 from evfem.terms.traction import PadState
 
@@ -97,9 +97,9 @@ class FrictionJumps:
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
         """Unpins nodes whose shear force is below the lower `limit` (P,); returns whether there were any."""
-        return self.let_go(self.held & (np.abs(shear) < limit - weak))
+        return self.unpin(self.held & (np.abs(shear) < limit - weak))
 
-    def let_go(self, loose: Any) -> bool:
+    def unpin(self, loose: Any) -> bool:
         """Unpins these nodes (P,) bool for the rest of the step; returns whether there were any."""
         self.place[loose] = np.nan
         self._released |= loose
@@ -129,9 +129,9 @@ class Interface:
         self.jumps = FrictionJumps(
             surface.friction_steps(constants.SHORT_RAMP * self.length), self.points[:, ::2]
         )
-        self._least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
-        self.bed: Any = bed_of(surface, pad, self.points, self.length, self._least)
-        self.bounds = ProportionalFriction()
+        self.least = (constants.SHORTEST_LENGTH * self.length) ** (self.dim - 1)
+        self.bounds, self.faces = ProportionalFriction(), Exact()
+        self.foundation: Any = Rigid()
         self.duration = 0.0
         self.neighbourhood = constants.NEIGHBOURS * self.length
 
@@ -142,8 +142,8 @@ class Interface:
 
     @property
     def rooms(self) -> tuple[Room, ...]:
-        """Bounds of friction, and the elastic foundation."""
-        return self.bounds, self.bed
+        """Bounds of friction, the faces in contact, and the foundation below them."""
+        return self.bounds, self.faces, self.foundation
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, dim) for displacements u (N, dim)."""
@@ -151,7 +151,7 @@ class Interface:
 
     def places(self, state: State) -> Floats:
         """Relative positions r of the pad nodes (P, dim), as above a rigid surface."""
-        return self.bed.places(self.positions(state.u), state)
+        return self.foundation.places(self.positions(state.u), state)
 
     def on_display(self, state: State) -> Floats:
         """x of `places` (P, 1), in space x and z (P, 2)."""
@@ -159,17 +159,13 @@ class Interface:
 
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, cached for the last two states."""
-        sunk = self.bed.displacement(state)
+        sunk = self.foundation.displacement(state)
         for u, before, found in self._surfaces:
             if u is state.u and before is sunk:
                 return found
-        found = self.bed.sloped(surface_state(self.surface, self.places(state)), state)
+        found = self.foundation.sloped(surface_state(self.surface, self.places(state)), state)
         self._surfaces = ((state.u, sunk, found), *self._surfaces[:1])
         return found
-
-    def tilted(self, state: State, force: Floats) -> Floats:
-        """Attraction (P, dim) above the surface of `state`, along the normal of what it has sunk."""
-        return self.bed.tilted(state, force)
 
     def resting(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""
@@ -238,7 +234,7 @@ class Interface:
 
     def tributary_of(self, position: Floats) -> Floats:
         """Tributary lengths (P,) in mm, in space areas in mm2, of nodes at positions (P, dim); above 0."""
-        return np.maximum(self.pad.tributary(position), self._least)
+        return np.maximum(self.pad.tributary(position), self.least)
 
     def tributary(self, state: State) -> Floats:
         """Tributary lengths or areas (P,) in a state."""
@@ -264,8 +260,8 @@ class Interface:
         return self.bounds.bound(self, old, state, nodes, mu, slip)
 
     def compliance(self, old: State) -> Floats:
-        """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
-        return np.zeros_like(old.contact_force)
+        """Compliance of the faces (P, dim), normal and tangent, in mm per N/mm."""
+        return self.faces.compliance(old)
 
     def friction(self, old: State, nodes: Ints, position: Floats) -> Floats:
         """Friction coefficient of these pad nodes (k,) at the positions (k, d) in mm after the state `old`,
@@ -309,7 +305,7 @@ class Interface:
         lower = self._bound(old, state, every, self.jumps.lower, resting)
         if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
-        if self.jumps.let_go(self._strayed(old, state, position)):
+        if self.jumps.unpin(self._strayed(old, state, position)):
             return False
         normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         compliance = self.compliance(old)[active]
@@ -326,16 +322,6 @@ class Interface:
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & np.where(status == STICK, sticks, slips)).all())
-
-
-class PenaltyInterface(Interface):
-    """Penalty contact: compliance 1 / (penalty x tributary length) per node; N/mm3, normal and tangent."""
-
-    penalties: tuple[float, float] = (np.inf, np.inf)
-
-    def compliance(self, old: State) -> Floats:
-        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
-        return 1.0 / np.outer(self.tributary(old), self.penalties)
 
 
 def slipped(interface: Interface, old: State, new: State) -> Floats:

@@ -273,7 +273,7 @@ class Line:
 
     def _surface_by_parameter(self, substep: Accepted, equations: list[Equations]) -> list[Any]:
         """Derivatives of the surface displacement by the parameter at fixed state, none of a rigid one."""
-        if not self.centre.run.model.equilibrium.interface.bed.yields:
+        if not self.centre.run.model.equilibrium.interface.foundation.yields:
             return []
         found = zip(*(one.surface_displacement(substep.new) for one in equations), strict=True)
         return [difference(each, self.step) for each in found]

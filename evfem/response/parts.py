@@ -62,7 +62,7 @@ class Equations:
         (`evfem.terms.foundation`).
         """
         force = self.interface.contact_forces(state) + self._attracted(state).attraction
-        below = self.interface.bed.under(self.interface.positions(state.u), state)
+        below = self.interface.foundation.under(self.interface.positions(state.u), state)
         return below.given(force), below.change(force)
 
     def accepted_state(self, state: State) -> State:

@@ -62,15 +62,15 @@ class Tangent:
         below[closed] = kept.size + np.arange(closed.size)
         _add(matrix, self._pad_forces(), number, number)
         _add(matrix, self._contact_rows(), below, number)
-        if self.equations.interface.bed.yields:
-            self._add_bed(matrix, number)
+        if self.equations.interface.foundation.yields:
+            self._add_foundation(matrix, number)
         matrix[: kept.size, : kept.size] += self.factor.schur
         for axis in range(self.state.bone.size):
             row = kept.size - self.state.bone.size + axis
             matrix[row] = self._bone_row(matrix[row], row, axis)
         return matrix
 
-    def _add_bed(self, matrix: Floats, number: Ints) -> None:
+    def _add_foundation(self, matrix: Floats, number: Ints) -> None:
         """Add what an elastic surface gives way by, under the forces on the pad, to a matrix of the balance
         and of contact by these places.
         """
@@ -78,7 +78,7 @@ class Tangent:
         near = np.flatnonzero((number[moves] >= 0).all(axis=1))
         moved = number[moves[near]].ravel()
         interface = self.equations.interface
-        below = interface.bed.under(interface.positions(self.state.u), self.state)
+        below = interface.foundation.under(interface.positions(self.state.u), self.state)
         moved_surface = below.among(near) @ -matrix[moved]
         matrix += matrix[:, moved] @ np.linalg.solve(
             np.eye(moved.size) - moved_surface[:, moved], moved_surface

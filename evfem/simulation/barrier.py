@@ -46,10 +46,9 @@ def rise(substep: SubstepWork, target: Target) -> float:
     """
     body, old, new = substep.model.body, substep.old, substep.new
     increment = new.u - old.u
-    springs = [float(0.5 * np.sum(substep.compliance * state.contact_force**2)) for state in (old, new)]
-    stored = body.energies(old.u, increment, SAMPLES) + springs[0] + (springs[1] - springs[0]) * SAMPLES**2
-    before, between, after = substep.foundation_energies
-    stored = stored + (1.0 - SAMPLES) ** 2 * before + (1.0 - SAMPLES) * SAMPLES * between + SAMPLES**2 * after
+    stored = body.energies(old.u, increment, SAMPLES)
+    rooms = substep.model.equilibrium.interface.rooms
+    ends = [stored[i] + sum(room.stored(state) for room in rooms) for i, state in ((0, old), (-1, new))]
     carried = _moved_with_bone(substep, target)
     load_work = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
     load_work = load_work - float(np.sum(body.given_forces(new.u) * increment))
@@ -62,7 +61,7 @@ def rise(substep: SubstepWork, target: Target) -> float:
     potential = potential + _contact_work(substep) + _drag_potential(substep)
     potential = potential + sum(term.potential(old, new, SAMPLES) for term in substep.model.terms)
     climbed = potential - np.minimum.accumulate(potential)
-    return float(climbed.max()) / max(stored[0], stored[-1], SMALLEST_ENERGY)
+    return float(climbed.max()) / max(*ends, SMALLEST_ENERGY)
 
 
 def _moved_with_bone(substep: SubstepWork, target: Target) -> Floats:

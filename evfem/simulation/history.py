@@ -20,9 +20,8 @@ from evfem.common.arrays import Floats, Ints, Words
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.errors import readable, unknown
-from evfem.terms.chargebooks import ChargeBooks
-from evfem.terms.foundation import Bed
-from evfem.terms.traction import force_columns
+from evfem.terms.columns import COLUMNS as OF_PACKAGE
+from evfem.terms.columns import OfRooms
 
 Row = Mapping[str, Any]
 #: a drift of the load that is worth a word
@@ -134,10 +133,9 @@ INTEGERS = tuple(name for name, kind in KINDS.items() if kind is int)
 #: columns to which every substep adds
 ADDED = ("_work", "_dissipation")
 SUMS = tuple(name for name in COLUMNS if name.endswith(ADDED))
-#: columns of the rooms of the package: a run has those of its scene's rooms
+#: columns of the rooms of the package
 ROOM_COLUMNS: Mapping[str, Mapping[str, Any]] = {
-    one.name: column(one.unit, one.meaning)
-    for one in (*force_columns("adhesive", "adhesion"), *Bed.columns, *ChargeBooks.columns)
+    name: column(one.unit, one.meaning) for name, one in OF_PACKAGE.items()
 }
 #: further columns of a finger in three dimensions
 SPATIAL: Mapping[str, Mapping[str, Any]] = {
@@ -175,15 +173,6 @@ NEEDED, SHOWN = (
 )
 
 
-def _of_room(name: str) -> Any:
-    """A column of a room as an attribute: 0 in a run whose scene has no such room."""
-
-    def found(result: Any) -> Floats:
-        return result.in_rooms.get(name, np.zeros_like(result.position))
-
-    return property(found, doc=f"{ABOUT[name]['meaning']}; 0 without")
-
-
 def _component(name: str) -> Any:
     """A column of three dimensions as an attribute; in the plane all is along x, and nothing along z."""
 
@@ -195,7 +184,7 @@ def _component(name: str) -> Any:
     return property(found, doc=f"{SPATIAL[name]['meaning']}; in the plane all is along x")
 
 
-class FurtherColumns:
+class FurtherColumns(OfRooms):
     """Columns of three dimensions and of rooms as attributes of a result."""
 
     position_z = _component("position_z")
@@ -204,15 +193,6 @@ class FurtherColumns:
     applied_tangential_force_x = _component("applied_tangential_force_x")
     applied_tangential_force_z = _component("applied_tangential_force_z")
     electrostatic_force_z = _component("electrostatic_force_z")
-    adhesive_force = _of_room("adhesive_force")
-    adhesive_force_x = _of_room("adhesive_force_x")
-    adhesive_force_z = _of_room("adhesive_force_z")
-    adhesive_work = _of_room("adhesive_work")
-    surface_sink = _of_room("surface_sink")
-    source_work = _of_room("source_work")
-    leakage_dissipation = _of_room("leakage_dissipation")
-    stretch_work = _of_room("stretch_work")
-    field_energy = _of_room("field_energy")
 
 
 def columns_of(names: Iterable[str]) -> tuple[str, ...]:

@@ -113,7 +113,7 @@ class Ledger:
         removed = np.where(both > 0.0, both, np.inf)
         for traction in model.attraction.parts:
             fraction = traction.restored(state.voltage)[0] / removed
-            pull = interface.tilted(state, pulls[traction.name]).sum(axis=0)
+            pull = interface.foundation.tilted(state, pulls[traction.name]).sum(axis=0)
             found[traction.name] = pull, float(np.sum(fraction * withheld))
         return found
 
@@ -194,7 +194,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / length, 0.0),
         shear_traction=on_pad(_shear(state) / length, 0.0),
         electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
-        surface_sink=on_pad(interface.bed.sink(state), 0.0),
+        surface_sink=on_pad(interface.foundation.sink(state), 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),
         von_mises=_von_mises(stress),
         cauchy_stress=stress,

@@ -17,7 +17,7 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.newton.equilibrium import Equilibrium
 from evfem.newton.factorised import FactorisedBody
-from evfem.newton.interface import Interface, PenaltyInterface
+from evfem.newton.interface import Interface
 from evfem.newton.state import Limits, State
 from evfem.planning.core import Closing
 from evfem.planning.plan import plan_on, scene_mesh
@@ -31,8 +31,8 @@ from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
 from evfem.surface.skin import Skin, make_skin
 from evfem.terms.attraction import ELECTROSTATIC, Attraction
-from evfem.terms.chargebooks import ChargeBooks
-from evfem.terms.charging import NO_CHARGES, Charging, NoCharges
+from evfem.terms.charging import NO_CHARGES, ChargeBooks, Charging, NoCharges
+from evfem.terms.foundation import Penalties, foundation_of
 from evfem.terms.friction import LawFriction
 from evfem.terms.hand import Drive, drive_of
 from evfem.terms.sources import source_of
@@ -188,15 +188,17 @@ def linearised(model: Model, state: State) -> Model:
 
 
 def make_interface(closing: Closing, pad: Pad | Skin, surface: Any, attraction: PadTraction) -> Interface:
-    """The contact interface: exact or penalty."""
+    """The contact interface, with its friction, faces and foundation."""
     scene, points, solver = closing.scene, closing.mesh.points, closing.scene.solver
     interface = Interface(pad, points, surface, solver.tolerance)
     if solver.contact != "exact":
-        interface = PenaltyInterface(pad, points, surface, solver.tolerance)
         normal = float(solver.penalty_normal or 0.0)
-        interface.penalties = (normal, solver.penalty_tangential or normal)
+        penalties = normal, solver.penalty_tangential or normal
+        interface.faces = Penalties(penalties, interface.tributary)
+    where = interface.points, interface.length, interface.least
+    interface.foundation = foundation_of(surface, pad, *where)
     if attraction.parts:
-        interface.bed.reach = np.inf
+        interface.foundation.reach = np.inf
     cored = closing.core is not None or scene.adhesion is not None
     if cored:
         interface.restored = attraction.restored

@@ -81,6 +81,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -91,7 +92,6 @@ from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
 from evfem.simulation.model import Model
-from evfem.terms.foundation import Rigid
 from evfem.terms.traction import PadPath, PadState
 
 #: fraction of the work of the change of internal forces or shear that a small smooth substep cannot set free
@@ -138,8 +138,7 @@ class SubstepWork:
         """Forces and energies at the end of the substep."""
         body, new = self.model.body, self.new
         user_forces = body.given_forces(new.u)
-        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2) + self.foundation_energies[-1])
-        springs += float(sum(term.stored(new) for term in self.model.terms))
+        springs = float(sum(term.stored(new) for term in self.model.terms))
         kinetic = float(sum(term.kinetic(new) for term in self.model.terms))
         return Books(body.forces(new.u) - user_forces, user_forces, body.energy(new.u), springs, kinetic)
 
@@ -210,7 +209,7 @@ class SubstepWork:
         ends, positions = (self.old, self.new), begin + fractions[..., None] * (end - begin)
         resists = self.model.equilibrium.interface.resistance
         limit = np.array([resists(ends, *each, length) for each in zip(positions, normal, strict=True)])
-        slips = self._bed.stretched((self.old, self.new), end - begin, length)
+        slips = self._foundation.stretched(ends, end - begin, length)
         return float(PART @ np.sum(limit * slips, axis=1))
 
     @property
@@ -227,16 +226,11 @@ class SubstepWork:
     def relative_displacement(self) -> Floats:
         """Displacements of the pad's nodes relative to the surface (P, dim) in mm."""
         moved = (self.new.u - self.old.u)[self.model.pad.nodes]
-        return self._bed.relative_displacement((self.old, self.new), moved)
-
-    @cached_property
-    def foundation_energies(self) -> Floats:
-        """Energy of an elastic foundation before, mixed (forces and positions of two ends), and after."""
-        return self._bed.energies((self.old, self.new), self._on_surface)
+        return self._foundation.relative_displacement((self.old, self.new), moved)
 
     @property
-    def _bed(self) -> Rigid:
-        return self.model.equilibrium.interface.bed
+    def _foundation(self) -> Any:
+        return self.model.equilibrium.interface.foundation
 
     @property
     def _on_surface(self) -> tuple[Floats, Floats]:

@@ -64,12 +64,12 @@ LIFTED = (
 @dataclass
 class Relaxation:
     """Pseudo-transient continuation of `body`; `solve` finds an equilibrium with drag from a state;
-    `charged`: with charge transport.
+    `timed`: under tractions that take time.
     """
 
     body: Body
     solve: Callable[[State, Target], State]
-    charged: bool = False
+    timed: bool = False
 
     def applies(self, target: Target) -> bool:
         """Whether the step to `target` is quasi-static: neither viscosity nor inertia act."""
@@ -111,9 +111,9 @@ class Relaxation:
         raise StepFailed("the released finger does not come to rest", [])
 
     def _held_loads(self, state: State, target: Target) -> Target:
-        """The loads of the steps with drag: without time, unless hand or charge transport depend on it."""
+        """The loads of the steps with drag: without time, unless drive or tractions depend on it."""
         target = replace(target, voltage=target.voltage.held(state))
-        return target if self.charged or target.drive.timed else replace(target, duration=0.0)
+        return target if self.timed or target.drive.timed else replace(target, duration=0.0)
 
     def _dragged(self, state: State, target: Target, begin: Floats, drag: DragSchedule) -> State | None:
         """The equilibrium with drag from `begin` (N, dim); None, and a larger rate, if it is not found."""

@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, block
 from evfem.common.rooms import Column, Foundation, Room
-from evfem.contact.below import RIGID_BELOW, BelowCandidates, RigidBelow
+from evfem.contact.below import RIGID_BELOW, RigidBelow
 from evfem.contact.condensed import COMPONENTS
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
@@ -71,6 +71,29 @@ class Yielding:
         return found
 
 
+@dataclass(frozen=True, eq=False)
+class BelowCandidates(RigidBelow):
+    """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
+    its increment without contact forces towards its displacement under the present attraction, `pulled`
+    (2 c,) in mm.
+    """
+
+    compliance: Floats
+    pulled: Floats
+
+    def relative(self, compliance: Floats) -> Floats:
+        return compliance + self.compliance
+
+    def among(self, among: Floats, rows: Ints) -> Floats:
+        return among + block(self.compliance, rows, rows)
+
+    def unloaded(self, free: Floats) -> Floats:
+        return free + np.pad(self.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
+
+    def displacement(self, whole: Floats) -> Any:
+        return self.pulled + self.compliance @ whole
+
+
 #: names in a state's memory: C F, the contribution of the surface to the relative positions of the pad's
 #: nodes, (P, dim) in mm, and its derivatives along x[, z] (P, d, dim)
 DISPLACEMENT, GRADIENT = "surface_displacement", "surface_gradient"
@@ -78,8 +101,42 @@ DISPLACEMENT, GRADIENT = "surface_displacement", "surface_gradient"
 FORCE = "surface_force"
 
 
+class Exact(Room):
+    """Faces that touch without giving way, with the methods of all faces."""
+
+    def compliance(self, old: Any) -> Floats:
+        """Compliance (P, dim) along normal and tangents in mm per N/mm in a step from `old`, in series with
+        that of pad and foundation.
+        """
+        return np.zeros_like(old.contact_force)
+
+
+class Penalties(Exact):
+    """Faces on springs: `penalties` in N/mm3 along normal and tangent, on the tributary lengths (P,) that
+    nodes have where a step begins, by `length`.
+    """
+
+    def __init__(self, penalties: tuple[float, float], length: Callable[[Any], Floats]) -> None:
+        self.penalties, self._length, self._old = penalties, length, None
+
+    def begin(self, old: Any, seconds: float) -> None:
+        self._old = old
+
+    def compliance(self, old: Any) -> Floats:
+        return 1.0 / np.outer(self._length(old), self.penalties)
+
+    def stored(self, state: Any) -> float:
+        return self._energy(self._old, state)
+
+    def potential(self, old: Any, new: Any, fractions: Floats) -> Floats:
+        return np.asarray((self._energy(old, new) - self._energy(old, old)) * fractions**2)
+
+    def _energy(self, old: Any, state: Any) -> float:
+        return 0.5 * float(np.sum(self.compliance(old) * state.contact_force**2))
+
+
 class Rigid(Room):
-    """A rigid surface, with the methods of every surface below the pad (P nodes, C candidates)."""
+    """A rigid foundation, with the methods of all below a pad (P nodes, C candidates)."""
 
     reach, yields = 0.0, False
 
@@ -123,10 +180,6 @@ class Rigid(Room):
         """
         return {}
 
-    def energies(self, ends: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
-        """Energy before, mixed (forces of one end, positions of the other) and after a substep, N mm."""
-        return np.zeros(3)
-
     def relative_displacement(self, ends: tuple[Any, Any], moved: Floats) -> Floats:
         """Displacements relative to the surface of nodes that `moved` (P, dim)."""
         return moved
@@ -140,7 +193,7 @@ class Memoryless(Foundation):
     """An elastic surface without memory: its displacement is that of the present forces."""
 
 
-class Bed(Rigid):
+class ElasticFoundation(Rigid):
     """Elastic foundation: an elastic surface, `elastic`, below a `pad` whose nodes are at `rest` (P, dim) and
     `spacing` mm apart; `least` is the smallest tributary length (mm), in space area, of a node; `surface` the
     undeformed one. Nodes without force high above it are left out.
@@ -159,7 +212,7 @@ class Bed(Rigid):
         own = deepcopy(self.elastic) if isinstance(self.elastic, Foundation) else None
         self.elastic, self._own = own or self.elastic, own or Memoryless()
         self._remembers = own is not None
-        self.columns = (*Bed.columns, *self._own.columns)
+        self.columns = (*ElasticFoundation.columns, *self._own.columns)
         self._left: tuple[Any, Any] = (0.0, 0.0)
 
     def begin(self, old: Any, seconds: float) -> None:
@@ -181,7 +234,15 @@ class Bed(Rigid):
         return in_laboratory(state.contact_force, found) + np.asarray(state.attraction)
 
     def stored(self, state: Any) -> float:
-        return self._own.stored(state)
+        own = self._own
+        return own.energy(state, self.pushing(state), self.displacement(state)) + own.stored(state)
+
+    def potential(self, old: Any, new: Any, fractions: Floats) -> Floats:
+        (before, after), (w, v) = map(self.pushing, (old, new)), map(self.displacement, (old, new))
+        begin, end = self._own.energy(old, before, w), self._own.energy(new, after, v)
+        between = 0.5 * float(np.sum(before * v) + np.sum(after * w))
+        left = 1.0 - fractions
+        return np.asarray((left**2 - 1.0) * begin + left * fractions * between + fractions**2 * end)
 
     def kinetic(self, state: Any) -> float:
         return self._own.kinetic(state)
@@ -254,12 +315,6 @@ class Bed(Rigid):
         displacement_below[c] = self.displacement(state)[c] + fraction * np.asarray(gives).reshape(c.size, -1)
         return {DISPLACEMENT: displacement_below, GRADIENT: below.change(push)}
 
-    def energies(self, ends: tuple[Any, Any], forces: tuple[Floats, Floats]) -> Floats:
-        energy, sunk = self._own.energy, [self.displacement(state) for state in ends]
-        pairs = list(zip(ends, forces, sunk, strict=True))
-        between = 0.5 * (np.sum(forces[0] * sunk[1]) + np.sum(forces[1] * sunk[0]))
-        return np.array([energy(*pairs[0]), float(between), energy(*pairs[1])])
-
     def relative_displacement(self, ends: tuple[Any, Any], moved: Floats) -> Floats:
         return np.asarray(moved + self.displacement(ends[1]) - self.displacement(ends[0]))
 
@@ -293,10 +348,10 @@ def in_laboratory(force: Floats, surface: SurfaceState) -> Floats:
     return np.asarray(np.einsum("pa,pak->pk", force, surface.axes)[:, COMPONENTS[: force.shape[1]]])
 
 
-def bed_of(surface: Any, pad: Pad | Skin, rest: Floats, spacing: float, least: float) -> Rigid:
+def foundation_of(surface: Any, pad: Pad | Skin, rest: Floats, spacing: float, least: float) -> Rigid:
     """The foundation of a pad: elastic, or rigid."""
     elastic = getattr(surface, "elastic", None)
-    return Rigid() if elastic is None else Bed(surface, pad, rest, spacing, least)
+    return Rigid() if elastic is None else ElasticFoundation(surface, pad, rest, spacing, least)
 
 
 def _kept(state: Any) -> Floats:

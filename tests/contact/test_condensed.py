@@ -334,7 +334,7 @@ def test_compiled_contact_is_the_twin_of_the_other(monkeypatch, twin, acts, unkn
         step, *_ = step_of(rng, 1.0, 0.1, unknowns, **ACTS[acts](rng))
         if seed % 2:
             yields = np.diag(rng.uniform(0.0, 0.1, 2 * K))
-            step = replace(step, bed=BelowCandidates(yields, 0.01 * rng.normal(size=2 * K)))
+            step = replace(step, below=BelowCandidates(yields, 0.01 * rng.normal(size=2 * K)))
         slow = solved(step, monkeypatch, here + "contact_loop", lambda: None)
         fast = solved(step, monkeypatch, here + "LinearContactStep._settled", undecided)
         if fast is None:

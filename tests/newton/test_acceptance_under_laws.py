@@ -26,10 +26,10 @@ from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.newton.control import GivenVoltage, Indentation, Target
 from evfem.newton.equilibrium import Equilibrium
-from evfem.newton.interface import Interface, PenaltyInterface
 from evfem.newton.state import Folded, Limits, StepFailed
 from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.surface.surfaces import Flat
+from evfem.terms.foundation import Exact, Penalties
 from evfem.terms.traction import NoTraction
 
 SECONDS, PENALTIES, X = 0.5, (50.0, 20.0), MESH.points[PAD.nodes, 0]
@@ -42,9 +42,7 @@ LAWS = {
 }
 #: with penalties the nodes' shares of the pad, and with them bounds that depend on the pressure, change
 #: with the shear by more than the tolerance
-KINDS = [(Interface, law) for law in LAWS] + [
-    (PenaltyInterface, law) for law in ("coulomb", "rate", "ageing")
-]
+KINDS = [(Exact, law) for law in LAWS] + [(Penalties, law) for law in ("coulomb", "rate", "ageing")]
 kinds = pytest.mark.parametrize(("kind", "law"), KINDS, ids=[f"{kind.__name__} {law}" for kind, law in KINDS])
 
 
@@ -52,11 +50,11 @@ def lawful(kind, law, surface=None):
     """An interface under a law, a state before a step of half a second and one after it that obeys
     everything, and the largest shear of every node (P,).
     """
-    interface, old, good = legal(surface or Flat(friction=MU, y=0.0), kind)
+    interface, old, good = legal(surface or Flat(friction=MU, y=0.0))
     begin_under(law, interface, SECONDS)
     give, before = np.zeros((PAD.nodes.size, 2)), np.zeros_like(good.contact_force)
-    if kind is PenaltyInterface:
-        interface.penalties = PENALTIES
+    if kind is Penalties:
+        interface.faces = Penalties(PENALTIES, interface.tributary)
         give, before[:, 1] = 1.0 / np.outer(PAD.length(X), PENALTIES), 0.05
     old = replace(old, contact_force=before).remembering({"contact_time": np.full(PAD.nodes.size, 0.2)})
     touching, normal = good.status != OPEN, good.contact_force[:, 0]
@@ -180,8 +178,9 @@ def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     """Displaced by dx, a node that slips at F(s), s = s0 + dx - C (F - F0), has dF/dx = F' / (1 + C
     F'); and what holds it at rest is the law's tangent there, however much the interface yields.
     """
-    interface, old, new = legal(FLAT, PenaltyInterface)
-    interface.penalties, law = (50.0, 2e3), RateFriction(speed=1.0, exponent=0.7)
+    interface, old, new = legal(FLAT)
+    interface.faces = Penalties((50.0, 2e3), interface.tributary)
+    law = RateFriction(speed=1.0, exponent=0.7)
     begin_under(law, interface, 2e-3)
     old = old.remembering({"contact_time": np.zeros(PAD.nodes.size)})
     k = node(FORWARD)

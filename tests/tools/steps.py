@@ -63,11 +63,11 @@ class Script:
         return ""
 
 
-def legal(surface, kind=Interface):
+def legal(surface):
     """An interface, a state before a step and one after it that obeys everything: every fourth
     node is open, sticks, has slipped forwards, backwards.
     """
-    interface = kind(PAD, MESH.points, surface, TOLERANCE)
+    interface = Interface(PAD, MESH.points, surface, TOLERANCE)
     script = Script([], [])
     equilibrium = Equilibrium(script, interface, NoTraction(), Limits(TOLERANCE))
     old = equilibrium.rest(np.zeros(2), 0.0)

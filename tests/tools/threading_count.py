@@ -71,9 +71,8 @@ CAPABILITIES = (
     capability("adhesion", r"adhes|adher|came_off|\bON\b|self\.let_go|ledger\.let_go|self\.pull\b"),
     capability(
         "elastic surface",
-        r"""\bbed\b|\bBed\b|Yielding|CandidatesBed|foundation_energies|tilted|untilted|surface_sink|\b_sunk\b
-        |\b_kept\(|\.elastic\b|\belastic\b|(state|old|new|after)\.given
-        |surface_displacement|\.strain\b|\bstrain\b|NO_BED|bed_of|_stretched""",
+        r"""ElasticFoundation|foundation_of|Yielding|BelowCandidates|tilted|untilted|surface_sink
+        |\.elastic\b|\belastic\b|surface_displacement|surface_gradient|foundation\.yields""",
     ),
     capability(
         "full field",
@@ -91,7 +90,7 @@ CAPABILITIES = (
     ),
     capability(
         "penalty contact",
-        r"""penalt|Penalty|interface_compliance|part\.compliance|self\.compliance|interface\.compliance
+        r"""penalt|Penalt|interface_compliance|part\.compliance|self\.compliance|interface\.compliance
         |springs""",
     ),
     capability(

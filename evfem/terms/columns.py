@@ -1,0 +1,41 @@
+"""Columns of the history that the capabilities of the package add, and their attributes of a result."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.terms.charging import ChargeBooks
+from evfem.terms.foundation import ElasticFoundation
+from evfem.terms.traction import force_columns
+
+#: by name: a run has those of its scene's rooms
+COLUMNS = {
+    one.name: one
+    for one in (*force_columns("adhesive", "adhesion"), *ElasticFoundation.columns, *ChargeBooks.columns)
+}
+
+
+def _of_room(name: str) -> Any:
+    """A column as an attribute: 0 in a run whose scene has no such room."""
+
+    def found(result: Any) -> Floats:
+        return result.in_rooms.get(name, np.zeros_like(result.position))
+
+    return property(found, doc=f"{COLUMNS[name].meaning}; 0 without")
+
+
+class OfRooms:
+    """These columns as attributes of a result."""
+
+    adhesive_force = _of_room("adhesive_force")
+    adhesive_force_x = _of_room("adhesive_force_x")
+    adhesive_force_z = _of_room("adhesive_force_z")
+    adhesive_work = _of_room("adhesive_work")
+    surface_sink = _of_room("surface_sink")
+    source_work = _of_room("source_work")
+    leakage_dissipation = _of_room("leakage_dissipation")
+    stretch_work = _of_room("stretch_work")
+    field_energy = _of_room("field_energy")
