@@ -12,7 +12,7 @@ from tools.threading_count import CAPABILITIES, CHECKOUT, HEART, count, units_of
 from evfem.newton.state import State
 
 #: conditionals of the heart (newton, solver, contact, simulation) that know an optional capability
-CONDITIONALS = 98
+CONDITIONALS = 93
 #: files of the heart that know one, beside its own ones and `simulation/model`
 FILES = {
     "hand": 3,

@@ -22,7 +22,7 @@ from evfem.common import constants
 from evfem.common.arrays import Floats, Ints
 from evfem.common.rooms import Room
 from evfem.contact.condensed import Candidates
-from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
+from evfem.contact.signorini import FORWARD, OPEN, STICK, side, sizes
 from evfem.newton.state import State
 from evfem.surface.friction import with_core
 from evfem.surface.pad import Pad, SurfaceState, surface_state
@@ -241,10 +241,9 @@ class Interface:
         return self.tributary_of(self.places(state))
 
     def tributary_at(self, ends: tuple[State, State], position: Floats) -> Floats:
-        """Tributary lengths or areas (P,) at positions (P, d) in a substep; in space the mean of its ends."""
-        if self.dim == 2:
-            return self.tributary_of(position)
-        return np.asarray(0.5 * sum(map(self.tributary, ends)))
+        """Tributary lengths or areas (P,) at positions (P, d) in a substep."""
+        begin, end = map(self.places, ends)
+        return np.maximum(self.pad.tributary_between(begin, end, position), self.least)
 
     def resistance(self, ends: tuple[State, State], position: Floats, normal: Floats, slip: Floats) -> Floats:
         """Friction bounds (P,) at positions (P, d), with pressing forces and slips (P,), within a substep."""
@@ -325,13 +324,15 @@ class Interface:
 
 
 def slipped(interface: Interface, old: State, new: State) -> Floats:
-    """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they opened;
-    along the mean of the surface's tangents.
+    """Slips (P, d) in mm, along the mean of the surface's tangents, of nodes that slip at the end, or did so
+    before they opened.
     """
     moved = interface.on_display(new) - interface.on_display(old)
     travel = 0.5 * (interface.surface_at(old).travel + interface.surface_at(new).travel)
-    slip = np.einsum("paj,pj->pa", travel, moved)
+    yielded = interface.compliance(old)[:, 1:] * (new.contact_force - old.contact_force)[:, 1:]
+    slip = np.einsum("paj,pj->pa", travel, moved) + yielded
     status = np.where(new.touching | (old.status == STICK), new.status, old.status)
     # a node may stick at a jump of friction that it has slipped up to
     carried = (status == STICK) & (sizes(slip) > interface.tolerance * interface.length)
-    return np.where(((status >= FORWARD) | carried)[:, None], slip, 0.0)
+    astray = (slip.shape[1] == 1) & (side(status) * slip > 0.0).any(axis=1)  # in the plane slips have a side
+    return np.where((((status >= FORWARD) & ~astray) | carried)[:, None], slip, 0.0)

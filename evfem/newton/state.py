@@ -15,6 +15,8 @@ from evfem.contact.signorini import OPEN, STICK
 from evfem.newton.strategy import Strategy
 from evfem.tissue.body import Body
 
+#: unit of forces by dimension
+FORCES = {2: "N/mm", 3: "N"}
 #: what rooms keep where none keeps anything
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -83,7 +85,7 @@ class State:
     @property
     def unit(self) -> str:
         """Unit of its forces."""
-        return "N/mm" if self.bone.size == 2 else "N"
+        return FORCES[self.bone.size]
 
     @property
     def touching(self) -> Any:

@@ -13,7 +13,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CRITICAL, SMALLEST_FORCE, SOFTENED
 from evfem.errors import InputError
 from evfem.newton.control import Target
-from evfem.newton.state import Folded, LiftedOff, State, StepFailed
+from evfem.newton.state import FORCES, Folded, LiftedOff, State, StepFailed
 from evfem.planning.parts import COMPLEX_SAFE, lost_derivatives
 from evfem.planning.plausibility import weakens
 from evfem.scene.scene import Scene
@@ -43,8 +43,7 @@ BORNE = 1.0
 
 #: points of the largest strain where materials of one's own are tried after a run
 STRAINED_POINTS = 32
-#: units of forces and of works by dimension
-FORCES = {2: "N/mm", 3: "N"}
+#: units of works by dimension
 WORKS = {2: "N mm/mm", 3: "N mm"}
 #: penetration that is worth a warning, relative to the size of the finger
 SUNK = 1e-6

@@ -88,7 +88,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.quadrature import PART, SLIDE
-from evfem.contact.signorini import BACKWARD, FORWARD, STICK
+from evfem.contact.signorini import STICK, sizes
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
 from evfem.simulation.model import Model
@@ -170,8 +170,7 @@ class SubstepWork:
         """Correction of the boundary work for nodes that start to slip within the substep: their shear force
         changes while they stick and is constant while they slip.
         """
-        old, new, interface = self.old, self.new, self.model.equilibrium.interface
-        slip = slipped(interface, old, new) if interface.dim == 3 else self._slip[:, None]
+        old, new, slip = self.old, self.new, self._slip
         before, after = old.contact_force[:, 1:], new.contact_force[:, 1:]
         begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > 0.0))
         return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
@@ -240,30 +239,14 @@ class SubstepWork:
         return before, after
 
     @cached_property
-    def compliance(self) -> Floats:
-        """Compliance of the interface (P, 2) in this substep, mm per N/mm."""
-        return self.model.equilibrium.interface.compliance(self.old)
-
-    @cached_property
     def _slip(self) -> Floats:
-        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they opened."""
-        old, new, interface = self.old, self.new, self.model.equilibrium.interface
-        stretch = [interface.surface_at(state).stretch for state in (old, new)]
-        slip = 0.5 * (stretch[0] + stretch[1]) * (self.positions[1] - self.positions[0])[:, 0]
-        slip = slip + self.compliance[:, 1] * (new.contact_force[:, 1] - old.contact_force[:, 1])
-        status = np.where(new.touching | (old.status == STICK), new.status, old.status)
-        # a node may stick at a jump of friction that it has slipped up to
-        carried = (status == STICK) & (np.abs(slip) > interface.tolerance * interface.length)
-        forward = ((status == FORWARD) & (slip > 0.0)) | carried
-        return np.where(forward | ((status == BACKWARD) & (slip < 0.0)), slip, 0.0)
+        """Slips (P, d) in mm along the surface."""
+        return slipped(self.model.equilibrium.interface, self.old, self.new)
 
     @cached_property
     def slip_length(self) -> Floats:
         """Slip of the pad nodes (P,), in mm."""
-        interface = self.model.equilibrium.interface
-        if interface.dim == 3:
-            return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))
-        return np.abs(self._slip)
+        return sizes(self._slip)
 
     def _friction_coefficient(self, position: Floats) -> Floats:
         """Friction coefficient of the pad nodes (P,) at the positions (P, d)."""
@@ -299,12 +282,9 @@ class SubstepWork:
 
     def _with_slip(self, along: Floats) -> Floats:
         """Component (P,) of the displacements `along` (P, dim) of the pad nodes in the direction of slip."""
-        interface = self.model.equilibrium.interface
-        if interface.dim == 3:
-            slip = slipped(interface, self.old, self.new) / np.maximum(self.slip_length, 1e-300)[:, None]
-            moved = np.einsum("paj,pj->pa", interface.surface_at(self.new).travel, along[:, ::2])
-            return np.asarray(np.sum(slip * moved, axis=1))
-        return np.sign(self._slip) * along[:, 0]
+        travel = self.model.equilibrium.interface.surface_at(self.new).travel
+        way = self._slip / np.maximum(self.slip_length, 1e-300)[:, None]
+        return np.einsum("pa,paj,pj->p", way, travel, along[:, ::2])
 
 
 def _mean_work(before: Floats, after: Floats, moved: Floats) -> float:

@@ -101,6 +101,10 @@ class Pad:
         """`length` of positions (..., P, 2); the name that `evfem.surface.skin.Skin` has for areas."""
         return self.length(position[..., 0])
 
+    def tributary_between(self, begin: Floats, end: Floats, x: Floats) -> Floats:
+        """`length` at x (P, 1) on the way from positions (P, 2) to others."""
+        return self.length(x[:, 0])
+
     def tributary_gradient(self, position: Floats) -> tuple[Ints, Ints, Floats]:
         """Derivative of the tributary lengths as triplets (node, moved unknown 2 j + a, value)."""
         x, (start, end) = position[:, 0], np.split(self.edges[:, :2], 2, axis=1)

@@ -63,6 +63,10 @@ class Skin:
         found = np.stack([np.bincount(self.faces.ravel(), row, size) for row in rows])
         return np.asarray(found.reshape(position.shape[:-1]))
 
+    def tributary_between(self, begin: Floats, end: Floats, x: Floats) -> Floats:
+        """The mean area on the way from positions (P, 3) to others."""
+        return 0.5 * (self.tributary(begin) + self.tributary(end))
+
     def tributary_gradient(self, position: Floats) -> tuple[Ints, Ints, Floats]:
         """Derivative of the tributary areas as triplets (node, moved unknown 3 j + a, value)."""
         first, second = self._ways(position)
