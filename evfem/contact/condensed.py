@@ -181,23 +181,16 @@ class LinearContactStep:
 
     def _settled(self, active: Any, unloaded_motion: Floats, body_motion: Floats) -> ContactOfCandidates:
         """Contact of the `active` nodes (c,) bool, to which penetrating ones are added until none is left."""
-        known, status, solves, nodes = (
-            self.candidates,
-            self.candidates.status.copy(),
-            0,
-            np.flatnonzero(active),
-        )
+        known, solves, nodes = self.candidates, 0, np.flatnonzero(active)
+        status = known.status.copy()
         while True:
             found, pushed = self._solve_active(nodes, unloaded_motion, body_motion, status[nodes])
             solves += found.solves
             status[nodes] = found.status
             whole = np.zeros(unloaded_motion.shape[0])
             whole[self.body.rows(nodes)] = pushed
-            moved = (
-                unloaded_motion[:, 0]
-                + unloaded_motion[:, 1:] @ found.extra
-                + self.relative_compliance @ whole
-            )
+            moved = unloaded_motion[:, 0] + unloaded_motion[:, 1:] @ found.extra
+            moved += self.relative_compliance @ whole
             gap = known.surface.normal_gap + self._along_normal(moved)
             gap[nodes] = 0.0  # solved in the dense problem
             penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(known.surface.gap)))

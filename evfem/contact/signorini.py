@@ -362,10 +362,8 @@ def solve_statuses(
         x = both[:, 0] - both[:, 1:] @ d
     pressing = np.zeros((problem.size, 1))
     pressing[closed, 0] = x[: closed.size]
-    force, attraction_loss = (
-        system.shear + pressing * system.sheared,
-        system.attraction_loss - pressing * system.gain,
-    )
+    force = system.shear + pressing * system.sheared
+    attraction_loss = system.attraction_loss - pressing * system.gain
     force.ravel()[position[closed.size : pressed.size]] = x[closed.size : pressed.size]
     force[system.turned, 1:] += x[last, None] * system.aside
     attraction_loss[attracted, 0] += x[own]

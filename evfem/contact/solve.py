@@ -100,9 +100,8 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
             return forces, found, solves, most_compliant
         if changed.any():
             most_compliant = np.where(changed, OPEN, found.status)
-            after_cycling = (
-                after_cycling or key in visited
-            )  # a cycle: from here on change only the node of the largest violation
+            # a cycle: from here on change only the node of the largest violation
+            after_cycling = after_cycling or key in visited
             if key in single_changes:  # and that cycles too
                 break
             if after_cycling:

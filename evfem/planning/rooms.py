@@ -29,6 +29,7 @@ class Kind:
 KINDS = (
     Kind("surface.friction_law", "friction", "terms.friction", lambda scene: scene.has_friction),
     Kind("surface.elastic", "elastic surface", "terms.foundation", lambda scene: bool(scene.ground.elastic)),
+    Kind("solver.contact", "penalties", "terms.foundation", lambda scene: scene.solver.contact != "exact"),
     Kind("electrostatics", "electricity", "terms.attraction", lambda scene: scene.electrics.acts),
     Kind("electrostatics.field", "full field", "terms.fullfield", lambda scene: scene.field != "local"),
     Kind("electrostatics.drive", "charges", "terms.charging", lambda scene: scene.electrics.resolved),

@@ -52,13 +52,8 @@ def rise(substep: SubstepWork, target: Target) -> float:
     carried = _moved_with_bone(substep, target)
     load_work = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
     load_work = load_work - float(np.sum(body.given_forces(new.u) * increment))
-    potential = (
-        stored
-        - stored[0]
-        - _attraction_work(substep, carried)
-        + (_friction_work(substep) - load_work) * SAMPLES
-    )
-    potential = potential + _contact_work(substep) + _drag_potential(substep)
+    potential = stored - stored[0] + (_friction_work(substep) - load_work) * SAMPLES
+    potential += _contact_work(substep) + _drag_potential(substep) - _attraction_work(substep, carried)
     potential = potential + sum(term.potential(old, new, SAMPLES) for term in substep.model.terms)
     climbed = potential - np.minimum.accumulate(potential)
     return float(climbed.max()) / max(*ends, SMALLEST_ENERGY)
@@ -94,11 +89,8 @@ def _friction_work(substep: SubstepWork) -> float:
     if not length.any():
         return 0.0
     interface, normal = substep.model.equilibrium.interface, np.maximum(substep.new.contact_force[:, 0], 0.0)
-    return float(
-        np.sum(
-            interface.resistance((substep.old, substep.new), substep.positions[1], normal, length) * length
-        )
-    )
+    ends, place = (substep.old, substep.new), substep.positions[1]
+    return float(np.sum(interface.resistance(ends, place, normal, length) * length))
 
 
 def _contact_work(substep: SubstepWork) -> Floats:
@@ -116,7 +108,6 @@ def _contact_work(substep: SubstepWork) -> Floats:
 def _drag_potential(substep: SubstepWork) -> Floats:
     """The potential of drag since the begin of the substep."""
     increment = substep.new.u - substep.old.u
-    drag = np.array(
-        [0.5 * substep.model.body.drag_dissipation(substep.old.u + s * increment) for s in SAMPLES]
-    )
+    lost = substep.model.body.drag_dissipation
+    drag = np.array([0.5 * lost(substep.old.u + s * increment) for s in SAMPLES])
     return drag - drag[0]

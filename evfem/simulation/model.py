@@ -195,8 +195,7 @@ def make_interface(closing: Closing, pad: Pad | Skin, surface: Any, attraction: 
         normal = float(solver.penalty_normal or 0.0)
         penalties = normal, solver.penalty_tangential or normal
         interface.faces = Penalties(penalties, interface.tributary)
-    where = interface.points, interface.length, interface.least
-    interface.foundation = foundation_of(surface, pad, *where)
+    interface.foundation = foundation_of(interface)
     if attraction.parts:
         interface.foundation.reach = np.inf
     cored = closing.core is not None or scene.adhesion is not None

@@ -348,10 +348,12 @@ def in_laboratory(force: Floats, surface: SurfaceState) -> Floats:
     return np.asarray(np.einsum("pa,pak->pk", force, surface.axes)[:, COMPONENTS[: force.shape[1]]])
 
 
-def foundation_of(surface: Any, pad: Pad | Skin, rest: Floats, spacing: float, least: float) -> Rigid:
-    """The foundation of a pad: elastic, or rigid."""
-    elastic = getattr(surface, "elastic", None)
-    return Rigid() if elastic is None else ElasticFoundation(surface, pad, rest, spacing, least)
+def foundation_of(interface: Any) -> Rigid:
+    """The foundation of the pad of an `evfem.newton.interface.Interface`: elastic, or rigid."""
+    if getattr(interface.surface, "elastic", None) is None:
+        return Rigid()
+    place = interface.points, interface.length, interface.least
+    return ElasticFoundation(interface.surface, interface.pad, *place)
 
 
 def _kept(state: Any) -> Floats:

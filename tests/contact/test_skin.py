@@ -56,6 +56,13 @@ def test_derivative_of_the_areas_is_that_of_differences(m):
     assert_allclose(found, expected, atol=1e-8)
 
 
+def test_on_the_way_nodes_stand_for_the_mean_of_both_ends():
+    """Twice as wide and thrice as long, 6 of 1: 3.5 on the way, wherever on it."""
+    skin, points = sheet(2, 4, lambda p, q: (p, 0.0 * p, q))
+    between = skin.tributary_between(points, points * [2.0, 1.0, 3.0], points[:, ::2])
+    assert_allclose(between, 3.5 * skin.tributary(points), rtol=1e-14)
+
+
 def test_several_places_at_once_are_each_place_alone():
     skin, points = sheet(3, 9, bent)
     both = np.stack([points, 1.3 * points])

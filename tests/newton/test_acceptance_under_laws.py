@@ -26,6 +26,7 @@ from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.newton.control import GivenVoltage, Indentation, Target
 from evfem.newton.equilibrium import Equilibrium
+from evfem.newton.interface import slipped
 from evfem.newton.state import Folded, Limits, StepFailed
 from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.surface.surfaces import Flat
@@ -213,3 +214,22 @@ def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     # the motion by which the contact problem has the node at rest, and its whole force then
     dx = -(found.slip[k, 0] - found.interface_compliance[k, 1] * held)
     assert held + series * dx == pytest.approx(bound(slip) - steep * slip, rel=1e-4)
+
+
+def test_faces_on_springs_slip_less_by_what_they_yield_and_hold_its_energy():
+    """Springs p A of a node: its shear has moved it by F / (p A), which is no slip; they store F^2 / (2 p A)
+    each, at half of the forces a quarter. What slips against its side counts for nothing.
+    """
+    interface, old, new = legal(FLAT)
+    length, k = PAD.length(MESH.points[PAD.nodes, 0]), node(FORWARD)
+    interface.faces = faces = Penalties((1e3, 4e3), interface.tributary)
+    shear = new.contact_force[k, 1]
+    assert slipped(interface, old, new)[k, 0] == pytest.approx(SLIP + shear / (4e3 * length[k]), rel=1e-12)
+    faces.begin(old, SECONDS)
+    normal, along = (new.contact_force**2 / np.outer(length, (1e3, 4e3))).sum(axis=0)
+    assert faces.stored(new) == pytest.approx(0.5 * (normal + along), rel=1e-12)
+    rise = faces.potential(old, new, np.array([0.0, 0.5, 1.0]))
+    np.testing.assert_allclose(rise, 0.5 * (normal + along) * np.array([0.0, 0.25, 1.0]), rtol=1e-12)
+    interface.faces = Penalties((1e3, 50.0), interface.tributary)
+    assert SLIP + shear / (50.0 * length[k]) < 0.0
+    assert slipped(interface, old, new)[k, 0] == 0.0

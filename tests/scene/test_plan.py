@@ -134,6 +134,7 @@ def test_the_table_of_rooms_names_keys_of_scene_files_and_modules_that_exist():
             "elastic surface",
         ),
         ({"solver": ev.Solver(dynamics="inertial")}, "time"),
+        ({"solver": ev.Solver(contact="penalty", penalty_normal=50.0)}, "penalties"),
     ],
 )
 def test_a_scene_has_the_rooms_of_its_keys(given, name):
