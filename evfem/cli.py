@@ -385,6 +385,8 @@ def _sweep(options: argparse.Namespace) -> int:
         notices.tell(f"point {row['point']}: {row['message']}")
     points = result.provenance["points"]
     print(f"{points['requested']} points: {told(points)}; table in {path / TABLE}", flush=True)
+    for name, over in result.provenance.get("means", {}).items():
+        print(f"{name}: the mean over {' or '.join(over)}", flush=True)
     return NOT_CONVERGED if wrong else DONE
 
 

@@ -76,8 +76,9 @@ class Single:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The column that the value follows from."""
-        return (self.output.split(".")[0],)
+        """The columns that the value follows from: a mean over a path depends on the path too."""
+        column, statistic, *_ = self.output.split(".")
+        return (column, *(("position", "indentation") if statistic == "mean" else ()))
 
     def answers(self, result: Result) -> dict[str, float | None]:
         """The value by name."""

@@ -265,7 +265,7 @@ class Sensitivities:
     def gradient(self, function: Callable[[Result], float]) -> dict[str, float]:
         """Derivatives by every parameter of a number that a smooth `function` makes of a run.
 
-        ``found.gradient(lambda run: run.tangential_force.mean())``
+        ``found.gradient(lambda run: run.tangential_force[-1])``
         """
         found = {}
         for key, value in self.parameters.items():

@@ -13,7 +13,7 @@ import json
 import re
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,7 +27,7 @@ from evfem.sweeps.manifest import Manifest
 
 POINTS, TABLE, PARQUET, PROVENANCE = "points", "sweep.csv", "sweep.parquet", "sweep.json"
 MANIFEST = ".evfem-sweep"
-FORMAT = "evfem-sweep-point-2"
+FORMAT = "evfem-sweep-point-3"
 POINT_FILE = re.compile(r"[0-9a-f]{64}\.json")
 #: how the file of a point begins, of whatever version
 POINT_BEGINS = b'{"format": "evfem-sweep-point-'
@@ -39,12 +39,15 @@ STATUS = ("done", "refused", "not_converged", "failed")
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a point: done, refused, not_converged or failed, its outputs and its message."""
+    """What became of a point: done, refused, not_converged or failed, its outputs and its message, and what
+    each mean among them is over (`evfem.sweeps.means`).
+    """
 
     status: str
     seconds: float
     message: str
     outputs: dict[str, float | None]
+    over: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -148,7 +151,8 @@ def _refuse_no_points(files: Sequence[Path]) -> None:
 
 def _sound(answer: Answer) -> bool:
     numbers = [answer.seconds, *(value for value in answer.outputs.values() if value is not None)]
-    words = answer.status in STATUS and isinstance(answer.message, str)
+    told = (answer.message, *answer.over.values())
+    words = answer.status in STATUS and all(isinstance(word, str) for word in told)
     return words and all(type(number) in (int, float) for number in numbers)
 
 

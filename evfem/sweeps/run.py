@@ -7,6 +7,7 @@ import time as clock
 from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder
+from evfem.sweeps.means import chosen, mean
 from evfem.sweeps.table import SweepResult, Units, table_units, units_of
 
 #: the table is written anew after so many seconds
@@ -206,6 +208,14 @@ class _Run:
                 rows.append({"point": point.index, **point.labels, **point.parameters, **found, **state})
         return SweepResult(plan.columns, rows, self._provenance(rows), self.units)
 
+    def _means(self) -> dict[str, Any]:
+        """What the means among the outputs are over, as far as points are done."""
+        told: dict[str, set[str]] = {}
+        for answer in self.answers.values():
+            for name, over in answer.over.items():
+                told.setdefault(name, set()).add(over)
+        return {"means": {name: sorted(over) for name, over in told.items()}} if told else {}
+
     def _provenance(self, rows: list[dict[str, Any]]) -> dict[str, Any]:
         plan, samples = self.plan, self.plan.samples
         counted = Counter(row["status"] for row in rows)
@@ -225,6 +235,7 @@ class _Run:
             "grid": plan.grid,
             "samples": drawn,
             "outputs": list(plan.outputs),
+            **self._means(),
             "units": {
                 "length": "mm",
                 "force": self.found[0]["normal_force"],
@@ -240,11 +251,14 @@ def evaluate(job: Job) -> Answer:
     """Run one point; whatever happens to it is in the answer."""
     text, folder, names = job
 
+    over: dict[str, str] = {}
+
     def ask(result: Result) -> dict[str, float | None]:
         result = result if result.depth is None else result.total
+        over.update({name: mean(result, *_asked(name))[1] for name in names if ".mean" in name})
         return {name: output(result, name) for name in names}
 
-    return answered(text, folder, ask, simulate)
+    return replace(answered(text, folder, ask, simulate), over=over)
 
 
 def answered(
@@ -271,12 +285,19 @@ def answered(
 
 def output(result: Result, name: str) -> float | None:
     """COLUMN.STATISTIC of a result, or COLUMN.STATISTIC.N over its motion N; None where it is no number."""
-    column, statistic, *motion = name.split(".")
-    values = np.asarray(getattr(result, column), dtype=float)
-    if motion:
-        values = values[result.motion_index == int(motion[0])]
-    found = values[-1] if statistic == "last" else getattr(np, statistic)(values)
+    (column, motion), statistic = _asked(name), name.split(".")[1]
+    if statistic == "mean":
+        found = mean(result, column, motion)[0]
+    else:
+        values = np.asarray(getattr(result, column), dtype=float)[chosen(result, motion)]
+        found = values[-1] if statistic == "last" else getattr(np, statistic)(values)
     return float(found) if math.isfinite(found) else None
+
+
+def _asked(name: str) -> tuple[str, int | None]:
+    """Column and motion (None: all) of an output."""
+    column, _, *motion = name.split(".")
+    return column, int(motion[0]) if motion else None
 
 
 def compute(

@@ -77,7 +77,9 @@ def test_the_table_has_the_numbers_of_single_runs(plan):
         run = ev.simulate(scenefile.loads(point.text, plan.parent))
         row = result.rows[point.index]
         assert row["normal_force.last"] == run.normal_force[-1]
-        assert row["normal_force.mean"] == pytest.approx(run.normal_force.mean(), rel=1e-14)
+        way = np.concatenate([run.indentation[:2], run.indentation[1] + run.position[2:]])
+        area = way[0] * run.normal_force[0] + np.trapezoid(run.normal_force, way)
+        assert row["normal_force.mean"] == pytest.approx(area / way[-1], rel=1e-14)
         assert row["tangential_force.min.1"] == run.tangential_force[2:].min()
         assert row["indentation.min"] == run.indentation.min()
     assert result.rows[4]["message"].startswith("surface.friction: given -1.0; allowed: a number")
@@ -101,6 +103,7 @@ def test_the_folder_has_table_parquet_and_provenance(plan, tmp_path):
     made = json.loads((tmp_path / "out" / "sweep.json").read_text())
     assert made["points"] == {"requested": 6, "done": 4, "refused": 2, "not_converged": 0, "failed": 0}
     assert made["scene"]["tables"]["finger"]["materials"]["tissue"]["E"] == 0.1
+    assert made["means"] == {"normal_force.mean": ["path"]}
     assert made["grid"] == {"surface.friction": [0.2, 0.4, -1.0], "motion.0.indentation": [0.1, 0.2]}
     assert made["versions"]["evfem"] == ev.__version__
     assert made["complete"]
@@ -138,7 +141,7 @@ def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
     lost, damaged, foreign, kept = sorted((out / "points").iterdir())
     lost.unlink()
     damaged.write_text(damaged.read_text()[:-9])
-    foreign.write_text(foreign.read_text().replace("point-2", "point-1"))
+    foreign.write_text(foreign.read_text().replace("point-3", "point-2"))
     stamp = kept.stat().st_mtime_ns
     plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.05, 0.1, 0.2]\n"))
     third = ev.sweep(plan, out, workers=1)  # it grew, so that nothing of it belongs to another
@@ -404,14 +407,16 @@ def test_the_command_says_what_became_of_the_points(plan, tmp_path, monkeypatch,
     monkeypatch.chdir(tmp_path)
     assert cli.main(["sweep", str(plan), "--workers", "1"]) == 3
     shown = capsys.readouterr()
-    assert shown.out == "6 points: 4 done, 2 refused; table in many-out/sweep.csv\n"
+    assert shown.out == (
+        "6 points: 4 done, 2 refused; table in many-out/sweep.csv\nnormal_force.mean: the mean over path\n"
+    )
     lines = shown.err.splitlines()
     assert lines[0] == "evfem: 2 of 6 points are no valid scene"
     assert lines[1:-2] == ["point 3 of 6", "point 4 of 6", "point 5 of 6", "point 6 of 6"]
     assert lines[-1].startswith("evfem: point 5: surface.friction: given -1.0")
     plan.write_text(SWEEP.replace(", -1.0]", "]"))
     assert cli.main(["sweep", str(plan), "--workers", "1", "--resume"]) == 0
-    assert capsys.readouterr().out == "4 points: 4 done; table in many-out/sweep.csv\n"
+    assert capsys.readouterr().out.startswith("4 points: 4 done; table in many-out/sweep.csv\n")
     assert cli.main(["sweep", "missing.toml"]) == 2
 
 
