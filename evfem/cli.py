@@ -421,10 +421,10 @@ def _signal(options: argparse.Namespace) -> None:
     print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {options.out}", flush=True)
 
 
-def _texture(options: argparse.Namespace) -> None:
+def _texture(options: argparse.Namespace) -> int | None:
     from evfem.estimate.commands import run
 
-    run(options)
+    return run(options)
 
 
 def _studio(options: argparse.Namespace) -> None:

@@ -64,12 +64,12 @@ ROOMS = {
         {"numpy", "tomli_w"},
         "motion terms electrics keys probes options scene serialiser format schema file spatial",
     ),
-    "planning": ({"numpy"}, "rooms resolution loaddrift parts plausibility fieldchoice core timescales plan"),
+    "planning": ({"numpy"}, "rooms resolution loaddrift parts attracted plausibility fieldchoice core timescales plan"),
     "simulation": (
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
-    "sweeps": ({"numpy", "tomli_w", "tqdm", "pyarrow"}, "manifest samples file folder table run check"),
+    "sweeps": ({"numpy", "tomli_w", "tqdm", "pyarrow"}, "manifest samples file folder table means run check"),
     "response": (
         {"numpy", "scipy"},
         "parameters parts tangent lines sensitivities file uncertainty design impedance",

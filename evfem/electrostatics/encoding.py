@@ -1,7 +1,8 @@
 """Closed-form rendering: from the friction of a real surface to a display's voltage, (1), (12)-(20b).
 
 Friction on a display is ``F_t = mu (F_n + F_e)``. The attraction of touching skin is ``F_e = A p(0, U)`` with
-the contact area ``A = k F_n^m``; the air layer around it is left out. Units: mm, N, V. In plane strain,
+the contact area ``A = k F_n^m``; the air layer around it is left out. Between rough faces p is that at their
+gap. Units: mm, N, V. In plane strain,
 forces are per mm of depth; then only a linear area law (m = 1) keeps its k, in mm^2/N.
 """
 
@@ -89,7 +90,8 @@ def share_not_renderable(position: Values, friction: Values, display_friction: f
 @dataclass(frozen=True)
 class Encoding:
     """A display with what is needed to encode friction as voltage: law, solid layers, area law, own friction.
-    Voltages are effective ones; `crest` is the peak of the display's waveform over them.
+    Voltages are effective ones; `crest` is the peak of the display's waveform over them. Where they touch,
+    rough faces are `gap` (mm) apart.
 
     The paper's (16a), (17), (19), (20a) are this with `Kaczmarek`, (16b), (20b) with
     `StrongTroxel`; (20a) and (20b) have a linear area law, where the voltage does not depend on
@@ -107,10 +109,17 @@ class Encoding:
     area: AreaLaw
     friction: float
     crest: float = WAVEFORMS["sine"].crest
+    gap: float = 0.0
 
     @classmethod
     def driven(
-        cls, law: ForceLaw, drive: Drive, solids: tuple[Layer, Layer], area: AreaLaw, friction: float
+        cls,
+        law: ForceLaw,
+        drive: Drive,
+        solids: tuple[Layer, Layer],
+        area: AreaLaw,
+        friction: float,
+        gap: float = 0.0,
     ) -> Encoding:
         """With a `drive` at its frequency, through what skin and gap conduct; `solids` are stratum
         corneum and insulator. Voltages stay effective ones, `peak` is that of the drive's waveform.
@@ -130,18 +139,24 @@ class Encoding:
             area,
             friction,
             WAVEFORMS[drive.waveform].crest,
+            gap,
         )
 
     def __post_init__(self) -> None:
         above("crest", self.crest, 0.0, "a peak over effective voltage above zero")
         above("friction", self.friction, 0.0, "a friction coefficient above zero")
-        one, two = (np.asarray(self.law.traction(0.0, u, self.layers)) for u in (1.0, 2.0))
+        at_least("gap", self.gap, 0.0, "a length in mm, not negative")
+        one, two = (np.asarray(self.pressure(u)) for u in (1.0, 2.0))
         if not np.allclose(two, 4.0 * one, rtol=1e-9, atol=0.0):
             raise InputError("law", self.law, "a law whose traction grows with the square of the voltage")
 
+    def pressure(self, voltage: Values) -> Values:
+        """Attraction in MPa of touching skin."""
+        return self.law.traction(self.gap, voltage, self.layers)
+
     def attraction(self, normal_force: Values, voltage: Values) -> Values:
         """F_e in N of touching skin, equations (14) and (15)."""
-        return plain(self.area(normal_force) * np.asarray(self.law.traction(0.0, voltage, self.layers)))
+        return plain(self.area(normal_force) * np.asarray(self.pressure(voltage)))
 
     def tangential_force(self, normal_force: Values, voltage: Values) -> Values:
         """F_t = mu_hd (F_n + F_e) in N in full slip, equations (1), (13), (16a), (16b)."""
@@ -155,7 +170,7 @@ class Encoding:
         """U in V that attracts with `attraction` N at `normal_force` N, equation (17)."""
         wanted = at_least("attraction", attraction, 0.0, "a force in N, not negative")
         force = above("normal_force", normal_force, 0.0, POSITIVE_FORCE)
-        per_square_volt = self.law.traction(0.0, 1.0, self.layers) * self.area(force)
+        per_square_volt = self.pressure(1.0) * self.area(force)
         return plain(np.sqrt(np.asarray(wanted) / per_square_volt))
 
     def voltage_for_friction(self, friction: Values, normal_force: Values = 1.0) -> Values:
@@ -219,11 +234,11 @@ def fit_area_to_friction(
 ) -> PowerFit:
     """Area law that explains friction measured with `voltage` on: (16a), (16b) fitted for k and m.
 
-    `display` gives law, layers and friction coefficient (its own area law is not used). Least
+    `display` gives law, layers, rough gap and friction coefficient (its own area law is not used). Least
     squares in the tangential force, in N; k in mm^2/N^m. The two laws give the same m, and k in
     the inverse ratio of their contact pressures.
     """
     above("voltage", voltage, 0.0, "a voltage in V above zero")
     excess = np.asarray(tangential_force) / display.friction - np.asarray(normal_force)
-    pressure = display.law.traction(0.0, voltage, display.layers)
+    pressure = display.pressure(voltage)
     return fit_power(normal_force, excess / pressure, relative=False)

@@ -12,9 +12,8 @@ from evfem.common.checks import keys_of
 from evfem.common.notices import status, tell
 from evfem.common.storage import write_text
 from evfem.electrostatics.signalfile import write_signal
-from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError, quoted
-from evfem.estimate.display import Device, exact_voltage, playback, render
+from evfem.estimate.display import LOST, Device, Rendering, exact_voltage, playback, render, render_exact
 from evfem.estimate.estimate import estimate, known_error
 from evfem.estimate.rendering import record
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of, touch_scene
@@ -24,11 +23,14 @@ from evfem.textures.importers import IMPORTERS, importer_of
 from evfem.textures.library import REFERENCES, about, find, names, reference
 from evfem.textures.texture import Texture, is_data, write
 
+#: exit status where the limit of the voltage loses part of the slide
+CUT = 1
 
-def run(args: argparse.Namespace) -> None:
-    """Do one of the commands."""
+
+def run(args: argparse.Namespace) -> int | None:
+    """Do one of the commands; None is done."""
     commands = {"list": _list, "show": _show, "make": _make, "import": _import, "simulate": _simulate}
-    {**commands, "estimate": _estimate, "database": _database}[args.what](args)
+    return {**commands, "estimate": _estimate, "database": _database}[args.what](args)
 
 
 def _list(args: argparse.Namespace) -> None:
@@ -80,22 +82,20 @@ def _felt(args: argparse.Namespace) -> tuple[Touch, Device]:
     return Touch(**_passed(args, Touch)), Device(**_passed(args, Device, friction="display"))
 
 
-def _simulate(args: argparse.Namespace) -> None:
+def _simulate(args: argparse.Namespace) -> int:
     texture, (touch, device) = find(args.name), _felt(args)
     _check_outputs(args)
     with status(f"sliding over {texture.name}"):
         reference = record(touch_scene(texture, touch))
-        exact, comparison = exact_voltage(reference, device) if args.exact else (None, None)
+        exact = exact_voltage(reference, device)[0] if args.exact else None
     curve = friction_of(reference.result)
     _curve(curve, args.out)
     if exact is None:
-        _render(curve, touch, device, args.signal)
-    else:
-        print(f"exact: {comparison}")
-        _signal(VoltageProfile(exact.x, exact.voltage), touch, device, args.signal)
+        return _render(curve, touch, device, args.signal)
+    return _rendered(render_exact(curve, exact, touch, device), touch, device, args.signal)
 
 
-def _estimate(args: argparse.Namespace) -> None:
+def _estimate(args: argparse.Namespace) -> int:
     touch, device = _felt(args)
     _check_outputs(args)
     found = estimate(find(args.name), touch)
@@ -106,7 +106,7 @@ def _estimate(args: argparse.Namespace) -> None:
         print(f"error for a {finger} finger at the default load and speed: {error:.1%} of the curve's range")
     for note in found.notes:
         tell(f"note: {note}")
-    _render(found.curve, touch, device, args.signal)
+    return _render(found.curve, touch, device, args.signal)
 
 
 def _check_outputs(args: argparse.Namespace) -> None:
@@ -118,12 +118,14 @@ def _check_outputs(args: argparse.Namespace) -> None:
             raise InputError(f"--{key}", f"{path}, which has the rows of a texture", "another file")
 
 
-def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path | None) -> None:
-    """Print how good the voltage is, and write it, if it has a path."""
-    if path is None:
-        return
-    found = render(curve, touch, device)
-    lost = f"{found.lost.mean():.0%} of the slide cannot be rendered"
+def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path | None) -> int:
+    """The voltage of the closed forms, if it has a path."""
+    return 0 if path is None else _rendered(render(curve, touch, device), touch, device, path)
+
+
+def _rendered(found: Rendering, touch: Touch, device: Device, path: Path | None) -> int:
+    """Print how good a voltage is, and write it, if it has a path; the exit status."""
+    lost = f"{found.share_lost:.0%} of the slide cannot be rendered"
     reached = lost if found.lost.any() else "all of the slide can be rendered"
     print(
         f"up to {found.signal.largest:.4g} V, rms {found.signal.rms:.4g} V; {reached}; error of the force "
@@ -132,19 +134,21 @@ def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path | Non
     for low, high, error, fraction in found.bands:
         if fraction > 1e-3:
             print(f"  {low:g} to {high:g} Hz: error {error:.2%}; holds {fraction:.1%} of the target's power")
-    _signal(found.signal.profile, touch, device, path)
-
-
-def _signal(profile: VoltageProfile, touch: Touch, device: Device, path: Path | None) -> None:
+    for said in (*found.losses, *device.doubts(found.signal.largest)):
+        tell(f"warning: {said}")
     if path is not None:
+        profile = found.signal.profile
         write_signal(path, profile, playback(profile, touch, device))
         print(path, flush=True)
+    return CUT if found.signal.share_limited > LOST else 0
 
 
 def _curve(curve: FrictionCurve, out: Path | None) -> None:
     """Print what a curve is like, and write it."""
     low, high, mean = curve.friction.min(), curve.friction.max(), curve.friction.mean()
-    band = "" if curve.error is None else f", each +- {curve.error:.2g}"
+    band = ", error unknown" if curve.source == "estimate" else ""
+    if curve.error is not None:
+        band = f", each +- {curve.error:.2g} for nine of ten textures"
     print(f"{curve.source}: friction {low:.4g} to {high:.4g}, {mean:.4g} on average{band}", flush=True)
     if out is not None:
         write_text(out, curve.rows())

@@ -7,6 +7,9 @@ steepest: sliding snaps from crest to crest there, and takes fifty times longer.
 curve stand that of the pad that yields linearly (`sliding`), and how wrong the estimator is there when it
 does not know the point: the root mean square of what is left of the friction, over the slope.
 
+From these follows the error of an estimate: `local` averages them around a place, and for `OF_TEN` of the
+points that are left out the largest error of the curve is below `factor` times what the others make `local`.
+
 Errors of the estimate for the reference textures, which are not in the database, are in a separate
 table: both fingers, at the default touch.
 """
@@ -15,7 +18,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -46,16 +49,19 @@ from evfem.textures.library import REFERENCES, reference
 
 #: points of Sobol's sequence for each finger
 INNER = 192
+#: share of unseen textures for which the error of an estimate holds at every position
+OF_TEN = 0.9
 FILE, KERNELS, CURVES = "textures-database.csv", "textures-kernels.csv", "textures-references.csv"
 CURVE, LINEAR = (tuple(f"{name}{i:02d}" for i in range(SAMPLES)) for name in ("mu", "linear"))
-ERROR = "error"
+ERROR, KERNEL = "error", ("ridged", *RANGES, "smoothing", "factor")
 
 
 @dataclass(frozen=True, eq=False)
 class Database:
     """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and, as
     `linear`, that of a pad that yields linearly, at x = (i + 1) / SAMPLES wavelengths behind a place where
-    the first sine rises through zero; `errors` (N,) of the estimator that does not know the point.
+    the first sine rises through zero; `errors` (N,) of the estimator that does not know the point; the
+    largest error of a curve is up to `factor` times as large.
     """
 
     textures: tuple[Parametric, ...]
@@ -64,6 +70,7 @@ class Database:
     errors: Floats
     scale: Floats
     smoothing: float
+    factor: float = 1.0
 
     @cached_property
     def responses(self) -> tuple[Floats, Floats, Floats]:
@@ -83,13 +90,34 @@ class Database:
 
     def errors_of(self, responses: Floats) -> Floats:
         """Root mean square error (N,) of the curves with these corrections (N, 3), over the slope."""
+        return np.asarray(np.sqrt(np.mean(np.square(self.wrong(responses)), axis=1)))
+
+    def local(self, location: Floats, without: int | None = None) -> float:
+        """Root mean square of the errors around a place (6,), without one of the points."""
+        errors, estimator = self.errors, self.estimator
+        if without is not None:
+            errors, estimator = np.delete(errors, without), estimator.without(without)
+        return float(np.sqrt(estimator.near(location) @ errors**2))
+
+    def error(self, location: Floats) -> float:
+        """Largest error of a curve at a place (6,), over the slope, for `OF_TEN` of unseen textures."""
+        return self.factor * self.local(location)
+
+    def times_local(self, responses: Floats) -> Floats:
+        """Largest errors (N,) of the curves with these corrections (N, 3) of points that are left out, over
+        what the others make of them.
+        """
+        largest = np.abs(self.wrong(responses)).max(axis=1)
+        return largest / [self.local(one, i) for i, one in enumerate(self.estimator.points)]
+
+    def wrong(self, responses: Floats) -> Floats:
+        """Errors (N, SAMPLES) of the curves with these corrections (N, 3), over the slope."""
         parts = zip(self.textures, self.friction, self.linear, responses, strict=True)
         curves = [
             corrected(_samples(one), linear, response, one.slope, one.wavelength) - friction
             for one, friction, linear, response in parts
         ]
-        slope = np.array([texture.slope for texture in self.textures])
-        return np.sqrt(np.mean(np.square(curves), axis=1)) / slope
+        return np.asarray(curves) / np.array([[texture.slope] for texture in self.textures])
 
 
 def responses_of(
@@ -122,9 +150,9 @@ def read(path: Path, ridged: bool) -> Database:
     rows = np.column_stack([table[name][of] for name in RANGES]).tolist()
     textures = tuple(Parametric(**dict(zip(RANGES, row, strict=True)), ridged=ridged) for row in rows)
     friction, linear = (np.column_stack([table[name][of] for name in names]) for names in (CURVE, LINEAR))
-    kernels = read_columns(path.with_name(KERNELS), ["ridged", *RANGES, "smoothing"], "database")
-    _, *scale, smoothing = np.column_stack(kernels)[int(ridged)].tolist()
-    return Database(textures, friction, linear, table[ERROR][of], np.array(scale), smoothing)
+    kernels = read_columns(path.with_name(KERNELS), [*KERNEL], "database")
+    _, *scale, smoothing, factor = np.column_stack(kernels)[int(ridged)].tolist()
+    return Database(textures, friction, linear, table[ERROR][of], np.array(scale), smoothing, factor)
 
 
 #: where the files are that come with evfem
@@ -210,18 +238,20 @@ def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
         friction, linear = friction.round(6), linear.round(6)  # what stands in the file is estimated from
         scale, smoothing = best_kernel(*responses_of(textures, friction, linear))
         words = [f"{value:.4g}" for value in (*scale, smoothing)]
-        kernels.append([str(int(ridged)), *words])
         written = np.array([float(word) for word in words])
         known = Database(textures, friction, linear, np.zeros(0), written[:-1], float(written[-1]))
+        guesses = known.estimator.left_out()
+        known = replace(known, errors=known.errors_of(guesses))
+        factor = np.quantile(known.times_local(guesses), OF_TEN)
+        kernels.append([str(int(ridged)), *words, f"{factor:.4g}"])
         rows += _rows(known, ridged)
-    write_text(folder / KERNELS, csv_text([["ridged", *RANGES, "smoothing"], *kernels]))
+    write_text(folder / KERNELS, csv_text([KERNEL, *kernels]))
     write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *LINEAR, ERROR], *rows]))
 
 
 def _rows(database: Database, ridged: bool) -> list[list[str]]:
     """The rows of one finger, with the errors of points that are left out."""
-    found = database.errors_of(database.estimator.left_out())
-    rows = zip(database.textures, database.friction, database.linear, found, strict=True)
+    rows = zip(database.textures, database.friction, database.linear, database.errors, strict=True)
     return [
         [
             *(f"{getattr(one, name):.6g}" for name in RANGES),

@@ -17,19 +17,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, among, between, one_of
 from evfem.electrostatics.drive import Drive
-from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.electrostatics.encoding import AreaLaw, Encoding, share_not_renderable
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
+from evfem.electrostatics.roughness import WIDEST
 from evfem.electrostatics.signalfile import Playback
 from evfem.electrostatics.signals import Amplifier, VoltageProfile
 from evfem.estimate import rendering
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of
+from evfem.planning.attracted import broken_down, touching
 from evfem.simulation.spectrum import amplitudes
 from evfem.surface.surfaces import Display
 
@@ -37,6 +39,9 @@ from evfem.surface.surfaces import Display
 BANDS = (0.0, 5.0, 15.0, 50.0, 150.0, 500.0)
 #: of the plane finger: area per load (mm2/N), and the stratum corneum of Table 2
 AREA, SKIN = 112.0, Layer(0.38, 1650.0)
+#: largest voltage (V) of the model on a display without an amplifier, and the fraction of a slide that may be
+#: lost before it is worth a word
+MOST_VOLTAGE, LOST = 10_000.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,7 @@ class Device(Checked):
     friction: Annotated[float, between(0.01, 3.0), "coefficient of the display"] = 0.25
     law: Annotated[str, among(FORCE_LAWS), "of the attraction"] = "kaczmarek"
     insulator: Annotated[str, one_of(*INSULATORS), "on the display"] = "film"
+    roughness_gap: Annotated[float, between(0.0, WIDEST, "mm"), "air that touching rough faces keep"] = 0.0
     voltage_max: Annotated[float | None, between(1.0, 1e5, "V"), "largest effective voltage"] = None
     slew: Annotated[float | None, between(1.0, 1e9, "V/s"), "how fast that can change"] = None
 
@@ -58,7 +64,24 @@ class Device(Checked):
     def encoding(self) -> Encoding:
         """Its closed forms."""
         layers = Layers.of(SKIN, INSULATORS[self.insulator])
-        return Encoding(FORCE_LAWS[self.law](), layers, AreaLaw(AREA), self.friction)
+        area, law = AreaLaw(AREA), FORCE_LAWS[self.law]()
+        return Encoding(law, layers, area, self.friction, gap=self.roughness_gap)
+
+    @property
+    def largest_voltage(self) -> float:
+        """Largest voltage (V) that the model may find."""
+        return MOST_VOLTAGE if self.voltage_max is None else self.voltage_max
+
+    def doubts(self, voltage: float) -> tuple[str, ...]:
+        """What the plan of a scene says of so high a voltage (V) on touching skin, one sentence each.
+
+        >>> [said[:43] for said in Device(law="strong_troxel", insulator="touchscreen").doubts(15.9)]
+        ['5 um of air between rough faces leave 0.79%']
+        """
+        solids = {"stratum corneum": SKIN, "insulator": INSULATORS[self.insulator]}
+        law, layers = self.encoding.law, self.encoding.layers
+        broken = broken_down(voltage, layers.reduced, solids)
+        return (*broken, *touching(law, layers, voltage, self.roughness_gap))
 
     @property
     def amplifier(self) -> Amplifier | None:
@@ -84,6 +107,25 @@ class Rendering:
     spectrum_error: float
     bands: tuple[tuple[float, float, float, float], ...]
 
+    @property
+    def share_lost(self) -> float:
+        """Fraction of the path on which the target is missed."""
+        return _share(self.curve.x, self.lost)
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """A sentence for each cause that loses more than `LOST` of the slide."""
+        causes = {
+            "is slipperier than the display: it cannot be rendered": self.signal.share_not_renderable,
+            "is beyond the limits of the voltage or of how fast it changes": self.signal.share_limited,
+        }
+        return tuple(f"{lost:.0%} of the slide {text}" for text, lost in causes.items() if lost > LOST)
+
+
+def _share(x: Floats, there: Any) -> float:
+    """Fraction of a path at whose places (n,) in mm something is `there` (n,)."""
+    return float(np.trapezoid(np.asarray(there, dtype=float), x) / (x[-1] - x[0]))
+
 
 def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
     """The voltage by the closed forms for a friction curve.
@@ -94,7 +136,7 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
     >>> bool(found.lost.any()), found.change_error < 1e-9, round(found.signal.largest)
     (False, True, 3511)
     >>> worse = render(curve, Touch(), Device(friction=0.34))
-    >>> float(worse.lost.mean().round(2)), round(worse.change_error, 2)
+    >>> round(worse.share_lost, 2), round(worse.change_error, 2)
     (0.33, 0.25)
     """
     load = np.full(curve.x.shape, touch.load)
@@ -117,12 +159,17 @@ def _compared(curve: FrictionCurve, signal: rendering.Signal, felt: Floats, spee
         curve=curve,
         signal=signal,
         felt=felt,
-        lost=np.abs(felt - curve.friction) > 10.0 * rendering.NOISE * np.abs(curve.friction).max(),
+        lost=_misses(felt, curve.friction),
         force_error=_relative(felt, curve.friction),
         change_error=_relative(felt - felt.mean(), change),
         spectrum_error=_relative(rendered, wanted),
         bands=tuple(bands),
     )
+
+
+def _misses(felt: Floats, wanted: Floats) -> Any:
+    """Where (n,) the friction on the display is another one than is wanted."""
+    return np.abs(felt - wanted) > 10.0 * rendering.NOISE * np.abs(wanted).max()
 
 
 def _relative(found: Floats, wanted: Floats) -> float:
@@ -158,14 +205,17 @@ class ExactCurve:
 def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: Device) -> Rendering:
     """Friction of the coupled model under its own voltage, compared as by `render`."""
     felt = np.interp(curve.x, found.x, found.friction)
-    voltage = np.interp(curve.x, found.x, found.voltage)
+    voltage, profile = np.interp(curve.x, found.x, found.voltage), VoltageProfile(found.x, found.voltage)
+    own = device.friction * (1.0 - rendering.NOISE)
+    cut = (voltage >= device.largest_voltage * (1.0 - rendering.NOISE)) & _misses(felt, curve.friction)
     signal = rendering.Signal(
-        profile=VoltageProfile(found.x, found.voltage),
-        share_not_renderable=float(np.mean(curve.friction < device.friction)),
+        profile=profile,
+        share_not_renderable=share_not_renderable(curve.x, curve.friction, own),
         largest=float(found.voltage.max()),
-        rms=float(np.sqrt(np.mean(voltage**2))),
+        rms=profile.rms(float(curve.x[0]), float(curve.x[-1])),
         carrier=float(Drive().peak(found.voltage.max())),
         error_of_display=_relative(felt, curve.friction),
+        share_limited=_share(curve.x, cut),
     )
     return _compared(curve, signal, felt, touch.speed)
 
@@ -173,7 +223,7 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
 def exact_voltage(reference: rendering.Recording, device: Device) -> tuple[ExactCurve, rendering.Comparison]:
     """The voltage that gives a recorded slide's force in each step (`rendering.exact`), and how well."""
     display = Display(INSULATORS[device.insulator], friction=device.friction)
-    largest = 10_000.0 if device.voltage_max is None else device.voltage_max
-    result = rendering.exact(reference, display, FORCE_LAWS[device.law](), largest).result
+    law, gap = FORCE_LAWS[device.law](), device.roughness_gap
+    result = rendering.exact(reference, display, law, device.largest_voltage, roughness_gap=gap).result
     felt, voltage = friction_of(result), result.voltage[result.motion_index == 2]
     return ExactCurve(felt.x, voltage, felt.friction), rendering.compare(reference.result, result)

@@ -8,8 +8,9 @@ to the two harmonics of the database that explain most of its heights::
 
 For a texture that repeats, 2 pi / q is a whole fraction of its period; else the best one of `TRIED`
 wavelengths. `notes` report heights that two harmonics do not explain, and parameters outside the range of the
-database (they are moved to its nearest edge) or outside the convex hull of its points; the finite element
-model has no such limits. A friction profile is used as it is.
+database (they are moved to its nearest edge) or outside the convex hull of its points; how wrong such an
+estimate is, is not known, and the finite element model has no such limits. A friction profile is used as it
+is.
 """
 
 from __future__ import annotations
@@ -101,8 +102,9 @@ def _harmonics(x: Floats, height: Floats, wavelength: float) -> Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """An estimated friction curve with `notes` on what makes it doubtful. `curve.error` is the leave-one-out
-    rms error of nearby points of the database, which does not include these.
+    """An estimated friction curve with `notes` on what makes it doubtful. `curve.error` holds at every
+    position for nine of ten textures that the database does not know; None outside what it covers, which a
+    note says.
     """
 
     curve: FrictionCurve
@@ -123,17 +125,16 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
     location = np.clip(wanted.point(), 0.0, 1.0)
     near = at(location, touch.ridged)
     database = shipped(touch.ridged)
-    response, near_by = database.estimator(location), database.estimator.near(location)
-    error = float(np.sqrt(near_by @ database.errors**2))
-    x, mu, missing = _friction(texture, touch, near, response)
+    x, mu, missing = _friction(texture, touch, near, database.estimator(location))
     notes = _notes(wanted, found, touch)
-    if near.slope * error > MUCH * np.ptp(mu):
-        notes.append("the error of the estimate is more than half of the range that it shows")
     if missing:
         notes.append(f"no equilibrium was found on {missing:.0%} of the slide")
     if not database.estimator.holds(location):
         notes.append("the texture is outside the hull of the database's points")
-    curve = FrictionCurve(x, mu, "estimate", near.slope * error)
+    error = None if notes else near.slope * database.error(location)
+    if error is not None and error > MUCH * np.ptp(mu):
+        notes.append("the error of the estimate is more than half of the range that it shows")
+    curve = FrictionCurve(x, mu, "estimate", error)
     return Estimate(curve, tuple(f"{note}: the model has no such limit" for note in notes), found)
 
 

@@ -20,7 +20,7 @@ from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import Encoding, share_not_renderable
 from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.errors import InputError, quoted
-from evfem.protocols import ForceLaw, Observer, Surface
+from evfem.protocols import ForceLaw, Observer, RoughnessLaw, Surface
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.history import SAME
@@ -206,9 +206,11 @@ def replay(
     law: ForceLaw,
     voltage: VoltageProfile | FollowForce,
     drive: Drive | None = None,
+    roughness_gap: float | RoughnessLaw = 0.0,
 ) -> Recording:
     """The reference's finger, motion and solver on a display under a voltage, alternating by a `drive`: as in
-    the paper, pressed to the load that the reference had after its press, and slid in the same steps.
+    the paper, pressed to the load that the reference had after its press, and slid in the same steps. Rough
+    faces keep the `roughness_gap` of a scene, in mm or as a law.
     """
     motion = list(reference.scene.motion)
     first = next((i for i, one in enumerate(motion) if one.course.distance), 0)
@@ -216,8 +218,8 @@ def replay(
         last_row = int(_slide_rows(reference.result)[0]) - 1
         load = float(reference.result.applied_force[last_row])
         motion[first - 1] = Press(force=load, steps=motion[first - 1].steps)
-    scene = replace(reference.scene, surface=display, law=law, voltage=voltage, motion=motion, drive=drive)
-    return record(scene)
+    shown: dict[str, Any] = {"surface": display, "law": law, "voltage": voltage, "drive": drive}
+    return record(replace(reference.scene, motion=motion, roughness_gap=roughness_gap, **shown))
 
 
 def exact(
@@ -226,6 +228,7 @@ def exact(
     law: ForceLaw,
     largest_voltage: float = 10_000.0,
     drive: Drive | None = None,
+    roughness_gap: float | RoughnessLaw = 0.0,
 ) -> Recording:
     """Exact encoding: the voltage at which the coupled model has the reference's friction force.
 
@@ -237,7 +240,7 @@ def exact(
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
-    return replay(reference, display, law, wish, drive)
+    return replay(reference, display, law, wish, drive, roughness_gap)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
+from evfem.planning.attracted import PRESSED, broken_down, touching
 from evfem.planning.resolution import path_depth
 from evfem.protocols import ForceLaw
 from evfem.scene.scene import Scene
@@ -42,10 +43,6 @@ SHORTEST, FEW = 0.15, 20
 #: length (mm) of a profile's end that a finger there touches, and the variation of height in it, as a
 #: fraction of the profile's height, above which the profile does not end level
 BESIDE, ROUGH_END = 1.0, 0.1
-#: field (V/um) that breaks any solid down
-BREAKDOWN = 300.0
-#: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
-PRESSED = 0.02
 #: travel of the bone over the width of the finger, and thickness of the stratum corneum (mm), at least
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
@@ -170,15 +167,9 @@ def _breakdown(scene: Scene) -> Iterator[str]:
     found = isinstance(scene.voltage, (FollowForce, ChargeControl))
     if scene.law is None or found or any(course.gap is not None for course in scene.courses):
         return
-    seen, voltage = scene.electrics, scene.electrics.largest_voltage
-    reduced = float(np.min(seen.attraction[1].reduced))
-    for name, layer in (("stratum corneum", seen.skin), ("insulator", seen.insulator)):
-        field = 1e-3 * voltage / (float(np.min(seen.lossless(layer).eps_r)) * reduced)
-        if field > BREAKDOWN and np.max(layer.thickness) > 0.0:
-            yield (
-                f"{voltage:g} V make a field of {field:.3g} V/um in the {name}, and any solid breaks down "
-                f"above {BREAKDOWN:g} V/um: voltages are in V, thicknesses in mm"
-            )
+    seen = scene.electrics
+    solids = {"stratum corneum": seen.lossless(seen.skin), "insulator": seen.lossless(seen.insulator)}
+    yield from broken_down(seen.largest_voltage, seen.attraction[1].reduced, solids)
 
 
 def touching_traction(scene: Scene, law: ForceLaw | None = None) -> float | None:
@@ -186,29 +177,29 @@ def touching_traction(scene: Scene, law: ForceLaw | None = None) -> float | None
     another, as far as that is known: not under a charge, or a friction force that sets the voltage. Rough
     faces are as far apart as under `PRESSED`.
     """
-    if not scene.electrics.acts or isinstance(scene.voltage, (FollowForce, ChargeControl)):
+    if not _known(scene):
         return None
     own, layers = scene.electrics.attraction
+    return float(np.max((law or own).traction(_rough(scene), scene.electrics.largest_voltage, layers)))
+
+
+def _known(scene: Scene) -> bool:
+    """Whether a voltage attracts that is known before the run."""
+    return scene.electrics.acts and not isinstance(scene.voltage, (FollowForce, ChargeControl))
+
+
+def _rough(scene: Scene) -> float:
+    """How far apart (mm) rough faces are under `PRESSED`, 0 for smooth ones."""
     rough = roughness_of(scene.roughness_gap)
-    gap = 0.0 if rough is None else float(rough.separation(PRESSED))
-    return float(np.max((law or own).traction(gap, scene.electrics.largest_voltage, layers)))
+    return 0.0 if rough is None else float(rough.separation(PRESSED))
 
 
 def _unbearable(scene: Scene) -> Iterator[str]:
-    """Where a fingertip is pressed: an attraction of touching skin beyond what any load presses with."""
-    if isinstance(scene.finger, MeshedFinger) or not any((c.depth or 0.0) > 0.0 for c in scene.courses):
-        return
-    traction = touching_traction(scene)
-    if traction is not None and traction > PRESSED:
-        yield (
-            f"at {scene.electrics.largest_voltage:g} V touching skin is attracted with {traction:.3g} MPa, "
-            f"and a load presses a fingertip with up to {PRESSED:g} MPa: the attraction exceeds the load"
-            + (
-                "; rough faces keep a gap: see roughness_gap"
-                if roughness_of(scene.roughness_gap) is None
-                else ""
-            )
-        )
+    """Where a fingertip is pressed: doubts about the attraction of touching skin."""
+    pressed = any((course.depth or 0.0) > 0.0 for course in scene.courses)
+    if pressed and _known(scene) and not isinstance(scene.finger, MeshedFinger):
+        law, layers = scene.electrics.attraction
+        yield from touching(law, layers, scene.electrics.largest_voltage, _rough(scene))
 
 
 def weakens(scene: Scene) -> bool:

@@ -33,8 +33,6 @@ FILES = {
     "toml": ("scene.toml", "application/toml"),
     "friction": ("friction.csv", "text/csv"),
 }
-#: a rendering that loses more of the slide is warned of
-LOST = 0.02
 
 
 def with_choices(content: bytes) -> bytes:
@@ -77,23 +75,19 @@ def answer(state: State) -> dict[str, Any]:
     wish, felt = (np.interp(x, found.curve.x, one) for one in (found.curve.friction, found.felt))
     frequency, wished = spectrum_of(x, wish, state.touch.speed)
     rendered = spectrum_of(x, felt, state.touch.speed)[1]
-    layers, signal = state.device.encoding.layers, found.signal
-    lost = {
-        "is slipperier than the display: it cannot be rendered": signal.share_not_renderable,
-        "is too fast for the amplifier": signal.share_limited,
-    }
-    warned = [f"{fraction:.0%} of the slide {text}" for text, fraction in lost.items() if fraction > LOST]
+    layers, rough, signal = state.device.encoding.layers, state.device.roughness_gap, found.signal
+    warned = [*found.losses, *state.device.doubts(signal.largest)]
     numbers = {
         "rms": signal.rms,
         "peak": signal.largest,
         "carrier": signal.carrier,
         "mean": float(curve.friction.mean()),
         "range": float(np.ptp(curve.friction)),
-        "lost": float(found.lost.mean()),
+        "lost": found.share_lost,
         "force_error": found.force_error,
         "change_error": found.change_error,
         "spectrum_error": found.spectrum_error,
-        "laws": float(layers.thickness / layers.reduced),
+        "laws": float((rough + layers.thickness) / (rough + layers.reduced)),
     }
     return {
         "quantity": state.texture.quantity,

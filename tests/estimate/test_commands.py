@@ -77,6 +77,41 @@ def test_an_estimate_becomes_files(capsys):
     assert read_signal("wave.wav").voltage.max() > 100.0
 
 
+def test_a_voltage_beyond_the_limit_is_told_and_ends_with_a_status(capsys):
+    """100 V of the 3.8 kV that the model needs: nothing of the texture is left."""
+    words = ("simulate", "wave-2mm", "--length", "0.5", "--exact", "--display", "0.2", "--signal", "a.wav")
+    assert run(*words, "--voltage-max", "100") == 1
+    told = capsys.readouterr()
+    assert "100% of the slide cannot be rendered" in told.out
+    assert "100% of the slide is beyond the limits of the voltage" in told.err
+    assert "Comparison(" not in told.out
+    assert run("estimate", "wave-2mm", "--voltage-max", "100", "--signal", "a.wav") == 1
+    assert "beyond the limits of the voltage" in capsys.readouterr().err
+
+
+def test_roughness_is_an_option_and_smooth_faces_are_doubted(capsys):
+    """With 5 um of air the voltage grows by (g + s) / s, s = 0.38 / 1650 + 0.001 / 3.9."""
+    words = ("estimate", "wave-2mm", "--law", "strong_troxel", "--insulator", "touchscreen")
+    found = []
+    for gap in ("0", "0.005"):
+        assert run(*words, "--roughness-gap", gap, "--signal", "a.csv") == 0
+        found.append((capsys.readouterr().err, read_signal("a.csv").voltage.max()))
+    (smooth, low), (rough, high) = found
+    reduced = 0.38 / 1650.0 + 0.001 / 3.9
+    assert high / low == pytest.approx((0.005 + reduced) / reduced, rel=1e-3)
+    assert "see roughness_gap" in smooth
+    assert "roughness_gap" not in rough
+
+
+def test_an_estimate_outside_the_database_has_no_error(capsys):
+    assert run("make", "grating", "--frequency", "1.25", "--amplitude", "0.012", "--out", "sq.json") == 0
+    assert run("estimate", "sq.json") == 0
+    told = capsys.readouterr()
+    assert "error unknown" in told.out
+    assert "+-" not in told.out
+    assert "wavelength 0.8 is outside the database" in told.err
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -1,12 +1,15 @@
 """From friction to feeling: voltages, limits, and the errors of a rendering."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+import evfem as ev
 from evfem.estimate.display import BANDS, Device, ExactCurve, playback, render, render_exact
 from evfem.estimate.touch import FrictionCurve, Touch
+from evfem.planning.plan import plan
 
 X = np.arange(400) * 0.02  # 8 mm, at 20 mm/s 0.4 s
 TOUCH = Touch(load=0.05)
@@ -86,3 +89,54 @@ def test_a_voltage_that_was_found_is_compared_like_one_of_the_closed_forms():
     assert found.signal.rms == pytest.approx(form.signal.rms, rel=0.02)
     assert found.signal.carrier == pytest.approx(form.signal.carrier)
     assert found.signal.share_not_renderable == pytest.approx(form.signal.share_not_renderable, abs=0.02)
+
+
+SCREEN = {"friction": 0.3, "law": "strong_troxel", "insulator": "touchscreen"}
+#: sum of thickness over permittivity (mm) of stratum corneum and touchscreen
+REDUCED = 0.38 / 1650.0 + 0.001 / 3.9
+
+
+def test_air_between_rough_faces_takes_more_voltage():
+    """(g + s) / s times the voltage of smooth faces: eps_0 U^2 / (2 (g + s)^2) is the same attraction."""
+    smooth, rough = (render(curve(), TOUCH, Device(**SCREEN, roughness_gap=gap)) for gap in (0.0, 0.005))
+    ratio = (0.005 + REDUCED) / REDUCED
+    assert rough.signal.largest / smooth.signal.largest == pytest.approx(ratio, rel=1e-9)
+    assert rough.force_error < 1e-9
+
+
+def test_a_display_is_doubted_as_a_plan_doubts_a_scene():
+    (said,) = Device(**SCREEN).doubts(15.9)
+    left = (REDUCED / (0.005 + REDUCED)) ** 2
+    assert f"leave {left:.2%} of the attraction of smooth ones" in said
+    assert Device(**SCREEN, roughness_gap=0.005).doubts(100.0) == ()
+    assert Device(**{**SCREEN, "law": "kaczmarek"}).doubts(15.9) == ()  # its fit has the air already
+    field = 1e-3 * 1000.0 / (3.9 * REDUCED)
+    broken, pulled = Device(**SCREEN).doubts(1000.0)
+    assert f"a field of {field:.3g} V/um in the insulator" in broken
+    press = [ev.Press(force=0.05)]
+    pad = ev.FingerPad(ridges=False, resolution="coarse")
+    scene = ev.Scene(pad, ev.Display(ev.TOUCHSCREEN), ev.StrongTroxel(), 1000.0, press)
+    assert set(plan(scene).warnings) == {broken, pulled}
+    assert plan(replace(scene, voltage=15.9)).warnings == (said,)
+
+
+def test_a_voltage_at_its_limit_is_lost_there():
+    """Half of the slide at 100 V, its limit, with too little friction; the other half as wished."""
+    wish = curve((0.02, 10.0))
+    cut = X < 4.0
+    felt = np.where(cut, 0.3, wish.friction)
+    given = ExactCurve(X, np.where(cut, 100.0, 90.0), felt)
+    found = render_exact(wish, given, TOUCH, Device(friction=0.3, voltage_max=100.0))
+    assert found.signal.share_limited == pytest.approx(0.5, abs=0.01)
+    assert found.share_lost == pytest.approx(0.5, abs=0.01)
+    (said,) = found.losses
+    assert said.startswith("50% of the slide is beyond the limits of the voltage")
+    free = render_exact(wish, given, TOUCH, Device(friction=0.3, voltage_max=200.0))
+    assert free.signal.share_limited == 0.0
+
+
+def test_shares_are_of_the_path_and_not_of_the_rows():
+    """Friction that falls below the display's own at 1 of 2 mm, with most rows on the first mm."""
+    x = np.concatenate([np.linspace(0.0, 1.0, 901), np.linspace(1.0, 2.0, 101)[1:]])
+    wish = FrictionCurve(x, np.where(x < 1.0, 0.4, 0.2), "made up")
+    assert render(wish, TOUCH, Device(friction=0.3)).share_lost == pytest.approx(0.5, abs=0.01)

@@ -146,3 +146,19 @@ def test_a_level_drawing_gets_a_sentence():
     level = {**DRAWN, "values": [0.0] * 4}
     assert isinstance(parse(json.dumps({"texture": level})).texture, Texture)
     refuses("which is level", page.answer, parse(json.dumps({"texture": level})))
+
+
+def test_the_page_warns_as_the_plan_does_and_has_the_rough_gap():
+    """(g + s) / s times the voltage with 5 um of air."""
+    device = {"law": "strong_troxel", "insulator": "touchscreen"}
+    smooth, rough = (
+        page.answer(parse(json.dumps({"device": device | {"roughness_gap": gap}}))) for gap in (0.0, 0.005)
+    )
+    reduced = 0.38 / 1650.0 + 0.001 / 3.9
+    ratio = rough["numbers"]["peak"] / smooth["numbers"]["peak"]
+    assert ratio == pytest.approx((0.005 + reduced) / reduced)
+    assert [any("see roughness_gap" in note for note in one["notes"]) for one in (smooth, rough)] == [
+        True,
+        False,
+    ]
+    assert page.answer(parse('{"texture": {"reference": "paper"}}'))["band"] is None

@@ -38,7 +38,7 @@ function state() {
     touch: {ridged: get("ridged").value === "1", friction: number("friction"), load: number("load"),
       speed: number("speed"), length: number("length")},
     device: {friction: number("display"), law: get("law").value, insulator: get("insulator").value,
-      voltage_max: most >= Number(get("voltage_max").max) ? undefined : most},
+      roughness_gap: number("roughness_gap"), voltage_max: most >= Number(get("voltage_max").max) ? undefined : most},
   };
 }
 
@@ -115,7 +115,8 @@ function numbers(found) {
     "Voltage, rms": `${n.rms.toFixed(0)} V`, "Voltage, peak": `${n.peak.toFixed(0)} V`,
     "Voltage by": found.encoding, "Friction by": found.source,
     "Friction, mean": n.mean.toFixed(3), "Friction, highest less lowest": n.range.toFixed(4),
-    "Friction, error of the estimate": found.band === null ? "no estimate" : `+- ${found.band.toFixed(4)}`,
+    "Friction, error of the estimate": found.band !== null ? `+- ${found.band.toFixed(4)}, nine of ten`
+      : found.source === "estimate" ? "unknown" : "no estimate",
     "Slide that cannot be rendered": percent(n.lost), "Friction force, error on the display": percent(n.force_error),
     "Friction spectrum, error on the display": percent(n.spectrum_error),
   };
@@ -237,7 +238,7 @@ async function send() {
 }
 
 const FORM = ["reference", "generator", "frequency", "amplitude", "irregularity", "second", "phase", "period", "height",
-  "ridged", "friction", "load", "speed", "length", "display", "law", "insulator", "voltage_max"];
+  "ridged", "friction", "load", "speed", "length", "display", "law", "insulator", "roughness_gap", "voltage_max"];
 
 function link() {
   const from = chosen(), all = {from};

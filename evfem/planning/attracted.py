@@ -1,0 +1,59 @@
+"""Doubts about an attraction by its closed form, of a scene or of a display alone: fields beyond the
+breakdown of insulators, attractions that no load presses with, smooth faces that decide the force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import Values
+from evfem.electrostatics.laws import Layer, Layers
+
+#: field (V/um) that breaks any solid down
+BREAKDOWN = 300.0
+#: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
+PRESSED = 0.02
+#: air (mm) that rough skin keeps at least (docs, which law), and the share of the attraction of smooth faces
+#: below which the roughness decides
+AIR, DECIDES = 0.005, 0.5
+
+
+def broken_down(voltage: float, reduced: Values, solids: Mapping[str, Layer]) -> Iterator[str]:
+    """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
+    for name, layer in solids.items():
+        field = 1e-3 * voltage / float(np.min(np.asarray(layer.eps_r)) * np.min(reduced))
+        if field > BREAKDOWN and np.max(layer.thickness) > 0.0:
+            yield (
+                f"{voltage:g} V make a field of {field:.3g} V/um in the {name}, and any solid breaks down "
+                f"above {BREAKDOWN:g} V/um: voltages are in V, thicknesses in mm"
+            )
+
+
+def touching(law: Any, layers: Layers, voltage: float, gap: float) -> Iterator[str]:
+    """Of touching faces that are a rough `gap` (mm) apart, 0 for smooth ones: an attraction beyond any load,
+    or one that a few micrometres of air change by a multiple.
+
+    >>> from evfem.electrostatics.laws import TOUCHSCREEN, Kaczmarek, StrongTroxel
+    >>> stack = Layers.of(Layer(0.38, 1650.0), TOUCHSCREEN)
+    >>> [[len(list(touching(law(), stack, 15.9, gap))) for gap in (0.0, 0.005)]
+    ...  for law in (StrongTroxel, Kaczmarek)]
+    [[1, 0], [0, 0]]
+    """
+    smooth = gap == 0.0 and getattr(law, "of_a_field", False)
+    traction = float(np.max(law.traction(gap, voltage, layers)))
+    if traction > PRESSED:
+        yield (
+            f"at {voltage:g} V touching skin is attracted with {traction:.3g} MPa, and a load presses a "
+            f"fingertip with up to {PRESSED:g} MPa: the attraction exceeds the load"
+            + ("; rough faces keep a gap: see roughness_gap" if smooth else "")
+        )
+    elif smooth and traction > 0.0:
+        left = float(np.max(law.traction(AIR, voltage, layers))) / traction
+        if left < DECIDES:
+            yield (
+                f"{1e3 * AIR:g} um of air between rough faces leave {left:.2%} of the attraction of smooth "
+                "ones, so the roughness decides the force: see roughness_gap"
+            )
