@@ -64,7 +64,10 @@ ROOMS = {
         {"numpy", "tomli_w"},
         "motion terms electrics keys probes options scene serialiser format schema file spatial",
     ),
-    "planning": ({"numpy"}, "rooms resolution loaddrift parts attracted plausibility fieldchoice core timescales plan"),
+    "planning": (
+        {"numpy"},
+        "rooms resolution loaddrift parts attracted plausibility fieldchoice core timescales plan",
+    ),
     "simulation": (
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",

@@ -22,7 +22,7 @@ from evfem.mesh.mesh import Mesh
 from evfem.planning.core import Closing, unseen
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_components
-from evfem.planning.plausibility import implausible, locking, touching_traction, weakens
+from evfem.planning.plausibility import implausible, jumps, locking, touching_traction
 from evfem.planning.resolution import oscillating, skipped, steps_line, too_fast, unresolved
 from evfem.planning.rooms import rooms_of
 from evfem.planning.timescales import left_out, time_scales
@@ -266,7 +266,7 @@ def _friction(scene: Scene) -> Term:
         return Term("friction", True, "Coulomb")
     timed = ", slip speed and contact time" if getattr(law, "timed", False) else ""
     falling = ""
-    if not scene.solver.inertial and weakens(scene):
+    if jumps(scene):
         falling = "; velocity weakening: without inertia the finger may jump, dynamics = inertial resolves it"
     limit = f"shear limit of each node from its pressure{timed}"
     return Term("friction", True, f"{type(law).__name__}: {limit}{falling}")

@@ -46,7 +46,10 @@ BESIDE, ROUGH_END = 1.0, 0.1
 #: travel of the bone over the width of the finger, and thickness of the stratum corneum (mm), at least
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
-HEAVIEST = 100.0
+HEAVIEST = 20.0
+#: depth of a plane finger (mm), at least; relaxation time of Kelvin-Voigt tissue (s), at most; frequency (Hz)
+#: of a drive by its mean, at least, below which whole fingers shake along
+THINNEST, SLOWEST_TISSUE, SLOWEST_DRIVE = 1.0, 1.0, 20.0
 #: spacing (mm) of the positions at which a profile's height is sampled
 WAY_STEP = 0.02
 
@@ -61,7 +64,10 @@ def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[
         *_large(scene, mesh, min(moduli.values())),
         *_other_units(scene, mesh),
         *_profile(scene, mesh),
+        *_slow(scene),
         *_at_rest(scene),
+        *_weakening(scene),
+        *_out_of_reach(scene),
         *_breakdown(scene),
         *_unbearable(scene),
         *_hovering(scene, mesh),
@@ -96,6 +102,8 @@ def _small(scene: Scene) -> Iterator[str]:
     skin = getattr(scene.finger.electrical, "stratum_corneum_thickness", None)
     if skin is not None and skin < THINNEST_SKIN:
         yield f"a stratum corneum of {skin:g} mm is thinner than any: lengths are in mm, not in m"
+    if scene.depth is not None and scene.depth < THINNEST:
+        yield f"a depth of {scene.depth:g} mm is less than that of any finger: lengths are in mm, not in m"
     travel = max(abs(length or 0.0) for c in scene.courses for length in (c.distance, c.indentation, c.gap))
     width = getattr(scene.finger, "width", None)
     # a mesh may have most of a half space beside a small contact
@@ -146,6 +154,42 @@ def _at_rest(scene: Scene) -> Iterator[str]:
     timed = any(motion.timed for motion in scene.motion)
     if timed and not scene.solver.timed and any(getattr(one, "relaxation", None) for one in givers):
         yield 'tissue relaxes with dynamics = "viscous" or "inertial" alone: here its branches do nothing'
+
+
+def _slow(scene: Scene) -> Iterator[str]:
+    """Relaxation times in ms and frequencies in kHz."""
+    of = {"finger": scene.finger, **scene.finger.materials}
+    times = {name: getattr(one, "viscosity", None) or 0.0 for name, one in of.items()}
+    slowest = max(times, key=lambda name: times[name])
+    if times[slowest] > SLOWEST_TISSUE:
+        slow = f"a viscosity of {times[slowest]:g} s of the {slowest} is slower than any tissue"
+        yield f"{slow}: relaxation times are in s, not in ms"
+    at = scene.electrics.frequency
+    if scene.drive is not None and not scene.drive.resolved and at is not None and at < SLOWEST_DRIVE:
+        slow = f"a drive of {at:g} Hz shakes the finger, which its mean over the cycle leaves out"
+        yield f'{slow}: frequencies are in Hz, not in kHz; or drive = "resolved"'
+
+
+def _weakening(scene: Scene) -> Iterator[str]:
+    """Friction that falls with the speed where nothing has mass, which has several solutions then."""
+    if jumps(scene):
+        yield (
+            f"friction falls with the speed, and {scene.solver.dynamics} dynamics has no mass that a jump "
+            "would move: where it sticks and slips is by chance; dynamics = inertial resolves it"
+        )
+
+
+def _out_of_reach(scene: Scene) -> Iterator[str]:
+    """Attractions that are exactly 0: beyond the reach of adhesion, or of touching nodes alone in the air."""
+    apart, law = _rough(scene), scene.adhesion
+    if law is not None and not np.any(law.traction(apart)):
+        yield (
+            f"{type(law).__name__} has no traction at {apart:g} mm, which rough faces keep where they touch: "
+            "there is no adhesion at all; see its reach (film) and roughness_gap"
+        )
+    touches = any(course.presses or course.distance for course in scene.courses)
+    if scene.electrics.acts and not scene.air_layer and not touches:
+        yield "air_layer = false, and no motion presses: nothing touches, and nothing is attracted"
 
 
 def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
@@ -211,6 +255,12 @@ def weakens(scene: Scene) -> bool:
     pressure, friction, age = (np.full(speed.size, value) for value in (PRESSED, 0.5, 1.0))
     bound = np.asarray(law.bound(pressure, friction, speed, age))
     return bool((np.diff(bound) < -1e-9 * np.abs(bound).max()).any())
+
+
+def jumps(scene: Scene) -> bool:
+    """Whether friction falls with the speed, and neither tissue nor hand has the mass that follows a jump."""
+    massless = not scene.solver.inertial and not getattr(scene.hand, "mass", 0.0)
+    return massless and weakens(scene)
 
 
 def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:

@@ -119,6 +119,7 @@ def test_a_slab_slides_with_the_force_of_its_uniform_pressure(law, ratio, near):
         assert np.diff(result.friction_dissipation)[-1] == pytest.approx(ratio * N * way, rel=near)
 
 
+@pytest.mark.filterwarnings("ignore:friction falls with the speed")
 @pytest.mark.parametrize("speed", [1.0, 30.0])
 @pytest.mark.parametrize(
     ("law", "ratio"),

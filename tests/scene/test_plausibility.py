@@ -142,7 +142,11 @@ def test_a_field_that_breaks_solids_down_is_doubted():
             ev.Press(force=50.0),
             "motion 0 presses with 50 N/mm, 3 MPa over the whole finger: forces are in N/mm",
         ),
-        (ev.Press(force=10.0), None),
+        (
+            ev.Press(force=5.0),
+            "motion 0 presses with 5 N/mm, 0.3 MPa over the whole finger: forces are in N/mm",
+        ),
+        (ev.Press(force=3.0), None),
     ],
 )
 def test_a_press_that_no_finger_bears_is_doubted(press, said):
@@ -352,3 +356,64 @@ def test_the_shortest_waves_of_roughness_need_five_nodes_each():
         assert (found is None) == enough
     assert "(0.2 mm) have fewer than 5 nodes of the pad each, which are 0.042 mm apart" in found
     assert found.endswith("a shortest wave of 0.21 mm")
+
+
+def said_of(asked):
+    return plan(asked).warnings
+
+
+def pad(*motion, **more):
+    """A pad that touches a display, with time."""
+    finger = ev.FingerPad(resolution="coarse", ridges=False, viscosity=more.pop("viscosity", 0.0))
+    return ev.Scene(finger, ev.Display(friction=0.3), motion=motion or [ev.Press(force=0.05)], **more)
+
+
+def test_seconds_hertz_and_depths_in_other_units_are_doubted():
+    """Each just beyond and just within what is doubted: 1 s, 20 Hz, 1 mm."""
+    for viscosity, doubted in ((5.0, 1), (0.9, 0)):
+        assert (
+            sum("relaxation times are in s, not in ms" in s for s in said_of(pad(viscosity=viscosity)))
+            == doubted
+        )
+    for depth, doubted in ((0.01, 1), (1.0, 0)):
+        assert sum("a depth of 0.01 mm" in s for s in said_of(pad(depth=depth))) == doubted
+    driven = {"law": ev.Kaczmarek(), "voltage": 100.0}
+    for frequency, doubted in ((5.0, 1), (20.0, 0)):
+        found = said_of(pad(drive=ev.Drive(frequency=frequency), **driven))
+        assert sum("frequencies are in Hz, not in kHz" in s for s in found) == doubted
+
+
+def test_loads_of_a_fingertip_that_no_hand_presses_with_are_doubted_and_huge_ones_refused():
+    tip = ev.Fingertip(ridges=False, resolution="coarse")
+    for force, doubted in ((400.0, 1), (20.0, 0)):
+        found = said_of(ev.Scene(tip, ev.Display(), motion=[ev.Press(force=force)]))
+        assert sum("over the whole finger: forces are in N" in s for s in found) == doubted
+    with pytest.raises(ev.InputError, match=r"given 1000000\.0; allowed: a force in N/mm"):
+        ev.Press(force=1e6)
+
+
+def test_attractions_that_are_exactly_nothing_are_told():
+    """Menisci of 1 um between faces that are 2 um apart; nodes in the air without an air layer."""
+    water = ev.Capillary(surface_tension=0.0728, contact_angle=0.0, film=1e-3)
+    for gap, told in ((2e-3, 1), (5e-4, 0)):
+        found = said_of(pad(adhesion=water, roughness_gap=gap))
+        assert sum("Capillary has no traction" in s for s in found) == told
+    charged = {"law": ev.Kaczmarek(), "voltage": 100.0, "air_layer": False}
+    for motion, told in ((ev.Hover(gap=0.2), 1), (ev.Press(force=0.05), 0)):
+        assert sum("nothing is attracted" in s for s in said_of(pad(motion, **charged))) == told
+
+
+def test_friction_that_falls_with_the_speed_is_doubted_where_nothing_has_mass():
+    slide = [ev.Press(force=0.05), ev.Slide(1.0, speed=5.0)]
+    falling, rising = ev.RateFriction(speed=5.0, ratio=0.5), ev.RateFriction(speed=5.0, exponent=0.5)
+
+    def doubted(law, dynamics="viscous", **more):
+        solver = ev.Solver(dynamics=dynamics)
+        asked = pad(*slide, friction_law=law, solver=solver, viscosity=1e-3, **more)
+        return any("friction falls with the speed" in one for one in said_of(asked))
+
+    assert doubted(falling)
+    assert doubted(falling, "quasistatic")
+    assert not doubted(rising)
+    assert not doubted(falling, "inertial")
+    assert not doubted(falling, "quasistatic", hand=ev.Hand(stiffness=0.01, mass=1e-6))

@@ -135,6 +135,7 @@ LAWS = [
 ]
 
 
+@pytest.mark.filterwarnings("ignore:friction falls with the speed")
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.kind)
 def test_every_slipping_node_has_the_shear_of_its_law(law):
     """The traction of the accepted state is the law's bound of its pressure, speed and age; the age
