@@ -192,7 +192,7 @@ def corner_frequencies(
 
 
 #: odd harmonics of a square wave that count one by one, groups of those above, and the highest one
-SINGLE, GROUPS, HIGHEST = 16, 32, 1_000_001
+SINGLE, GROUPS, HIGHEST = 16, 20, 1_000_001
 #: orders of samples that repeat: at least so many, and so many times the samples of a period
 SMOOTH, PERIODS = 4096, 8
 
@@ -211,14 +211,31 @@ def square_harmonics() -> tuple[Floats, Floats]:
 
 
 def grouped(order: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """The first `SINGLE` orders as they are, those above in at most `GROUPS` groups of equal total."""
+    """The first `SINGLE` orders as they are, those above in at most `GROUPS` groups that are even in the
+    logarithm, each at two orders: Gauss's rule for its weights, exact for cubics of the logarithm.
+    """
     if order.size <= SINGLE:
         return order, weight
     ends = np.unique(np.geomspace(SINGLE, order.size, GROUPS + 1).astype(int))[:-1]
-    begins = np.concatenate([np.arange(SINGLE), ends])
-    sums = np.add.reduceat(weight, begins)
-    mean = np.exp(np.add.reduceat(weight * np.log(order), begins) / np.where(sums > 0.0, sums, 1.0))
-    return np.concatenate([order[:SINGLE], mean[SINGLE:]]), sums
+    parts = zip(np.split(order, ends), np.split(weight, ends), strict=True)
+    (first, own), *groups = parts
+    pairs = [_two(np.log(one), size) for one, size in groups]
+    at, sizes = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    return np.concatenate([first, np.exp(at)]), np.concatenate([own, sizes])
+
+
+def _two(x: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Gauss's rule with two points for a sum with weights that are not negative; one where x is one."""
+    total = float(weight.sum())
+    if total <= 0.0:
+        return x[:1], np.zeros(1)
+    mean = float(weight @ x) / total
+    square, cube = (float(weight @ (x - mean) ** n) / total for n in (2, 3))
+    if square <= 1e-24:
+        return np.array([mean]), np.array([total])
+    skew = cube / square
+    away = 0.5 * (skew + np.array([-1.0, 1.0]) * np.sqrt(skew**2 + 4.0 * square))
+    return mean + away, total * np.array([away[1], -away[0]]) / (away[1] - away[0])
 
 
 def shares(order: Floats, square: Floats) -> tuple[float, Floats, Floats]:

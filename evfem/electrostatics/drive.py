@@ -6,11 +6,12 @@ of its odd harmonics, :math:`U_n^2 = 8 U^2 / (\pi n)^2`, whose mean pressures ad
 
 .. math:: \bar p = \sum_{n = 1, 3, ...} p(g, U_n, z(n \omega)) .
 
-The first harmonics count one by one, those above in groups at their mean frequency, as the
-pressure hardly changes from one to the next. A signal that repeats (a sine with a bias B, samples)
-is such a sum too, with a direct part: :math:`\bar p = p(g, B, z(0)) + p(g, A/\sqrt2, z(\omega))`. At no
-frequency a gap that leaks over an insulator that does not has no field, and contributes nothing; a
-gap that does not leak has the whole voltage that conductors leave it.
+The first harmonics count one by one, those above in groups at two frequencies each: the mean of a square
+wave over a leaking gap is right to 4e-5 down to a millionth of its corner frequency. A signal that repeats (a
+sine with a bias B, samples) is such a sum too, with a direct part:
+:math:`\bar p = p(g, B, z(0)) + p(g, A/\sqrt2, z(\omega))`. At no frequency a gap that leaks over an insulator
+that does not has no field, and contributes nothing; a gap that does not leak has the whole voltage that
+conductors leave it.
 
 Resolved in time, the voltage of the moment charges the skin, the gap leaks
 (`evfem.electrostatics.relaxation`), and the attraction swings with it.

@@ -48,8 +48,12 @@ from evfem.protocols import TimeSignal
 HEADER = ["time", "voltage"]
 #: largest voltage (V), and frequency and rate (Hz)
 LARGEST, FASTEST = 1e6, 1e9
+#: coulombs, or farads, per metre of depth in a nanocoulomb, or nanofarad, per millimetre
+NANO = 1e-6
 #: largest charge (nC per mm of depth)
 MOST_CHARGE = 1e6
+#: largest capacitance beside the finger (nF per mm of depth)
+MOST_CAPACITANCE = 1e3
 #: fraction of the fluctuation's power that lies below the highest frequency of samples
 POWER = 0.95
 #: fraction of half a period that counts as rounding of a time
@@ -67,6 +71,11 @@ _CHARGE = "a charge in nC per mm of depth, or a signal in time that is called wi
 _ENVELOPE = "a voltage in V, or a signal in time that is called with times"
 _NUMBER_OR_SIGNAL = {"type": float | dict, "kinds": lambda: SIGNALS, "tag": "kind"}
 Frequency = Annotated[float, FREQUENCY, "of the sine, square wave or carrier"]
+Parallel = Annotated[
+    float,
+    number(f"a capacitance in nF/mm from 0 to {MOST_CAPACITANCE:g}", Within(0.0, MOST_CAPACITANCE), "nF/mm"),
+    "beside the finger, of cable, amplifier and the rest of the electrode, per mm of depth",
+]
 Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 
 
@@ -158,7 +167,7 @@ class Square(_Periodic):
 @dataclass(frozen=True)
 class OpenCircuit(Checked):
     """A direct voltage until the electrode is disconnected; then it keeps its charge, whatever that does to
-    its voltage. For a resolved `Drive`.
+    its voltage, together with a `parallel_capacitance`. For a resolved `Drive`.
 
     >>> OpenCircuit(100.0, after=0.1).largest
     100.0
@@ -166,6 +175,7 @@ class OpenCircuit(Checked):
 
     voltage: Annotated[float, _BIAS, "of the source"]
     after: Annotated[float, START, "when the electrode is disconnected"] = 0.0
+    parallel_capacitance: Parallel = 0.0
     highest_frequency = 0.0
     kind = "open_circuit"
 
@@ -183,7 +193,10 @@ class OpenCircuit(Checked):
 class ChargeControl:
     """The electrode has a charge, and the voltage that this takes. For a resolved `Drive`.
 
-    A plate of the area A under the charge Q is pulled by Q^2 / (2 eps_0 A), however far it is.
+    A plate of the area A under the charge Q is pulled by Q^2 / (2 eps_0 A), however far it is. What is
+    beside the finger, `parallel_capacitance`, takes a share of the charge, C_p U: a plate with the capacity
+    C_0 that comes from the gap g on a spring is then stable up to the travel g/3 (1 + C_0 / C_p). A metre of
+    coaxial cable, 100 pF, is 0.01 nF/mm over a depth of 10 mm, and tens of times as much as a finger.
 
     >>> ChargeControl(0.02).charge_at(0.5)
     0.02
@@ -194,6 +207,7 @@ class ChargeControl:
         {"allowed": "a charge in nC/mm, or a signal of charges", "unit": "nC/mm", **_NUMBER_OR_SIGNAL},
         "of the electrode, per mm of depth: a number, or a signal of charges",
     ]
+    parallel_capacitance: Parallel = 0.0
     kind = "charge"
 
     def __post_init__(self) -> None:

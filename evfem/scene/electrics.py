@@ -18,7 +18,7 @@ from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import Sandwich
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
+from evfem.electrostatics.timesignals import NANO, Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.faces import layer_thickness
 from evfem.protocols import TimeSignal
@@ -137,6 +137,11 @@ class Electrics:
         assert self.drive is not None
         gap = {"gap_conductivity": self.drive.gap_conductivity, "gap_eps_r": self.gap_eps_r}
         return Sandwich.of(self.skin, self.insulator, frequency=self.frequency, **gap)
+
+    @property
+    def parallel(self) -> float:
+        """Capacitance beside the finger over eps_0 (in space mm)."""
+        return NANO * getattr(self.given, "parallel_capacitance", 0.0) / eps_0
 
     @property
     def conducts(self) -> bool:

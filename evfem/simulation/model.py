@@ -227,7 +227,7 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
     rough = roughness_of(scene.roughness_gap)
     charging: Charging | NoCharges = NO_CHARGES
     if electrics.resolved:
-        charging = Charging(electrics.sandwich, pad.nodes.size)
+        charging = Charging(electrics.sandwich, pad.nodes.size, electrics.parallel)
     if closing.core is not None:
         law = closing.core.law
     local = (law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)

@@ -75,13 +75,16 @@ NO_CHARGES = NoCharges()
 
 
 class Charging(NoCharges):
-    """Charge transport in a step of so many `seconds` from the state given to `begin`."""
+    """Charge transport in a step of so many `seconds` from the state given to `begin`; a `parallel`
+    capacitance over eps_0 (1, in space mm) is beside the finger.
+    """
 
     flows = True
 
-    def __init__(self, stack: Sandwich, nodes: int) -> None:
+    def __init__(self, stack: Sandwich, nodes: int, parallel: float = 0.0) -> None:
         self.stack = stack
         self.nodes = nodes
+        self.parallel = parallel
         none = np.zeros(nodes)
         self.begin(Charged(self.none, 0.0, none, none), 0.0)
 
@@ -151,8 +154,11 @@ class Charging(NoCharges):
         return found
 
     def electrode_charge(self, at: Charged) -> float:
-        """Charge of the electrode over eps_0 (V), as the insulator's displacement ends on it."""
-        return float(np.sum(at.length * self.stack.fields(at.gap, at.voltage, at.charges)[2]))
+        """Charge of the electrode over eps_0 (V), as the insulator's displacement ends on it, and of what is
+        beside the finger.
+        """
+        ended = float(np.sum(at.length * self.stack.fields(at.gap, at.voltage, at.charges)[2]))
+        return ended + self.parallel * at.voltage
 
     def capacity(self, at: Charged) -> float:
         """Derivative of that charge by the voltage (V) at the end of the step, in which it is linear."""
@@ -177,12 +183,17 @@ class Charging(NoCharges):
         return np.asarray(eps_0 * self.stack.energy(at.gap, at.voltage, at.charges))
 
     def field_energy(self, at: Charged) -> float:
-        """Energy of the field, N mm per mm of depth."""
-        return float(np.sum(at.length * self.energy_density(at)))
+        """Energy of the field, N mm per mm of depth, with that beside the finger."""
+        return float(np.sum(at.length * self.energy_density(at))) + self._beside(at.voltage)
+
+    def _beside(self, voltage: float) -> float:
+        """Energy in the capacitance beside the finger."""
+        return 0.5 * eps_0 * self.parallel * voltage**2
 
     def flow(self, new: Charged) -> Flow:
         """Charge supplied and charge leaked in the step that ended at `new`."""
         old, stack, seconds = self.old, self.stack, self.seconds
+        beside = self._beside(new.voltage) - self._beside(old.voltage)
         start = self.carried(new.length)
         before, moved = (
             stack.fields(gap, old.voltage, charges)[0]
@@ -192,7 +203,7 @@ class Charging(NoCharges):
         if seconds == 0.0:
             jumped = stack.fields(new.gap, new.voltage, start)[0]
             source += 0.5 * (old.voltage + new.voltage) * np.sum(new.length * (jumped - moved))
-            return Flow(float(eps_0 * source), 0.0)
+            return Flow(float(eps_0 * source) + beside, 0.0)
         time, weight = self._times()
         volts = old.voltage + (new.voltage - old.voltage) * (time / seconds)
         charges = stack.after(new.gap, start[:, None], old.voltage, volts[:, None], time[:, None])
@@ -205,7 +216,7 @@ class Charging(NoCharges):
         source += np.sum(
             weight @ ((volts[:, None] * stack.crossing(*at) - rise * stack.fields(*at)[0]) * new.length)
         )
-        return Flow(float(eps_0 * source), float(eps_0 * leaked))
+        return Flow(float(eps_0 * source) + beside, float(eps_0 * leaked))
 
     def _times(self) -> tuple[Floats, Floats]:
         """Quadrature nodes (s) and weights (s) of the step, dense where the fastest charge moves."""

@@ -22,7 +22,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import Layers, eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
+from evfem.electrostatics.timesignals import NANO, ChargeControl, OpenCircuit
 from evfem.errors import InputError
 from evfem.protocols import TimeSignal
 
@@ -30,9 +30,6 @@ from evfem.protocols import TimeSignal
 TURNED = 0.02
 #: parts of the way between two rows of a table, samples of a signal in a period and their largest number
 PARTS, SAMPLES, MOST = 4, 32, 100_000
-#: coulombs per metre of depth in a nanocoulomb per millimetre
-NANO = 1e-6
-
 
 @dataclass(frozen=True)
 class Moment:

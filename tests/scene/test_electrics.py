@@ -156,6 +156,11 @@ def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():
     ("signal", "voltage", "said"),
     [
         ('kind = "charge", charge = 0.02', ev.ChargeControl(0.02), "given charge"),
+        (
+            'kind = "charge", charge = 0.02, parallel_capacitance = 0.01',
+            ev.ChargeControl(0.02, parallel_capacitance=0.01),
+            "given charge",
+        ),
         ('kind = "open_circuit", voltage = 80.0, after = 0.05', ev.OpenCircuit(80.0, 0.05), "disconnected"),
         (
             'kind = "charge", charge = {kind = "sine", frequency = 0.5, amplitude = 0.02}',

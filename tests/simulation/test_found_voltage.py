@@ -106,6 +106,79 @@ def test_a_charge_holds_a_plate_beyond_a_third_of_its_gap(dim):
     np.testing.assert_allclose(2.0 * found.field_energy[1:], (charge * found.voltage)[1:], rtol=1e-7)
 
 
+def beside(share, farthest):
+    """A plate whose capacity is so many times that beside it, with the charge of a travel (mm) in equal
+    parts: with w = gap + solids, C = eps_0 A / (w - x), the force k x takes the charge
+    Q = (C + C_p) (w - x) sqrt(2 k x / (eps_0 A)).
+    """
+    k, area = spring(2)
+    wide = GAP + SOLIDS
+    parallel = eps_0 * area / wide / share
+    travel = farthest * np.arange(1, 9) / 8.0
+    capacity = eps_0 * area / (wide - travel)
+    charge = (capacity + parallel) * (wide - travel) * np.sqrt(2.0 * k * travel / (eps_0 * area))
+    times = travel / farthest
+    signal = ev.ChargeControl(Along(times, 1e6 * charge), parallel_capacitance=1e6 * parallel)
+    return scene(2, signal, [ev.Wait(1.0, steps=8)], RESOLVED), travel, charge, parallel
+
+
+class Along:
+    """A charge (nC/mm) that is linear between times (s)."""
+
+    highest_frequency = 0.0
+
+    def __init__(self, times, charges):
+        self.times, self.charges, self.largest = np.append(0.0, times), np.append(0.0, charges), max(charges)
+
+    def __call__(self, time):
+        return np.interp(time, self.times, self.charges)
+
+
+def test_what_is_beside_the_finger_takes_a_share_of_the_charge():
+    """With C_p = C_0 / 2 a plate is stable at every travel, g/3 (1 + 2) = g; the voltage is Q / (C + C_p)."""
+    asked, travel, charge, parallel = beside(2.0, 0.6 * GAP)
+    found, (_, area) = ev.simulate(asked), spring(2)
+    np.testing.assert_allclose(GAP - found.min_gap[1:], travel, rtol=5e-3)
+    capacity = eps_0 * area / (found.min_gap[1:] + SOLIDS)
+    np.testing.assert_allclose(found.voltage[1:], charge / (capacity + parallel), rtol=2e-4)
+    assert found.relaxations.sum() == 0
+    spent = found.field_energy + found.electrostatic_work + found.stretch_work
+    np.testing.assert_allclose(found.source_work, spent, rtol=1e-5)
+    np.testing.assert_allclose(2.0 * found.field_energy[1:], charge * found.voltage[1:], rtol=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("share", [0.05, 0.5])
+def test_with_a_cable_beside_it_a_plate_under_a_charge_snaps(share):
+    """At x = w / 3 (1 + C_0 / C_p) the charge that x takes is the largest. 2 % less has the travel of that
+    charge; 2 % more has no equilibrium before the plate lands.
+    """
+    limit = (GAP + SOLIDS) / 3.0 * (1.0 + share)
+    asked, travel, charge, _ = beside(share, limit)
+    below, over = (ev.simulate(replace(asked, voltage=scaled(asked, f))) for f in (0.98, 1.02))
+    taken = lambda x: np.interp(x, travel, charge) - 0.98 * charge[-2]  # noqa: E731
+    assert taken(GAP - below.min_gap[-2]) == pytest.approx(0.0, abs=0.005 * charge[-1])
+    assert GAP - below.min_gap[-1] < limit
+    assert over.min_gap[-1] < 0.05 * GAP
+
+
+def scaled(asked, factor):
+    """The charge of a scene times a factor."""
+    given = asked.voltage.charge
+    return replace(asked.voltage, charge=Along(given.times[1:], factor * given.charges[1:]))
+
+
+def test_a_disconnected_electrode_shares_its_charge_with_what_is_beside():
+    """U (C + C_p) stays as the plate is lifted from 0.1 to 0.2 mm."""
+    (_, area), parallel = spring(2), 1e-6
+    signal = ev.OpenCircuit(20.0, after=0.1, parallel_capacitance=parallel)
+    motion = [ev.Wait(0.1, steps=1), ev.Hover(2.0 * GAP), ev.Wait(0.1, steps=1)]
+    found = ev.simulate(scene(2, signal, motion, RESOLVED))
+    total = eps_0 * area / (found.min_gap + SOLIDS) + 1e-6 * parallel
+    np.testing.assert_allclose(found.voltage * total, 20.0 * total[1], rtol=1e-3)
+    assert found.voltage[-1] > 20.5
+
+
 def test_a_charge_that_leaks_leaves_the_voltage_of_the_insulator():
     """Long after, no field is left in a skin and a gap that conduct: U = Q s_3 / (eps_0 A), no force."""
     leak = ev.Drive(skin=ev.Dielectric(1e5, conductivity=1e-3), gap_conductivity=1e-4, resolved=True)
