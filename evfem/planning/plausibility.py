@@ -149,11 +149,13 @@ def _profile(scene: Scene, mesh: Mesh) -> Iterator[str]:
 
 
 def _at_rest(scene: Scene) -> Iterator[str]:
-    """Maxwell branches in a scene without viscous or inertial dynamics."""
+    """Maxwell branches and viscosity in a scene with time, but without viscous or inertial dynamics."""
+    if scene.solver.timed or not any(motion.timed for motion in scene.motion):
+        return
     givers = (scene.finger, *scene.finger.materials.values())
-    timed = any(motion.timed for motion in scene.motion)
-    if timed and not scene.solver.timed and any(getattr(one, "relaxation", None) for one in givers):
-        yield 'tissue relaxes with dynamics = "viscous" or "inertial" alone: here its branches do nothing'
+    for name, does in {"relaxation": "its branches do", "viscosity": "its viscosity does"}.items():
+        if any(getattr(one, name, None) for one in givers):
+            yield f'tissue relaxes with dynamics = "viscous" or "inertial" alone: here {does} nothing'
 
 
 def _slow(scene: Scene) -> Iterator[str]:

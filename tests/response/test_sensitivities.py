@@ -258,7 +258,7 @@ CASES = {
 }
 
 
-@pytest.mark.filterwarnings("ignore:friction falls with the speed")
+@pytest.mark.filterwarnings("ignore:friction falls with the speed", "ignore:5 um of air")
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_are_those_of_differences_of_runs(case):
     make, key = CASES[case]

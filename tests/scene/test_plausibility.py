@@ -188,6 +188,8 @@ def test_branches_that_no_time_loads_are_doubted():
     assert plan(rest).warning.endswith("alone: here its branches do nothing")
     assert plan(replace(rest, solver=ev.Solver(dynamics="viscous"))).warnings == ()
     assert plan(replace(rest, motion=PRESS)).warnings == ()  # as for an impedance
+    thick = replace(rest, finger=replace(finger, relaxation=(), viscosity=0.01))
+    assert plan(thick).warning.endswith("alone: here its viscosity does nothing")
 
 
 # -- slides that never touch -----------------------------------------------------------------------------

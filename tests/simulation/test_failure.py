@@ -19,7 +19,8 @@ def said(
     share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, electric=None, **solver
 ):
     """What is said of a step from a pressed finger whose loss is at `share`."""
-    body = finger(block(4, 2), viscosity=1e-3)
+    timed = solver.get("dynamics", "quasistatic") != "quasistatic"
+    body = finger(block(4, 2), viscosity=1e-3 * timed)
     motion = [ev.Press(indentation=0.1, steps=1), ev.Slide(0.1, steps=1, speed=1.0)]
     surface = ev.Flat(friction=0.3, insulator=ev.Layer(0.05, 3.0))
     going = Run(ev.Scene(body, surface, motion=motion, solver=ev.Solver(**solver), **(electric or {})), None)

@@ -256,7 +256,8 @@ def test_without_air_layer_only_the_contact_attracts():
         )
         assert force == pytest.approx(expected, rel=1e-7)
         assert force == pytest.approx(pressure * length.sum(), rel=0.1)
-    hover = run(Display(), Hover(0.1), law=Kaczmarek(), voltage=2000.0, air_layer=False)
+    with pytest.warns(UserWarning, match="nothing touches, and nothing is attracted"):
+        hover = run(Display(), Hover(0.1), law=Kaczmarek(), voltage=2000.0, air_layer=False)
     assert hover.electrostatic_force[0] == 0.0
 
 

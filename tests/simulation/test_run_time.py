@@ -48,7 +48,7 @@ def test_a_loose_finger_stays_at_its_height_until_a_voltage_acts():
     motion = [ev.Press(indentation=-0.05, steps=1), ev.Slide(0.2, speed=20.0, **hold)]
     motion += [ev.Wait(0.1, **hold), ev.VoltageRamp(1500.0, **hold)]
     for dynamics in ("quasistatic", "viscous", "inertial"):
-        body = finger(block(8, 3, sag=0.4), viscosity=5e-3)
+        body = finger(block(8, 3, sag=0.4), viscosity=5e-3 * (dynamics != "quasistatic"))
         result = ev.simulate(scene(*motion, voltage=0.0, body=body, solver=ev.Solver(dynamics=dynamics)))
         assert result.indentation[:7].tolist() == [-0.05] * 7
         assert np.abs(result.applied_force[:7]).max() < 1e-9
