@@ -22,15 +22,17 @@ enters linearly. `docs/howto/extend.md` shows a user-defined control.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import KILOVOLT
+from evfem.common.constants import KILOVOLT, SMALLEST_FORCE
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
+from evfem.newton.search import Search
 from evfem.newton.state import State, StepFailed
 from evfem.terms.hand import RIGID, Drive
 from evfem.terms.traction import PadState, Reading, smallest_gap
@@ -43,6 +45,8 @@ JUMP = 0.25
 TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown found from the friction force
 AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
+#: a wished force is met if less is missed than so many tolerances of the largest force on the bone
+MET = 100.0
 
 
 class HeightControl:
@@ -119,6 +123,21 @@ class VoltageStep:
     unit: Floats | float = 0.0
 
 
+@dataclass(frozen=True)
+class Trials:
+    """Equilibria of a step from `old` in which the bone moves by `travel`, x[, z] (d,) in mm, with a relative
+    `tolerance`: `solve(control, start)`, by default from where the step begins, raises `StepFailed`;
+    `unused(state, direction)` is the friction force (N/mm) along a unit vector (d,) by which sticking nodes
+    are below their bounds.
+    """
+
+    old: State
+    travel: Floats
+    tolerance: float
+    solve: Callable[..., State]
+    unused: Callable[[State, Floats], float]
+
+
 class VoltageControl:
     """Control of the voltage: `voltage` (V), prescribed or the largest; `free`: it is an unknown."""
 
@@ -167,9 +186,13 @@ class VoltageControl:
         """Whether the equation, or its bound, holds for a bone that moves along the display by (d,)."""
         return True
 
-    def fallback(self, old: State, found: State | None) -> VoltageControl | None:
-        """Another control where the step with this one failed (None) or has no meaningful solution."""
-        return None
+    def find(self, trials: Trials) -> State:
+        """The equilibrium of a step. Raises `StepFailed`."""
+        return trials.solve(self)
+
+    def missed(self, state: State, tolerance: float) -> float:
+        """Wished less reached force (N/mm) of an accepted state, 0 where the wish is met."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -273,8 +296,7 @@ class GivenGap(ConstrainedVoltage):
 @dataclass
 class FollowFriction(VoltageControl):
     """The voltage, from 0 to `voltage` (V), makes the bone's force along a `direction`, x[, z] of a unit
-    vector, `force` (N/mm). Friction of a pad that sticks hardly depends on the voltage, which then stays as
-    it was.
+    vector, `force` (N/mm); where none does, the nearest force (`evfem.newton.search`).
     """
 
     force: float
@@ -319,17 +341,41 @@ class FollowFriction(VoltageControl):
         """At a bound the force may miss `force` in its direction; else the voltage is unknown again."""
         if self.free:
             return True
-        forward = float(np.sign(travel @ np.array(self.direction))) or 1.0
-        lacking = forward * self._force_residual(reaction)
+        lacking = self._forward(travel) * self._force_residual(reaction)
         if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
             self._mode = UNKNOWN
             return False
         return True
 
-    def fallback(self, old: State, found: State | None) -> VoltageControl | None:
-        if found is not None and not (self._mode == AT_LIMIT and sticks(found)):
-            return None
-        return GivenVoltage(old.voltage)
+    def find(self, trials: Trials) -> State:
+        """With the voltage as an unknown, or, where that fails or sticks at its limit, by a search."""
+        with suppress(StepFailed):
+            found = trials.solve(self)
+            if not (self._mode == AT_LIMIT and sticks(found)):
+                return found
+        forward = self._forward(trials.travel)
+
+        def at(voltage: float, start: State | None) -> State:
+            return trials.solve(GivenVoltage(voltage), start)
+
+        def measured(state: State) -> tuple[float, float, float]:
+            unused = trials.unused(state, forward * np.array(self.direction))
+            return forward * self._force_residual(state.reaction), unused, strength(state)
+
+        return Search(at, measured, trials.old.voltage, self.voltage, trials.tolerance).nearest()
+
+    def _forward(self, travel: Floats) -> float:
+        """Whether a bone that moves by (d,) goes along the direction, 1, or against it, -1."""
+        return float(np.sign(travel @ np.array(self.direction))) or 1.0
+
+    def missed(self, state: State, tolerance: float) -> float:
+        found = self._force_residual(state.reaction)
+        return found if abs(found) > MET * tolerance * strength(state) else 0.0
+
+
+def strength(state: State) -> float:
+    """Largest force on the bone (N/mm), to which tolerances are relative."""
+    return max(float(np.abs(state.reaction).max()), SMALLEST_FORCE)
 
 
 def sticks(state: State) -> bool:

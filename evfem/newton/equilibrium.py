@@ -21,6 +21,7 @@ state; nothing is committed before acceptance.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.rooms import begun, ended
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.newton.control import Force, Indentation, Target, Unsupported, sticks
+from evfem.newton.control import Force, Indentation, Target, Trials, Unsupported, VoltageControl, strength
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
 from evfem.newton.state import Balance, Folded, Limits, State, StepFailed
@@ -137,23 +138,14 @@ class Equilibrium:
         return lowered if abs(lowered.reaction[1]) < SMALLEST_FORCE else lifted
 
     def _solve_with_voltage_control(self, old: State, target: Target, start: State | None) -> State:
-        """Solve the step with the target's voltage control; if the control cannot be satisfied, solve once
-        more at constant voltage and require that some node sticks. Raises `StepFailed`.
-        """
-        found = None
-        try:
-            found = self._attempt(old, target, start)
-        except StepFailed:
-            if target.voltage.fallback(old, None) is None:
-                raise
-        other = target.voltage.fallback(old, found)
-        if found is not None and other is None:
-            return found
-        assert other is not None
-        at_fixed_voltage = self._attempt(old, replace(target, voltage=other), start)
-        if not sticks(at_fixed_voltage):
-            raise StepFailed("the prescribed friction force was not found", self.record.residuals)
-        return at_fixed_voltage
+        """Solve the step as the target's voltage control finds it. Raises `StepFailed`."""
+
+        def solve(control: VoltageControl, begin: State | None = None) -> State:
+            return self._attempt(old, replace(target, voltage=control), begin or start)
+
+        unused = partial(self.interface.unused_friction, old)
+        travel = target.place - old.bone[::2]
+        return target.voltage.find(Trials(old, travel, self.tolerance, solve, unused))
 
     def _attempt(self, old: State, target: Target, start: State | None) -> State:
         try:
@@ -206,7 +198,7 @@ class Equilibrium:
         if not self.obeys_contact(old, state):
             return False
         travel = target.place - old.bone[::2]
-        slack = self.tolerance * max(np.abs(state.reaction).max(), SMALLEST_FORCE)
+        slack = self.tolerance * strength(state)
         return target.voltage.accepts(travel, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:

@@ -258,6 +258,12 @@ class Interface:
         """The same of some nodes (k,) with the coefficients mu (k,), slipping by (k,)."""
         return self.bounds.bound(self, old, state, nodes, mu, slip)
 
+    def unused_friction(self, old: State, state: State, direction: Floats) -> float:
+        """Friction force (N/mm) along a unit vector (d,) by which sticking nodes are below their bounds."""
+        place, sticks = self.jumps.at(self.on_display(state)), state.status == STICK
+        bound = self.limit(old, state, place, np.zeros(len(place)))
+        return float((bound + state.contact_force[:, 1:] @ direction)[sticks].sum())
+
     def compliance(self, old: State) -> Floats:
         """Compliance of the faces (P, dim), normal and tangent, in mm per N/mm."""
         return self.faces.compliance(old)

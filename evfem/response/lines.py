@@ -167,12 +167,10 @@ class Beside:
         ledger.accept(old, new)
         return ledger
 
-    def row(self, state: State, step: int, books: Books, sums: dict[str, float]) -> dict[str, Any]:
+    def row(self, state: State, books: Books, sums: dict[str, float]) -> dict[str, Any]:
         """The row at the end of the present step."""
         assert self.request is not None
-        one, run = self.request, self.run
-        ledger = Ledger(run.model, sums, books)
-        return ledger.row(state, step, one.motion_index, one.kind, run.time + one.duration)
+        return self.run.row(Ledger(self.run.model, sums, books), self.request, state)
 
 
 @dataclass
@@ -378,16 +376,14 @@ class Line:
 
     # -- a step
 
-    def ends(
-        self, step: int, state: State, books: Books, sums: dict[str, float], row: dict[str, Any]
-    ) -> None:
+    def ends(self, state: State, books: Books, sums: dict[str, float], row: dict[str, Any]) -> None:
         """A step is done: the derivative of its row, and the range of the parameter with these statuses."""
-        fixed = [one.row(state, step, books, sums) for one in self.beside]
+        fixed = [one.row(state, books, sums) for one in self.beside]
         way, along = self.way, []
         for sample in SAMPLES:
             offset = sample * way
             of_sums = {name: value + offset * self.sums.get(name, 0.0) for name, value in sums.items()}
-            here = moved(state, self.state, offset), step, moved(books, self.books, offset), of_sums
+            here = moved(state, self.state, offset), moved(books, self.books, offset), of_sums
             along.append(self.centre.row(*here))
         names = [name for name in fixed[0] if differentiable(name) and (self.works or not is_work(name))]
         found = {}

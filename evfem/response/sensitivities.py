@@ -146,7 +146,7 @@ class _Differentiated:
                 line.valid_to.append(np.nan)
                 continue
             assert self.ledger.end is not None
-            line.ends(request.step, self.run.state, self.ledger.end, self.ledger.sums, self.run.rows[-1])
+            line.ends(self.run.state, self.ledger.end, self.ledger.sums, self.run.rows[-1])
         self.centre.run.time += request.duration
 
     @property

@@ -111,6 +111,7 @@ def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
         _energy_created(rows),
         _snapped(rows),
         _climbed(rows),
+        _missed(rows),
         _strained(scene, rows),
     )
     return [sentence for one in told for sentence in one] if rows else []
@@ -238,6 +239,18 @@ def _climbed(rows: Sequence[Row]) -> Iterator[str]:
             f"{count} steps in time, the first of them step {first}, pass a barrier of the energy that their "
             "speed does not carry them over: shorter steps may end elsewhere"
         )
+
+
+def _missed(rows: Sequence[Row]) -> Iterator[str]:
+    """Rows whose friction force is not the wished one."""
+    unit = "N" if "contact_area" in rows[0] else "N/mm"
+    for row in rows:
+        if (missed := row.get("missed_force", 0.0)) != 0.0:
+            reached = row["applied_tangential_force"]
+            yield (
+                f"step {row['step']}: wished {reached + missed:.3g}, reached {reached:.3g} {unit} at "
+                f"{row['voltage']:.4g} V"
+            )
 
 
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:

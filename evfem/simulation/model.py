@@ -92,7 +92,8 @@ class Model:
         """Columns of the scene's rooms in the history."""
         parts = (one for one in self.attraction.parts if one.name != ELECTROSTATIC)
         forces = (column for one in parts for column in one.named(self.mesh.dim))
-        return (*forces, *(column for room in self.shown for column in room.columns))
+        own = source_of(self.scene.electrics.voltage).columns
+        return (*forces, *(column for room in self.shown for column in room.columns), *own)
 
     @cached_property
     def shear_modulus(self) -> Floats:

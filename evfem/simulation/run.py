@@ -361,8 +361,8 @@ class Run:
             deepest_penetration(self.model, self.free_nodes, self.state.u),
             key=lambda one: one[0],
         )
+        row = self.row(self.ledger, request, self.state)
         self.time += request.duration
-        row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
         row["substeps"] = substeps
         row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
         row["relaxations"] = self.stepper.relaxations - released
@@ -377,6 +377,12 @@ class Run:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
         return self.frames[-1]
+
+    def row(self, ledger: Ledger, request: Request, state: State) -> dict[str, Any]:
+        """The row of a state at the end of a request, without its costs."""
+        at = request.step, request.motion_index, request.kind, self.time + request.duration
+        voltage, tolerance = request.path(0.0, 1.0).voltage, self.model.equilibrium.tolerance
+        return ledger.row(state, *at) | self.source.values(voltage, state, tolerance)
 
     def keep_last_frame(self) -> None:
         """The fields of the last step, wanted or not."""

@@ -9,12 +9,18 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.terms.charging import ChargeBooks
 from evfem.terms.foundation import ElasticFoundation
+from evfem.terms.sources import ForceSource
 from evfem.terms.traction import force_columns
 
 #: by name: a run has those of its scene's rooms
 COLUMNS = {
     one.name: one
-    for one in (*force_columns("adhesive", "adhesion"), *ElasticFoundation.columns, *ChargeBooks.columns)
+    for one in (
+        *force_columns("adhesive", "adhesion"),
+        *ElasticFoundation.columns,
+        *ChargeBooks.columns,
+        *ForceSource.columns,
+    )
 }
 
 
@@ -39,3 +45,4 @@ class OfRooms:
     leakage_dissipation = _of_room("leakage_dissipation")
     stretch_work = _of_room("stretch_work")
     field_energy = _of_room("field_energy")
+    missed_force = _of_room("missed_force")

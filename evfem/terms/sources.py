@@ -15,11 +15,12 @@ source               prescribes                   control (`evfem.newton.control
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.rooms import Column
 from evfem.electrostatics.laws import Layers, eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import NANO, ChargeControl, OpenCircuit
@@ -86,6 +87,8 @@ class Source:
     """A constant voltage, or that of ramps; `signal` is the scene's."""
 
     signal: Any = 0.0
+    #: columns of the history
+    columns: ClassVar[tuple[Column, ...]] = ()
 
     def at(self, moment: Moment) -> float:
         """The voltage (V) at a moment."""
@@ -107,6 +110,10 @@ class Source:
     def turns(self, begin: Moment, end: Moment) -> Floats:
         """Fractions (k,) of a step from `begin` to `end` at which what is prescribed turns."""
         return np.zeros(0)
+
+    def values(self, control: Any, state: Any, tolerance: float) -> dict[str, float]:
+        """Values of the `columns` of an accepted state at the end of a step with this control."""
+        return {}
 
     def pulls(self, moment: Moment) -> bool:
         """Whether anything may attract an unloaded finger at a moment."""
@@ -177,6 +184,8 @@ class OpenSource(SignalSource):
 class ForceSource(Source):
     """Whatever voltage makes the friction force follow a target in slides; elsewhere it stays."""
 
+    columns = (Column("missed_force", "N/mm", "wished less reached friction force on the bone"),)
+
     @property
     def start(self) -> float:
         return 0.0
@@ -189,6 +198,9 @@ class ForceSource(Source):
 
     def turns(self, begin: Moment, end: Moment) -> Floats:
         return over_places(self.signal, begin.along, end.along, 1) if end.slides else np.zeros(0)
+
+    def values(self, control: Any, state: Any, tolerance: float) -> dict[str, float]:
+        return {"missed_force": control.missed(state, tolerance)}
 
     def pulls(self, moment: Moment) -> bool:
         return True

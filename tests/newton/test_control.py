@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
-from evfem.contact.signorini import OPEN, STICK
-from evfem.newton.control import FollowFriction, GivenVoltage, VoltageProblem
+from evfem.newton.control import FollowFriction, VoltageProblem
 
 
 class Friction:
@@ -60,16 +59,3 @@ def test_a_bound_is_left_only_where_the_voltage_could_help(way, wish, tolerated,
         control.force = way * control.force
         assert control.accepts(np.array([way]), np.array([way * force, 0.0]), 1e-6) == accepted
         assert control.free == (not accepted)
-
-
-@pytest.mark.parametrize(
-    ("wish", "status", "kept"),
-    [(20.0, STICK, True), (20.0, OPEN, False), (1.0, STICK, False), (6.5, STICK, False)],
-    ids=["at limit, sticks", "at limit, slips", "at zero", "between"],
-)
-def test_only_at_the_limit_of_a_pad_that_sticks_the_old_voltage_is_kept(wish, status, kept):
-    control, _, _ = follow(wish, 1.0)
-    found, old = SimpleNamespace(status=np.array([status])), SimpleNamespace(voltage=321.0)
-    assert control.fallback(old, found) == (GivenVoltage(321.0) if kept else None)
-    assert control.fallback(old, None) == GivenVoltage(321.0)
-    assert GivenVoltage(5.0).fallback(old, None) is None
