@@ -56,8 +56,8 @@ ROOMS = {
     ),
     "newton": (
         {"numpy", "scipy"},
-        "strategy state control condensation interface linearisation pressure anderson travel factorised "
-        "equilibrium",
+        "strategy state search control condensation interface linearisation pressure anderson travel "
+        "factorised equilibrium",
     ),
     "solver": ({"numpy"}, "relaxation hold path stepping linearbody"),
     "scene": (

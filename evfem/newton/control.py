@@ -29,10 +29,10 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import KILOVOLT, SMALLEST_FORCE
+from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
-from evfem.newton.search import Search
+from evfem.newton.search import Trials, Wish, strength
 from evfem.newton.state import State, StepFailed
 from evfem.terms.hand import RIGID, Drive
 from evfem.terms.traction import PadState, Reading, smallest_gap
@@ -121,21 +121,6 @@ class VoltageStep:
     solution: StepSolution
     change: float = 0.0
     unit: Floats | float = 0.0
-
-
-@dataclass(frozen=True)
-class Trials:
-    """Equilibria of a step from `old` in which the bone moves by `travel`, x[, z] (d,) in mm, with a relative
-    `tolerance`: `solve(control, start)`, by default from where the step begins, raises `StepFailed`;
-    `unused(state, direction)` is the friction force (N/mm) along a unit vector (d,) by which sticking nodes
-    are below their bounds.
-    """
-
-    old: State
-    travel: Floats
-    tolerance: float
-    solve: Callable[..., State]
-    unused: Callable[[State, Floats], float]
 
 
 class VoltageControl:
@@ -353,16 +338,9 @@ class FollowFriction(VoltageControl):
             found = trials.solve(self)
             if not (self._mode == AT_LIMIT and sticks(found)):
                 return found
-        forward = self._forward(trials.travel)
-
-        def at(voltage: float, start: State | None) -> State:
-            return trials.solve(GivenVoltage(voltage), start)
-
-        def measured(state: State) -> tuple[float, float, float]:
-            unused = trials.unused(state, forward * np.array(self.direction))
-            return forward * self._force_residual(state.reaction), unused, strength(state)
-
-        return Search(at, measured, trials.old.voltage, self.voltage, trials.tolerance).nearest()
+        ahead = self._forward(trials.travel) * np.array(self.direction)
+        wish = Wish(float(ahead @ self.direction) * self.force, ahead, self.voltage)
+        return trials.nearest(wish, GivenVoltage)
 
     def _forward(self, travel: Floats) -> float:
         """Whether a bone that moves by (d,) goes along the direction, 1, or against it, -1."""
@@ -371,11 +349,6 @@ class FollowFriction(VoltageControl):
     def missed(self, state: State, tolerance: float) -> float:
         found = self._force_residual(state.reaction)
         return found if abs(found) > MET * tolerance * strength(state) else 0.0
-
-
-def strength(state: State) -> float:
-    """Largest force on the bone (N/mm), to which tolerances are relative."""
-    return max(float(np.abs(state.reaction).max()), SMALLEST_FORCE)
 
 
 def sticks(state: State) -> bool:

@@ -29,9 +29,10 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.rooms import begun, ended
 from evfem.contact.signorini import ContactNotSolved, Unstable
-from evfem.newton.control import Force, Indentation, Target, Trials, Unsupported, VoltageControl, strength
+from evfem.newton.control import Force, Indentation, Target, Unsupported, VoltageControl
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
+from evfem.newton.search import Trials, strength
 from evfem.newton.state import Balance, Folded, Limits, State, StepFailed
 from evfem.newton.strategy import stuck
 from evfem.terms.traction import TOUCHING, PadState, PadTraction

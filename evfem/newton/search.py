@@ -27,8 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.constants import KILOVOLT
-from evfem.newton.state import StepFailed
+from evfem.common.arrays import Floats
+from evfem.common.constants import KILOVOLT, SMALLEST_FORCE
+from evfem.newton.state import State, StepFailed
 
 #: most equilibria at raised voltages, those of them that may fail, and most between two voltages
 RISES, FAILURES, TRIALS = 24, 6, 40
@@ -132,3 +133,44 @@ class Search:
             f[1 - now] *= 0.5 if now == side else 1.0
             f[now], side = value(found), now
         return min(low, high, key=lambda one: abs(value(one)))
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A `force` (N/mm) on the bone along the unit vector `ahead` (d,) of its motion, from 0 to `most` V."""
+
+    force: float
+    ahead: Floats
+    most: float
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Equilibria of a step from `old` in which the bone moves by `travel`, x[, z] (d,) in mm, with a relative
+    `tolerance`: `solve(control, start)`, by default from where the step begins, raises `StepFailed`;
+    `unused(state, direction)` is the friction force (N/mm) along a unit vector (d,) by which sticking nodes
+    are below their bounds.
+    """
+
+    old: State
+    travel: Floats
+    tolerance: float
+    solve: Callable[..., State]
+    unused: Callable[[State, Floats], float]
+
+    def nearest(self, wish: Wish, given: Callable[[float], Any]) -> State:
+        """The equilibrium nearest to a wish, by the controls `given` of prescribed voltages (V)."""
+
+        def at(voltage: float, start: State | None) -> State:
+            return self.solve(given(voltage), start)
+
+        def measured(state: State) -> tuple[float, float, float]:
+            lacking = wish.force - float(state.reaction[::2] @ wish.ahead)
+            return lacking, self.unused(state, wish.ahead), strength(state)
+
+        return Search(at, measured, self.old.voltage, wish.most, self.tolerance).nearest()
+
+
+def strength(state: State) -> float:
+    """Largest force on the bone (N/mm), to which tolerances are relative."""
+    return max(float(np.abs(state.reaction).max()), SMALLEST_FORCE)

@@ -1,4 +1,4 @@
-"""A voltage that is found from a wished friction force: what is met, what is missed, and what is said of it."""
+"""A voltage that is found from a wished friction force: what is met, and what is said to be missed."""
 
 import numpy as np
 import pytest
