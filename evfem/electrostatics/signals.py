@@ -5,13 +5,14 @@ The laws need the effective voltage across skin and insulator. Units: V, mm (of 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Values, above, plain
+from evfem.common.checks import Values, Within, above, check_fields, number, plain, set_frozen
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
 from evfem.common.views import plus
@@ -20,6 +21,9 @@ from evfem.errors import ABSENT, InputError
 HEADER = ["position", "voltage"]
 #: largest magnitude of a position (mm) and of a voltage (V)
 LARGEST = 1e6
+_POSITION = {"allowed": "positions in mm that never fall", "type": list[float], "unit": "mm"}
+_FORCE = {"allowed": "as many forces in N/mm", "type": list[float], "unit": "N/mm"}
+_LARGEST = number(f"a voltage in V, above 0, up to {LARGEST:g}", Within(0.0, LARGEST, above=True), "V")
 
 
 @dataclass(frozen=True)
@@ -38,24 +42,10 @@ class VoltageProfile:
     voltage: Any
 
     def __post_init__(self) -> None:
-        position = numbers("position", self.position, "a list of positions in mm")
-        voltage = numbers("voltage", self.voltage, "a list of voltages in V")
-        if position.size == 0 or position.size != voltage.size:
-            sizes = f"{position.size} positions and {voltage.size} voltages"
-            raise InputError("voltage profile", sizes, "equally many positions and voltages, at least one")
-        if position.size > MOST_ROWS:
-            raise InputError("position", f"{position.size} rows", f"at most {MOST_ROWS} rows")
-        for key, values, unit in (("position", position, "mm"), ("voltage", voltage, "V")):
-            if np.abs(values).max() > LARGEST:
-                given = f"{values[np.argmax(np.abs(values))]:g}"
-                raise InputError(key, given, f"numbers within {LARGEST:g} {unit}")
-        falls = np.flatnonzero(np.diff(position) < 0)
-        if falls.size:
-            row = int(falls[0])
-            given = f"{position[row]} followed by {position[row + 1]}"
-            raise InputError("position", given, "positions in mm that never fall")
-        object.__setattr__(self, "position", position)
-        object.__setattr__(self, "voltage", voltage)
+        position, voltage = _over_position(
+            self.position, self.voltage, ("voltage", "voltages", "V", "voltage profile")
+        )
+        set_frozen(self, position=position, voltage=voltage)
 
     def __repr__(self) -> str:
         x, U = self.position, self.voltage
@@ -101,31 +91,61 @@ class VoltageProfile:
         return float(np.max(rise / run)) if np.all(run > 0) else float("inf")
 
 
+def _over_position(position: Any, values: Any, told: tuple[str, str, str, str]) -> tuple[Any, Any]:
+    """Checked rows of a table over the position: positions in mm, and values by their key, name and unit;
+    the last of `told` is at fault where there are not equally many.
+    """
+    key, name, unit, both = told
+    position = numbers("position", position, "a list of positions in mm")
+    values = numbers(key, values, f"a list of {name} in {unit}")
+    if position.size == 0 or position.size != values.size:
+        sizes = f"{position.size} positions and {values.size} {name}"
+        raise InputError(both, sizes, f"equally many positions and {name}, at least one")
+    if position.size > MOST_ROWS:
+        raise InputError("position", f"{position.size} rows", f"at most {MOST_ROWS} rows")
+    for one, found, of in (("position", position, "mm"), (key, values, unit)):
+        if np.abs(found).max() > LARGEST:
+            given = f"{found[np.argmax(np.abs(found))]:g}"
+            raise InputError(one, given, f"numbers within {LARGEST:g} {of}")
+    falls = np.flatnonzero(np.diff(position) < 0)
+    if falls.size:
+        row = int(falls[0])
+        given = f"{position[row]} followed by {position[row + 1]}"
+        raise InputError("position", given, "positions in mm that never fall")
+    return position, values
+
+
 @dataclass(frozen=True)
 class FollowForce:
     """A voltage that is not given but found: whatever makes the friction force on the bone follow a target.
 
     `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between
     its rows; during slides the effective voltage stays between 0 and `largest_voltage` (V),
-    elsewhere it stays as it is. For `Scene(voltage=...)`.
+    elsewhere it stays as it is. A force out of reach is followed as nearly as possible; the column
+    `missed_force` and a warning tell it. For `Scene(voltage=...)`.
 
     >>> FollowForce([0.0, 1.0], [0.0, 0.02], largest_voltage=2000.0)(0.5)
     0.01
     """
 
-    position: Any
-    tangential_force: Any
-    largest_voltage: float = 10_000.0
+    position: Annotated[Any, _POSITION, "of the bone, along the slide"]
+    tangential_force: Annotated[Any, _FORCE, "on the bone at these positions, linear in between"]
+    largest_voltage: Annotated[float, _LARGEST, "up to which it is sought"] = 10_000.0
+    kind = "follow_force"
 
     def __post_init__(self) -> None:
-        profile = VoltageProfile(self.position, self.tangential_force)
-        above("largest_voltage", self.largest_voltage, 0.0, "a voltage in V above zero")
-        object.__setattr__(self, "position", profile.position)
-        object.__setattr__(self, "tangential_force", profile.voltage)
+        check_fields(self)
+        told = ("tangential_force", "forces", "N/mm", "tangential_force")
+        position, force = _over_position(self.position, self.tangential_force, told)
+        set_frozen(self, position=position, tangential_force=force)
 
     def __call__(self, position: Values) -> Values:
         """Wished force in N/mm at `position` in mm."""
         return plain(piecewise_linear(self.position, self.tangential_force, position))
+
+
+#: kinds of voltages in a file that are found
+FOUND: Mapping[str, Any] = {FollowForce.kind: FollowForce}
 
 
 def carrier_amplitude(effective: Values) -> Values:

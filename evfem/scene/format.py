@@ -16,7 +16,7 @@ from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer
 from evfem.electrostatics.signalfile import read_voltage
-from evfem.electrostatics.signals import VoltageProfile
+from evfem.electrostatics.signals import FOUND, FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import RATE, START, Sampled
 from evfem.errors import ABSENT, InputError, Mistakes
 from evfem.finger.fingerpad import Electrical, FingerPad
@@ -45,6 +45,8 @@ _RELIEF = "the path of a csv file with the header x,z,height"
 _CSV = {"file": lambda name: name.lower().endswith(".csv")}
 _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
+_VOLTAGE = number(f"{VOLTAGE['allowed']}, or a table with a kind: {' | '.join(FOUND)}", VOLTAGE["test"], "V")
+_VOLTAGE |= {"type": float | dict, "kinds": lambda: FOUND}
 
 
 def _rows(allowed: str, unit: str) -> dict[str, Any]:
@@ -229,7 +231,9 @@ class Electrostatics:
     """[electrostatics]: law, voltage and drive of a scene, and the insulator of its surface."""
 
     law: Annotated[str, among(FORCE_LAWS), "force law of the paper, eqs (2) to (5)"]
-    voltage: Annotated[float | None, VOLTAGE, "effective, across skin and insulator"] = None
+    voltage: Annotated[
+        float | FollowForce | None, _VOLTAGE, "effective, across skin and insulator, given or found"
+    ] = None
     amplitude: Annotated[
         float | None,
         number("a peak voltage in V, from 0 to 1e6", Within(0.0, 1e6), "V"),

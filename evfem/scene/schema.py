@@ -16,12 +16,13 @@ from typing import Any, Literal, get_args, get_origin
 from evfem.common.checks import Key, Within, keys_of
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
+from evfem.electrostatics.signals import FOUND
 from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.finger.fingertip import FINGERS
 from evfem.newton.strategy import Strategy
 from evfem.scene import format as file
 from evfem.scene.keys import VERSION
-from evfem.scene.motion import MOTIONS
+from evfem.scene.motion import MOTIONS, VOLTAGE
 from evfem.scene.probes import Probe
 from evfem.scene.scene import Output, Solver
 from evfem.surface.adhesion import ADHESIONS
@@ -157,6 +158,7 @@ def sections() -> list[Section]:
         *kinds("surface.friction_law", FRICTIONS, "which kind"),
         section("surface.elastic", ElasticLayer),
         section("electrostatics", file.Electrostatics, *FORCE_LAWS.values()),
+        *kinds("electrostatics.voltage", FOUND, "which kind"),
         *kinds("electrostatics.signal", file.SIGNALS, "which kind"),
         *kinds(
             "electrostatics.roughness_gap",
@@ -194,12 +196,14 @@ def schema() -> Schema:
     friction, layer = {"$ref": "#/definitions/friction"}, tables["surface.elastic"][0].schema()
     beside: dict[str, Schema] = {"friction_law": friction}
     beside["elastic"] = {"anyOf": [layer, {"type": "array", "minItems": 1, "items": layer}]}
+    volts: Schema = {"type": "number"} | _limits(VOLTAGE["test"], whole=False)
     probe = {"anyOf": [_shape((list[list[float]],)), tables["output.probes.NAME"][0].schema()]}
     inner: dict[str, Schema] = {
         "version": {"const": VERSION},
         "finger": {"anyOf": fingers},
         "surface": {"oneOf": [one.schema(**beside) for one in tables["surface"]]},
         "electrostatics": tables["electrostatics"][0].schema(
+            voltage={"anyOf": [volts, one_of["electrostatics.voltage"]]},
             signal={"$ref": "#/definitions/signal"},
             roughness_gap={"anyOf": [{"type": "number"}, one_of["electrostatics.roughness_gap"]]},
         ),

@@ -18,7 +18,7 @@ from evfem.common.checks import keys_of
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
-from evfem.electrostatics.signals import VoltageProfile
+from evfem.electrostatics.signals import FOUND, FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import SIGNALS
 from evfem.errors import InputError
 from evfem.finger.fingerpad import MeshedFinger
@@ -156,4 +156,6 @@ def voltage_keys(voltage: Any) -> dict[str, Any]:
         return {"voltage_profile": [list(row) for row in rows]}
     if isinstance(voltage, float):
         return {"voltage": voltage}
+    if isinstance(voltage, FollowForce):
+        return {"voltage": _of_kind(voltage, FOUND, "electrostatics.voltage")}
     return {"signal": _of_kind(voltage, SIGNALS, "electrostatics.voltage")}

@@ -62,7 +62,7 @@ duration = 1.0
 PLACES = {"press": 0, "slide": 1, "hover": 2, "voltage": 3, "wait": 4}
 #: tables that `SLIDE` does not have
 ELSEWHERE = ("finger.materials", "surface", "electrostatics.signal", "electrostatics.roughness_gap")
-ELSEWHERE += ("output.probes", "adhesion")
+ELSEWHERE += ("electrostatics.voltage", "output.probes", "adhesion")
 
 
 def judged(schema, text):
