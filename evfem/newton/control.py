@@ -326,7 +326,7 @@ class FollowFriction(VoltageControl):
         """At a bound the force may miss `force` in its direction; else the voltage is unknown again."""
         if self.free:
             return True
-        lacking = self._forward(travel) * self._force_residual(reaction)
+        lacking = self.wish(travel).lacking(reaction)
         if lacking > slack if self._mode == AT_ZERO else lacking < -slack:
             self._mode = UNKNOWN
             return False
@@ -338,13 +338,13 @@ class FollowFriction(VoltageControl):
             found = trials.solve(self)
             if not (self._mode == AT_LIMIT and sticks(found)):
                 return found
-        ahead = self._forward(trials.travel) * np.array(self.direction)
-        wish = Wish(float(ahead @ self.direction) * self.force, ahead, self.voltage)
-        return trials.nearest(wish, GivenVoltage)
+        return trials.nearest(self.wish(trials.travel), GivenVoltage)
 
-    def _forward(self, travel: Floats) -> float:
-        """Whether a bone that moves by (d,) goes along the direction, 1, or against it, -1."""
-        return float(np.sign(travel @ np.array(self.direction))) or 1.0
+    def wish(self, travel: Floats) -> Wish:
+        """What is wished of a bone that moves by (d,) along the display."""
+        direction = np.array(self.direction)
+        forward = float(np.sign(travel @ direction)) or 1.0
+        return Wish(forward * self.force, forward * direction, self.voltage)
 
     def missed(self, state: State, tolerance: float) -> float:
         found = self._force_residual(state.reaction)

@@ -143,6 +143,10 @@ class Wish:
     ahead: Floats
     most: float
 
+    def lacking(self, reaction: Floats) -> float:
+        """Wished less present force (N/mm) at reactions (dim,)."""
+        return self.force - float(reaction[::2] @ self.ahead)
+
 
 @dataclass(frozen=True)
 class Trials:
@@ -165,8 +169,7 @@ class Trials:
             return self.solve(given(voltage), start)
 
         def measured(state: State) -> tuple[float, float, float]:
-            lacking = wish.force - float(state.reaction[::2] @ wish.ahead)
-            return lacking, self.unused(state, wish.ahead), strength(state)
+            return wish.lacking(state.reaction), self.unused(state, wish.ahead), strength(state)
 
         return Search(at, measured, self.old.voltage, wish.most, self.tolerance).nearest()
 

@@ -19,7 +19,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.newton.state import State
 from evfem.response.parameters import Parameter
-from evfem.response.parts import Equations
+from evfem.response.parts import BOUND, GIVEN, WISH, ZERO, Equations
 from evfem.scene.scene import Scene
 from evfem.simulation.history import UNITS
 from evfem.simulation.ledger import Ledger
@@ -121,7 +121,8 @@ def moved(owner: Any, change: Change, way: float) -> Any:
 @dataclass(frozen=True, eq=False)
 class Accepted:
     """An accepted substep of a run: its states and their margins, its span of the step, pins of nodes at
-    discontinuities of friction (`pins`, (P, d) in mm, else nan), and the energy balances before and after it.
+    discontinuities of friction (`pins`, (P, d) in mm, else nan), the energy balances before and after it, and
+    what determines its `voltage` (`evfem.response.parts`).
     """
 
     old: State
@@ -131,6 +132,7 @@ class Accepted:
     pins: Floats
     books: tuple[Books | None, Books]
     sums: tuple[dict[str, float], dict[str, float]]
+    voltage: str = GIVEN
 
 
 @dataclass
@@ -224,14 +226,45 @@ class Line:
     def follow(self, substep: Accepted, solve: Solve, jumps: Jumps, patient: bool) -> bool:
         """Advance the derivatives to the end of a substep; not where `solve` is slow, unless `patient`."""
         equations = [one.begin(substep, jumps, substep.old) for one in self.beside]
-        voltage = difference([one.target.voltage.voltage for one in equations], self.step)
+        fixed = self._surface_by_parameter(substep, equations), *self._partial(substep, equations, jumps)
+        rate = {
+            GIVEN: lambda: float(difference([one.target.voltage.voltage for one in equations], self.step)),
+            ZERO: lambda: 0.0,
+        }.get(substep.voltage, lambda: float(self.state["voltage"]))()
+        change = self._change(substep, solve, jumps, patient, fixed, rate)
+        if change and substep.voltage in (WISH, BOUND):
+            further = rate + (abs(substep.new.voltage) or 1.0) * STEP / self.longest
+            other = self._change(substep, solve, jumps, patient, fixed, further)
+            change = other and self._met(substep, equations, jumps, (change, other))
+        if not change:
+            self.reason = LOST if patient else ""
+            return False
+        self._accept(substep, equations, jumps, change)
+        return True
+
+    def _met(
+        self, substep: Accepted, equations: list[Equations], jumps: Jumps, ends: tuple[Change, Change]
+    ) -> Change:
+        """The derivative with which the equation of the voltage holds, from those with two of the voltage."""
+        slips, new = substep.voltage == BOUND, substep.new
+        fixed = difference([one.lacking(new, slips) for one in equations], self.step)
+        ask: Any = lambda at, state: (at.lacking(state, slips),)  # noqa: E731
+        lacks = [fixed + self._slopes(substep, jumps, one, self._way(substep, one), ask)[0] for one in ends]
+        part = -lacks[0] / (lacks[1] - lacks[0])
+        return {name: one + part * (ends[1][name] - one) for name, one in ends[0].items()}
+
+    def _change(
+        self, substep: Accepted, solve: Solve, jumps: Jumps, patient: bool, fixed: Any, voltage: float
+    ) -> Change:
+        """The derivative of a substep whose voltage has this one, from the partial ones by the parameter;
+        nothing where it is not found.
+        """
         kept = substep.new.parts
         change: Change = {
             name: np.zeros_like(kept[name]) for name in (*UNKNOWN, *SURFACE_FIELDS) if name in kept
         }
-        change["voltage"] = float(voltage)
-        surface_displacement = self._surface_by_parameter(substep, equations)
-        by_parameter, reaction = self._partial(substep, equations, jumps)
+        change["voltage"] = voltage
+        surface_displacement, by_parameter, reaction = fixed
         rate, before, rounds = 1.0, 1.0, 0
         while rounds < MAX_REFINEMENTS:
             rounds += 1
@@ -249,11 +282,8 @@ class Line:
             if not np.isfinite(relative) or (rate > SLOW and rounds > 1 and not patient):
                 break
         if before <= WRONG and (patient or rate <= SLOW or before <= ROUNDING):
-            change["reaction"] = reaction + self._along(substep, jumps, change)[1]
-            self._accept(substep, equations, jumps, change)
-            return True
-        self.reason = LOST if patient else ""
-        return False
+            return change | {"reaction": reaction + self._along(substep, jumps, change)[1]}
+        return {}
 
     def _partial(self, substep: Accepted, equations: list[Equations], jumps: Jumps) -> tuple[Floats, Floats]:
         """Derivatives (m,) of the equations and (dim,) of the reaction by the parameter at fixed state."""

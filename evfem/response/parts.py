@@ -24,10 +24,16 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, sizes
-from evfem.newton.control import Target, Unsupported
+from evfem.newton.control import MET, ConstrainedVoltage, FollowFriction, Target, Unsupported
 from evfem.newton.interface import Interface
+from evfem.newton.search import strength
 from evfem.newton.state import State
 from evfem.simulation.model import Model
+from evfem.terms.traction import PadState
+
+#: what determines a voltage: itself, that of the state before, its lower bound 0, a wished charge, gap or
+#: friction force, or the bound of friction of a pad that sticks
+GIVEN, KEPT, ZERO, WISH, BOUND = "given", "kept", "zero", "wish", "bound"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +101,36 @@ class Equations:
         """Which residuals of contact are nonsmooth, (P, dim) bool."""
         slips = (state.status >= FORWARD)[:, None]
         return (slips & (np.arange(state.bone.size) > 0)) | (not self.interface.surface.is_flat)
+
+    def lacking(self, state: State, slips: bool) -> float:
+        """What the equation of a voltage that is found lacks: wished less present charge, gap or friction
+        force; less also the friction that sticking nodes do not use, where it is that at which the pad slips.
+        """
+        control = self.target.voltage
+        if isinstance(control, ConstrainedVoltage):
+            reading, wanted = control.read(self.model.attraction, self._pad(state))
+            return float(wanted - reading.value)
+        assert isinstance(control, FollowFriction)
+        wish = control.wish(self.target.place - self.old.bone[::2])
+        unused = self.interface.unused_friction(self.old, state, wish.ahead) if slips else 0.0
+        return wish.lacking(state.reaction) - unused
+
+    def voltage_by(self, state: State) -> str:
+        """What determines the voltage of the accepted `state`: one of the words at the head of this file."""
+        control, tolerance = self.target.voltage, self.model.equilibrium.tolerance
+        if not isinstance(control, FollowFriction):
+            return WISH if control.sought else GIVEN
+        if state.voltage == 0.0:
+            return ZERO
+        if control.missed(state, tolerance) == 0.0:
+            return WISH
+        if state.voltage in (control.voltage, self.old.voltage):
+            return GIVEN if state.voltage == control.voltage else KEPT
+        slips = abs(self.lacking(state, slips=True)) <= MET * tolerance * strength(state)
+        return BOUND if slips else ""
+
+    def _pad(self, state: State) -> PadState:
+        return self.interface.pad_state(state, self.old.touching)
 
     def force_controlled(self, axis: int) -> bool:
         """Whether the bone is force-controlled along an axis, not displacement-controlled."""

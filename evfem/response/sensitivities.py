@@ -69,7 +69,7 @@ from evfem.simulation.works import Books
 #: why columns have no derivative
 COUNTED = "it counts, or is measured by, whole nodes, steps or seconds"
 SNAPPED = "the finger snapped or was released in step {}: no derivative goes through that"
-SOUGHT = "a voltage that is an unknown of the step is not differentiated (step {})"
+SOUGHT = "the voltage that is sought in step {} obeys no equation: its force jumps there, or ends"
 LIFTED = "a finger without a load that is touched is not differentiated (step {})"
 
 
@@ -172,12 +172,12 @@ class _Differentiated:
             return
         span, pins = self._span(), self.run.model.equilibrium.interface.jumps
         here = Equations(self.run.model, old, self._request.path(*span).begun(old))
-        if reason := _refused(here.target, new):
-            self._stop(reason)
+        if not (voltage := here.voltage_by(new)) or _lifted(here.target, new):
+            self._stop(LIFTED if voltage else SOUGHT)
             return
         assert self.ledger.end is not None
         books, sums = (before[1], self.ledger.end), (before[0], self.ledger.sums)
-        part = Accepted(old, here.held(new), here.margins(new), span, pins.place.copy(), books, sums)
+        part = Accepted(old, here.held(new), here.margins(new), span, pins.place.copy(), books, sums, voltage)
         for line in self._followed:
             self._follow(line, part, here)
 
@@ -207,11 +207,9 @@ class _Differentiated:
         return True
 
 
-def _refused(target: Target, new: State) -> str:
-    """Why a part is not differentiated, or nothing."""
-    if target.voltage.sought:
-        return SOUGHT
-    return LIFTED if isinstance(target.height, Unsupported) and bool((new.status != OPEN).any()) else ""
+def _lifted(target: Target, new: State) -> bool:
+    """Whether a finger without a load is touched."""
+    return isinstance(target.height, Unsupported) and bool((new.status != OPEN).any())
 
 
 @dataclass(frozen=True, eq=False)
