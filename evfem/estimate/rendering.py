@@ -233,10 +233,10 @@ def exact(
     """Exact encoding: the voltage at which the coupled model has the reference's friction force.
 
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as its
-    equation; where that lies outside, the voltage stays at its limit. While some nodes stick, attraction
-    hardly changes the friction force; if no voltage meets the target then, the voltage is unchanged. The
-    resulting effective voltage is in `result.voltage`, the `drive`'s peak in `peak_voltage`;
-    `Comparison.unmet` marks the positions where the target was missed.
+    equation; where that lies outside, the voltage stays at its limit. While nodes stick, attraction hardly
+    changes the friction force; if no voltage meets the target then, the voltage is unchanged, or that at
+    which they would slip at it (`evfem.newton.search`). The resulting effective voltage is in
+    `result.voltage`, the `drive`'s peak in `peak_voltage`, the force that is missed in `missed_force`.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)

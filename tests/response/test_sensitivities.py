@@ -295,14 +295,6 @@ def test_what_a_finger_computes_is_no_parameter():
         ev.sensitivities(dome_scene(ev.Press(indentation=0.1, steps=1)), "finger.materials.lower.E")
 
 
-def test_a_voltage_that_follows_a_force_is_not_differentiated_and_said_so():
-    scene = block(voltage=ev.FollowForce([0.0, 1.0], [0.005, 0.005], 300.0), motion=block().motion[:2])
-    found = ev.sensitivities(scene, TISSUE + "E", ["normal_force"])
-    assert np.isfinite(found["normal_force", TISSUE + "E"][:3]).all()
-    assert np.isnan(found["normal_force", TISSUE + "E"][3:]).all()
-    assert "unknown of the step" in found.reasons[TISSUE + "E"]
-
-
 def test_where_a_force_is_held_shapes_change_normal_force_and_attraction_alike():
     """What rounds are the nail's forces, which are large: with as small changes of the whole shape as the
     attraction needs, the difference would be 6e-9.

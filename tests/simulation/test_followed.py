@@ -69,6 +69,71 @@ def test_while_the_pad_sticks_it_is_said_too_and_the_wish_comes_later():
     assert result.applied_tangential_force[3] < 0.035
 
 
+FILE = """
+version = 1
+[finger]
+ridges = false
+resolution = "coarse"
+[surface]
+kind = "flat"
+friction = 0.4
+[electrostatics]
+law = "kaczmarek"
+insulator = "film"
+voltage = {kind = "follow_force", position = [0, 3], tangential_force = [0.03, 0.035]}
+[[motion]]
+kind = "press"
+force = 0.05
+steps = 2
+[[motion]]
+kind = "slide"
+distance = 3.0
+steps = 2
+"""
+
+
+def test_a_sweep_varies_what_is_wished(tmp_path):
+    """The rows of the wish, and friction; the wish of 0.03 at the start does not count at the end."""
+    (tmp_path / "scene.toml").write_text(FILE, encoding="utf-8")
+    end = "electrostatics.voltage.tangential_force.1"
+    outputs = ("voltage.last", "missed_force.last", "applied_tangential_force.last", "applied_force.last")
+    grid = {end: [0.019, 0.03]}
+    rows = ev.sweep(ev.Sweep(tmp_path / "scene.toml", grid, outputs=outputs), workers=1).rows
+    below, met = rows
+    assert below["voltage.last"] == 0.0
+    assert below["missed_force.last"] == pytest.approx(0.019 - MU * below["applied_force.last"], rel=1e-7)
+    assert met["missed_force.last"] == 0.0
+    assert met["applied_tangential_force.last"] == pytest.approx(0.03, rel=1e-7)
+    python = slid(0.03, 2).voltage[-1]
+    assert met["voltage.last"] == pytest.approx(python, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("line", "key"),
+    [
+        ("position = [0, 3], tangential_force = [0.03]", "tangential_force"),
+        ("position = [3, 0], tangential_force = [0.03, 0.03]", "position"),
+        ("position = [0, 3]", "tangential_force"),
+        ("position = [0, 3], tangential_force = [0.03, 0.03], largest_voltage = 0", "largest_voltage"),
+        ("position = [0, 3], force = [0.03, 0.03]", "force"),
+    ],
+)
+def test_a_mistake_in_the_file_names_its_key(line, key):
+    told = 'voltage = {kind = "follow_force", ' + line + "}"
+    with pytest.raises(ev.InputError) as error:
+        ev.scenefile.loads(FILE.replace(FILE.splitlines()[11], told))
+    assert error.value.key == f"electrostatics.voltage.{key}"
+
+
+def test_a_scene_with_a_wish_is_written_and_read():
+    scene = ev.scenefile.loads(FILE.replace("0.035]", "0.035], largest_voltage = 4000.0"))
+    again = ev.scenefile.loads(ev.scenefile.dump(scene))
+    assert type(again.voltage) is ev.FollowForce
+    assert again.voltage.position.tolist() == [0.0, 3.0]
+    assert again.voltage.tangential_force.tolist() == [0.03, 0.035]
+    assert again.voltage.largest_voltage == 4000.0
+
+
 def test_a_run_whose_voltage_is_given_has_no_such_column():
     scene = ev.Scene(
         ev.FingerPad(resolution="coarse", ridges=False), ev.Display(), motion=[ev.Press(force=LOAD, steps=1)]

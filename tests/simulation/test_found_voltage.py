@@ -318,3 +318,25 @@ def test_the_barrier_of_a_plate_is_that_of_its_potential():
     back = rise(SubstepWork(hovering.model, closed.state, hovering.state), target) * stored
     assert there == pytest.approx(potential[top] - potential[stable], rel=0.05)
     assert back == pytest.approx(potential[top] - potential[-1], rel=0.05)
+
+
+def test_the_derivatives_of_the_voltage_of_a_gap_are_those_of_the_closed_form():
+    """U^2 = 2 k x (g + s)^2 / (eps_0 A): by the columns' modulus U/2E, by the thickness U/3(g + s)."""
+    asked = scene(2, 0.0, [ev.VoltageRamp(gap=0.04, steps=3)])
+    modulus, thickness = keys = ["finger.materials.columns.E", "electrostatics.insulator_thickness"]
+    found = ev.sensitivities(asked, keys, ["voltage", "min_gap"])
+    U, gap = found.result.voltage[1:], found.result.min_gap[1:]
+    np.testing.assert_allclose(found["voltage", modulus][1:], U / 0.2, rtol=2e-3)
+    np.testing.assert_allclose(found["voltage", thickness][1:], U / 3.0 / (gap + SOLIDS), rtol=1e-5)
+    np.testing.assert_allclose(found["min_gap", modulus][1:], 0.0, atol=1e-9)
+
+
+def test_the_derivatives_of_the_voltage_of_a_charge_are_those_of_the_closed_form():
+    """U = Q (g + s) / (eps_0 A), x = Q^2 / (2 eps_0 A k): stiffer columns leave x/E more of the gap."""
+    asked, travel, charge = charging(2, farthest=0.35)
+    modulus = "finger.materials.columns.E"
+    found = ev.sensitivities(asked, [modulus], ["voltage", "min_gap"])
+    _, area = spring(2)
+    np.testing.assert_allclose(found["min_gap", modulus], travel / 0.1, rtol=3e-3, atol=1e-9)
+    by_gap = charge / (eps_0 * area)
+    np.testing.assert_allclose(found["voltage", modulus], by_gap * travel / 0.1, rtol=3e-3, atol=1e-6)
