@@ -97,6 +97,8 @@ class Search:
         largest, failures = (self.most / KILOVOLT) ** 2, 0
         step = FIRST * largest
         for _ in range(RISES):
+            if low.squared >= largest:
+                break
             try:
                 high = self._try(min(low.squared + step, largest), low.state)
             except StepFailed:
@@ -109,8 +111,6 @@ class Search:
                 return low, high
             gained, grown = low.short - high.short, high.squared - low.squared
             low = high
-            if low.squared >= largest:
-                break
             step = grown * min(max(BEYOND * high.short / max(gained, 1e-300), 1.0), MOST)
         return low, low
 

@@ -16,15 +16,16 @@ TOLERANCE = 1e-8
 class Block:
     """Coulomb's block: it slips at mu (N + c s), or sticks below; `lost(s)` squared voltages fail."""
 
-    def __init__(self, wish, bears=STIFF, lost=lambda squared: False, jump=0.0):
+    def __init__(self, wish, bears=STIFF, lost=lambda squared: False, jump=0.0, power=1.0):
         self.wish, self.bears, self.lost, self.jump, self.asked = wish, bears, lost, jump, []
+        self.power = power
 
     def at(self, voltage, start):
         squared = (voltage / 1000.0) ** 2
         self.asked.append(voltage)
         if self.lost(squared):
             raise StepFailed("lost", [])
-        bound = MU * (LOAD + PULL * squared + (self.jump if squared > 9.0 else 0.0))
+        bound = MU * (LOAD + PULL * squared**self.power + (self.jump if squared > 9.0 else 0.0))
         return SimpleNamespace(voltage=voltage, bound=bound, force=min(bound, self.bears))
 
     def measure(self, state):
@@ -52,7 +53,19 @@ def test_a_force_between_is_met_from_any_voltage(wish, begin):
 @pytest.mark.parametrize(("wish", "voltage"), [(0.019, 0.0), (0.2, 10_000.0)])
 @pytest.mark.parametrize("begin", [0.0, 3000.0, 10_000.0])
 def test_a_force_out_of_reach_has_the_nearest_bound(wish, voltage, begin):
-    assert Block(wish).nearest(begin).voltage == voltage
+    block = Block(wish)
+    assert block.nearest(begin).voltage == voltage
+    # no voltage is asked twice
+    assert len(block.asked) == len(set(block.asked))
+
+
+@pytest.mark.parametrize("power", [0.2, 4.0])
+def test_a_force_that_bends_over_the_squared_voltage_is_met_in_few_equilibria(power):
+    """Regula falsi without the halves of the Illinois rule keeps one end, and takes hundreds."""
+    block = Block(0.0205, power=power)
+    found = block.nearest(2900.0)
+    assert found.voltage == pytest.approx(1000.0 * (0.00125 / PULL) ** (0.5 / power), rel=1e-4)
+    assert len(block.asked) < 25
 
 
 def test_a_pad_that_sticks_keeps_its_voltage():

@@ -1,5 +1,6 @@
 """Derivatives of a voltage that is found from a wished friction force, beside differences of whole runs."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -68,6 +69,11 @@ def test_at_its_bounds_the_voltage_has_no_derivative_but_the_missed_force_has():
         assert pressed != 0.0
         known = differences("surface.friction", "missed_force", **given)
         np.testing.assert_allclose(found["missed_force", "surface.friction"], known, rtol=1e-5, atol=1e-9)
+    # a wish that falls below what there is without a voltage, after one that was met
+    falling = ev.FollowForce([0.0, 2.0, 2.0, 3.0], [0.03, 0.03, 0.015, 0.015])
+    found = ev.sensitivities(replace(followed(), voltage=falling), ["surface.friction"], ["voltage"])
+    assert found.result.voltage[2:].round().tolist() == [3380.0, 0.0]
+    assert found["voltage", "surface.friction"][-1] == 0.0
     found = ev.sensitivities(
         followed(largest=2000.0), ["electrostatics.voltage.largest_voltage"], ["voltage"]
     )
