@@ -77,7 +77,7 @@ class Search:
         """The equilibrium whose friction force is nearest to the wish; raises `StepFailed` if there is none
         at the last voltage.
         """
-        first = self._try(min(self.begin, self.most) ** 2 / KILOVOLT**2, None)
+        first = self._try(min(self.begin, self.most), None)
         waits = first.unused > UNUSED * first.slack / self.tolerance or first.short <= first.slack
         if abs(first.lacking) <= first.slack or (first.lacking > 0.0 and waits):
             return first.state
@@ -87,10 +87,10 @@ class Search:
             return (first if first.squared == 0.0 else unpowered).state
         return self._between(unpowered, first).state
 
-    def _try(self, squared: float, start: Any) -> Trial:
-        state = self.at(KILOVOLT * float(np.sqrt(squared)), start)
+    def _try(self, voltage: float, start: Any) -> Trial:
+        state = self.at(voltage, start)
         lacking, unused, largest = self.measure(state)
-        return Trial(squared, state, lacking, unused, self.tolerance * largest)
+        return Trial((voltage / KILOVOLT) ** 2, state, lacking, unused, self.tolerance * largest)
 
     def _raised(self, low: Trial) -> tuple[Trial, Trial]:
         """Two trials with the wish between them, or twice the highest one."""
@@ -100,7 +100,8 @@ class Search:
             if low.squared >= largest:
                 break
             try:
-                high = self._try(min(low.squared + step, largest), low.state)
+                voltage = min(KILOVOLT * float(np.sqrt(low.squared + step)), self.most)
+                high = self._try(voltage, low.state)
             except StepFailed:
                 failures += 1
                 if failures > FAILURES:
@@ -125,7 +126,7 @@ class Search:
             squared = (low.squared * f[1] - high.squared * f[0]) / (f[1] - f[0])
             start = low if squared - low.squared < high.squared - squared else high
             try:
-                found = self._try(squared, start.state)
+                found = self._try(KILOVOLT * float(np.sqrt(squared)), start.state)
             except StepFailed:
                 break
             now = int(value(found) <= 0.0)

@@ -68,8 +68,14 @@ def test_a_force_that_bends_over_the_squared_voltage_is_met_in_few_equilibria(po
     assert len(block.asked) < 25
 
 
-def test_a_pad_that_sticks_keeps_its_voltage():
-    assert Block(0.035, bears=0.015).nearest(800.0).voltage == 800.0
+@pytest.mark.parametrize("begin", np.linspace(0.0, 3000.0, 30))
+def test_a_pad_that_sticks_keeps_its_voltage_to_the_last_digit(begin):
+    assert Block(0.035, bears=0.015).nearest(begin).voltage == begin
+
+
+@pytest.mark.parametrize("most", np.linspace(100.0, 3000.0, 30))
+def test_the_largest_voltage_is_reached_to_the_last_digit(most):
+    assert Block(0.035).nearest(0.0, most).voltage == most
 
 
 def test_a_pad_that_comes_to_stick_has_the_voltage_at_which_it_would_slip_at_the_wish():
