@@ -178,8 +178,9 @@ class Equations:
         return np.column_stack([np.where(status == OPEN, normal[:, 0], gap), along]), slip, bound
 
     def margins(self, state: State) -> Floats:
-        """How far nodes are from another status (P, 2): gap (mm) of open ones, contact force of closed ones;
-        shear force below the bound of sticking ones, slip (mm) of slipping ones, inf of open ones.
+        """How far nodes are from another status (P + 1, 2): gap (mm) of open ones, contact force of closed
+        ones; shear force below the bound of sticking ones, slip (mm) of slipping ones, inf of open ones; at
+        last a voltage that follows a force from its bounds, or at one of them the force from the wish.
         """
         slip, bound = self.contact(state)[1:]
         touching = state.status != OPEN
@@ -187,7 +188,17 @@ class Equations:
         first = np.where(touching, state.contact_force[:, 0], np.where(self.interface.pad.free, gap, np.inf))
         left = bound - sizes(state.contact_force[:, 1:])
         second = np.where(state.status == STICK, left, sizes(slip))
-        return np.column_stack([first, np.where(touching, second, np.inf)])
+        nodes = np.column_stack([first, np.where(touching, second, np.inf)])
+        return np.vstack([nodes, self._voltage_margins(state)])
+
+    def _voltage_margins(self, state: State) -> Floats:
+        """How far the voltage of a friction force is from what else may determine it, (2,); inf of others."""
+        control = self.target.voltage
+        if not isinstance(control, FollowFriction):
+            return np.full(2, np.inf)
+        if 0.0 < state.voltage < control.voltage:
+            return np.array([state.voltage, control.voltage - state.voltage])
+        return np.array([self.lacking(state, slips=False), np.inf])
 
 
 def directions(status: Ints, slip: Floats) -> Floats:

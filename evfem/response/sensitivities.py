@@ -26,9 +26,15 @@ w' is found by refinement, :math:`w' \leftarrow w' - K^{-1} R'`, with K of `evfe
 until R', the derivative of R along all of z', w' and p, is rounding. So K decides only how fast, and that of
 the part before serves while no status changes. What does not converge is nan, and the reason is told.
 
+The voltage U of a wished force, charge or gap obeys one more equation, l(w, z, U, p) = 0. As w' is linear in
+U', two of them, for two U', give that with l' = 0: minus the quotient of l' at U' = 0 and of its growth with
+U'. At a bound U' is that of the bound. A finger that sticks while its voltage is that at which it would slip
+obeys another l = 0, with its unused friction (`evfem.newton.search`).
+
 The derivative is that of the piece between changes of status. How far the piece reaches is `valid_to`: for
-the margin m of a node (gap, contact force, shear force below the bound, slip) :math:`|m / m'|`, the least of
-all nodes and parts of the step. The widths of contact, counts and times have none.
+the margin m of a node (gap, contact force, shear force below the bound, slip), or of a voltage between its
+bounds, :math:`|m / m'|`, the least of all nodes and parts of the step. The widths of contact, counts and
+times have none.
 
 Sources: C. A. Vidal, R. B. Haber, Comput. Methods Appl. Mech. Eng. (August 1993) 393-431 (direct
 differentiation step by step, with the history); J. Korelc, P. Wriggers, doi:10.1007/978-3-030-33520-5_2
