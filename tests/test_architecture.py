@@ -75,7 +75,7 @@ ROOMS = {
     "sweeps": ({"numpy", "tomli_w", "tqdm", "pyarrow"}, "manifest samples file folder table means run check"),
     "response": (
         {"numpy", "scipy"},
-        "parameters parts tangent lines sensitivities file uncertainty design impedance",
+        "parameters parts tangent differences lines sensitivities file uncertainty design impedance",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, is_dataclass, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.newton.state import State
+from evfem.response.differences import SAMPLES, Change, added, changes, difference, moved
 from evfem.response.parameters import Parameter
 from evfem.response.parts import BOUND, GIVEN, WISH, ZERO, Equations
 from evfem.scene.scene import Scene
@@ -28,9 +29,8 @@ from evfem.simulation.run import Request, Run
 from evfem.simulation.works import Books
 from evfem.surface.ways import Steps
 
-#: relative change of a parameter between samples, the samples in such steps, weights of the difference
+#: relative change of a parameter between samples
 STEP = 1e-3
-SAMPLES, WEIGHTS = (-2, -1, 1, 2), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 #: the outer samples lie within this fraction of the distance to a kink of the attraction or another status,
 #: within this fraction of the length over which the attraction changes, and at least so far
 NEAR, SMOOTH, LEAST = 0.5, 2e-3, 1e-4
@@ -60,8 +60,6 @@ TIED = "several nodes touch the surface first, and which one is next depends on 
 LOST = "the linear equations of step {} were not solved"
 #: endings of columns with units that are counts all the same: not differentiable
 DISCRETE = ("contact_width", "contact_area", "mean_contact_pressure")
-#: derivatives of states and energy balances, by their fields
-Change = dict[str, Any]
 Jumps = Sequence[Steps]
 Lengths = Callable[[State], Floats]
 Solve = Callable[[Floats], Floats]
@@ -79,43 +77,6 @@ def differentiable(column: str) -> bool:
 def is_work(column: str) -> bool:
     """Whether a column is a work or an energy."""
     return column.endswith(("_work", "_energy", "_dissipation"))
-
-
-def difference(values: Sequence[Any], step: float) -> Any:
-    """Derivative of numbers or arrays from values at the `SAMPLES`, a `step` apart.
-
-    >>> round(float(difference([np.exp(0.01 * k) for k in SAMPLES], 0.01)), 8)
-    1.0
-    """
-    return sum(weight * np.asarray(value) for weight, value in zip(WEIGHTS, values, strict=True)) / step
-
-
-def changes(owners: Sequence[Any], step: float) -> Any:
-    """Central difference (4th order) of arrays, or of every real field of a state or energy balance, over
-    samples at -2, -1, 1, 2 steps.
-    """
-    if not is_dataclass(owners[0]):
-        return difference(owners, step)
-    each = [parts_of(one) for one in owners]
-    real = [name for name, value in each[0].items() if np.asarray(value).dtype.kind == "f"]
-    return {name: difference([one[name] for one in each], step) for name in real}
-
-
-def parts_of(owner: Any) -> dict[str, Any]:
-    """Fields of a state, or of an energy balance, by name."""
-    return owner.parts if isinstance(owner, State) else vars(owner)
-
-
-def added(first: Change, second: Change) -> Change:
-    """The sum of two derivatives."""
-    return {name: value + second[name] for name, value in first.items()}
-
-
-def moved(owner: Any, change: Change, way: float) -> Any:
-    """A state, or an energy balance, displaced along a derivative."""
-    parts = parts_of(owner)
-    further = {name: parts[name] + way * value for name, value in change.items()}
-    return owner.with_parts(further) if isinstance(owner, State) else replace(owner, **further)
 
 
 @dataclass(frozen=True, eq=False)
