@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tools.builders import resumed
 
 import evfem as ev
 
@@ -90,6 +91,15 @@ kind = "slide"
 distance = 3.0
 steps = 2
 """
+
+
+def test_a_run_that_is_resumed_misses_the_same():
+    text = FILE.replace("[0.03, 0.035]", "[0.035, 0.035]").replace("steps = 2", "steps = 4")
+    whole, again = resumed(ev.scenefile.loads(text), 4)
+    np.testing.assert_array_equal(again.missed_force, whole.missed_force)
+    told = [[one for one in run.warnings if "wished" in one] for run in (whole, again)]
+    assert told[0] == told[1]
+    assert np.flatnonzero(whole.missed_force).tolist() == [4]
 
 
 def test_a_sweep_varies_what_is_wished(tmp_path):
