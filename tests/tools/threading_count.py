@@ -101,8 +101,8 @@ CAPABILITIES = (
     ),
     capability(
         "voltage that follows",
-        r"""FollowForce|FollowFriction|KeptCharge|GivenGap|ConstrainedVoltage|OpenCircuit|ChargeControl
-        |voltage\.(follows|free|fallback|lacking|missing|held|after|accepts|unknowns|begin|solve)
+        r"""FollowForce|FollowFriction|missed_force|KeptCharge|GivenGap|ConstrainedVoltage|OpenCircuit|ChargeControl
+        |voltage\.(follows|free|find|missed|lacking|missing|held|after|accepts|unknowns|begin|solve)
         |VoltageProblem|VoltageStep|electrode_charge|smallest_gap|\bdriven\b|_kept\b|course\.gap
         |last\.gap""",
     ),
