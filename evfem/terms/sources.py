@@ -32,6 +32,7 @@ TURNED = 0.02
 #: parts of the way between two rows of a table, samples of a signal in a period and their largest number
 PARTS, SAMPLES, MOST = 4, 32, 100_000
 
+
 @dataclass(frozen=True)
 class Moment:
     """Of a target: the `voltage` (V) of ramps, the `time` (s) there and at the `begin` of the step, x of the
