@@ -72,9 +72,10 @@ class Ledger:
         model, end = self.model, self.end
         assert end is not None
         self.pull_off.ends(step)
-        position = model.equilibrium.interface.places(state)
-        contact = model.equilibrium.interface.contact_forces(state).sum(axis=0)
-        touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
+        interface = model.equilibrium.interface
+        position, places = interface.positions(state.u), interface.places(state)
+        contact, withheld = interface.contact_forces(state).sum(axis=0), interface.withheld(state)
+        touching = state.status != OPEN
         pulls = self._pulls(state, withheld)
         real, extent = _extent(model, state, position, contact)
         pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
@@ -93,7 +94,7 @@ class Ledger:
             **{f"{name}_force": float(kept - pull[1]) for name, (pull, kept) in pulls.items()},
             **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
-            "min_gap": float(surface_state(model.surface, position).gap.min()),
+            "min_gap": float(surface_state(model.surface, places).gap.min()),
             "peak_contact_pressure": float((pressing / current_lengths(model, position)).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
@@ -141,9 +142,12 @@ def _components(name: str, force: Floats) -> dict[str, float]:
 
 
 def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
-    """Columns of the widths or areas of contact, mm or mm2, in space those along z too."""
+    """Columns of the widths or areas of contact, mm or mm2, in space those along z too; pad nodes are at
+    `position` (P, dim), and gaps those to the surface that has given way.
+    """
     pressure = state.contact_force[:, 0] / current_lengths(model, position)
-    gap = surface_state(model.surface, position).normal_gap
+    places = model.equilibrium.interface.places(state)
+    gap = surface_state(model.surface, places).normal_gap
     at = reach(gap, pressure, model.pad.spacing_at(position), model.shear_modulus)
     if isinstance(model.pad, Pad):
         width, real = model.pad.contact_widths(position, at)
@@ -173,8 +177,8 @@ def _positive(length: Floats) -> Floats:
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
     size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
-    position, withheld = interface.places(state), interface.withheld(state)
-    surface, length = surface_state(model.surface, position), current_lengths(model, position)
+    surface, withheld = surface_state(model.surface, interface.places(state)), interface.withheld(state)
+    length = current_lengths(model, interface.positions(state.u))
 
     pulled = _positive(model.attraction.weights(interface.pad_state(state, state.touching)))
 

@@ -95,6 +95,21 @@ def on_dome(surface, motion=IN_SPACE, **more):
     )
 
 
+def test_the_width_of_contact_is_that_of_the_deformed_face():
+    """That between the outermost nodes that touch, to their distance from the next; the undeformed length of
+    the face below them, which is drawn together, is 5 % less.
+    """
+    soft = ev.Flat(friction=0.8, elastic=ev.ElasticLayer(E=0.03, nu=0.45, thickness=4.0))
+    result = on_pad(soft, [ev.Press(indentation=1.5, steps=3)])
+    mesh, frame = result.mesh, result.frames[-1]
+    pad = mesh.node_sets["pad"]
+    x = (mesh.points + frame.displacement)[pad, 0]
+    order = np.argsort(x)
+    touching = np.flatnonzero((frame.contact_pressure[pad] > 0.0)[order])
+    inner, outer = (np.ptp(x[order][[touching[0] - k, touching[-1] + k]]) for k in (0, 1))
+    assert result.contact_width[-1] == pytest.approx(inner, abs=0.5 * (outer - inner))
+
+
 @pytest.mark.parametrize(("slid", "contact"), [(on_pad, "contact_width"), (on_dome, "contact_area")])
 def test_a_hard_surface_is_the_rigid_one(slid, contact):
     rigid, hard = (slid(ev.Flat(elastic=one)) for one in (None, ev.ElasticLayer(1e12, 0.3, 1.0)))
