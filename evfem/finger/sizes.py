@@ -242,6 +242,19 @@ def area_error(cells: float) -> float:
     return max(13.0 / cells**2, 0.9 / cells)
 
 
+def pressure_error(cells: float) -> float:
+    """Relative error of the peak contact pressure of ridges with `cells` linear cells per ridge; it zigzags
+    with the nodes at the edges of crests.
+
+    Measured with the ridges of Table 2 at .02, .05, .1 and .2 N/mm against 96 cells: up to 29 % with 6, 24 %
+    with 12, 7 % with 24, 5 % with 48; 28 % with 12 after a slide.
+
+    >>> [round(pressure_error(cells), 3) for cells in (6, 12, 48)]
+    [0.583, 0.292, 0.073]
+    """
+    return 3.5 / cells
+
+
 def check_cells(cells: int | None, ridged: bool) -> None:
     """Raise InputError if `cells_per_ridge` is odd, or set for a pad without ridges."""
     if cells is not None and not ridged:

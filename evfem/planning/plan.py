@@ -241,10 +241,14 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
 
 def _contact(scene: Scene) -> Term:
     shape = "flat surface" if scene.ground.is_flat else "textured surface, with its slope and curvature"
+    peak = getattr(scene.finger, "pressure_error", 0.0)
     if cells := getattr(scene.finger, "ridge_cells", 0.0):
         error = 100.0 * area_error(cells)
         known = f"has an error of {error:.2g} %" if error < 100.0 else "is not resolved"
         shape += f"; with {cells:g} cells per ridge the real contact area {known}"
+        shape += f", the peak pressure one of {100.0 * min(peak, 1.0):.2g} %"
+    elif peak:
+        shape += f"; the peak pressure has an error of {100.0 * peak:.2g} %"
     return Term("contact", True, shape + _elastic_surface(scene))
 
 

@@ -289,19 +289,39 @@ def test_cells_per_ridge_that_no_mesh_has_are_refused(cells):
         refuses("8 without ridges; allowed: a pad with ridges", finger, ridges=False, cells_per_ridge=8)
 
 
-def test_the_plan_says_an_error_of_the_real_area_that_holds():
+def test_the_plan_says_errors_of_area_and_peak_pressure_that_hold():
     def pressed(cells):
         pad = FingerPad(resolution="coarse", cells_per_ridge=cells)
         motion = [ev.Press(force=0.02, steps=1), ev.Press(force=0.05, steps=1)]
         scene = ev.Scene(pad, ev.Flat(friction=0.0), motion=motion)
-        return scene, ev.simulate(scene).real_contact_width
+        result = ev.simulate(scene)
+        return scene, result.real_contact_width, result.peak_contact_pressure
 
-    _, fine = pressed(48)
+    _, fine, peaks = pressed(48)
     for cells, error in ((6, 0.36), (12, 0.09)):
-        scene, found = pressed(cells)
+        scene, found, peak = pressed(cells)
         told = f"with {cells} cells per ridge the real contact area has an error of {100 * error:.2g} %"
         assert told in " ".join(str(ev.plan(scene)).split())
         np.testing.assert_allclose(found, fine, rtol=error)
+        assert f"{told}, the peak pressure one of {350 / cells:.2g} %" in " ".join(
+            str(ev.plan(scene)).split()
+        )
+        np.testing.assert_allclose(peak, peaks, rtol=3.5 / cells)
+
+
+@pytest.mark.parametrize(("resolution", "error"), [("coarse", 0.1), ("medium", 0.06)])
+def test_the_plan_says_an_error_of_a_smooth_pads_peak_that_holds(resolution, error):
+    def pressed(resolution):
+        pad = FingerPad(resolution=resolution, ridges=False)
+        scene = ev.Scene(pad, ev.Flat(friction=0.0), motion=[ev.Press(force=f, steps=2) for f in (0.02, 0.1)])
+        return scene, ev.simulate(scene).peak_contact_pressure
+
+    scene, found = pressed(resolution)
+    assert f"the peak pressure has an error of {100 * error:g} %" in " ".join(str(ev.plan(scene)).split())
+    np.testing.assert_allclose(found[1::2], pressed("fine")[1][1::2], rtol=error)
+
+
+def test_cells_per_ridge_of_a_file():
     text = (
         "[finger]\ncells_per_ridge = 20\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.02\n"
     )
