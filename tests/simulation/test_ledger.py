@@ -49,8 +49,10 @@ def _outline():
 
 
 def _start(model):
-    """Undeformed, G0 above first touch, without a load: the voltage counts as raised in the first step."""
-    bone = np.array([0.0, -G0])
+    """Undeformed, at the gap of the first motion, without a load: the voltage counts as raised in the first
+    step.
+    """
+    bone = np.array([0.0, MOTION[0].course.lift - G0])
     u = np.tile(bone, (len(model.mesh.points), 1))
     zero = np.zeros((model.pad.nodes.size, 2))
     return SimpleNamespace(

@@ -27,10 +27,10 @@ CONTRACT = (
     "kinetic_energy, integrator_dissipation, snap_dissipation, "
     "substeps, newton_iterations, relaxations, jumps, seconds"
 )
-#: those that follow them where the scene has adhesion, an elastic surface, a voltage resolved in time
+#: those that follow where the scene has adhesion, an elastic surface, a voltage resolved in time or found
 OF_ROOMS = (
     "adhesive_force, adhesive_force_x, adhesive_force_z, adhesive_work, surface_sink, source_work, "
-    "leakage_dissipation, stretch_work, field_energy"
+    "leakage_dissipation, stretch_work, field_energy, missed_force"
 )
 PLANE_ROOMS = tuple(name for name in ROOM_COLUMNS if not name.endswith("_z"))
 
@@ -240,7 +240,7 @@ def test_a_total_has_the_same_names_over_the_depth(tmp_path):
     total = result.total
     per_depth = {name for name in result.columns if name.endswith(("_force", "_force_x", "_width"))}
     per_depth |= {name for name in result.columns if name.endswith(("_work", "_energy", "_dissipation"))}
-    assert len(per_depth) == 23
+    assert len(per_depth) == 24
     for name in result.columns:
         factor = 8.0 if name in per_depth else 1.0
         assert total.rows[2][name] == (
