@@ -124,11 +124,13 @@ def skipped(scene: Scene) -> Iterator[str]:
     signal = scene.electrics.voltage
     if not isinstance(signal, VoltageProfile | FollowForce):
         return
-    x = 0.0
+    place = np.zeros(2)
     for i, motion in enumerate(scene.motion):
-        way = motion.course.travel[0]
-        rows = x + way * np.arange(motion.steps + 1) / motion.steps
-        x = float(rows[-1])
+        course = motion.course
+        heading = np.array(course.direction if isinstance(signal, FollowForce) else (1.0, 0.0))
+        begin, way = float(place @ heading), float(np.array(course.travel) @ heading)
+        place = place + course.travel
+        rows = begin + way * np.linspace(0.0, 1.0, motion.steps + 1)
         within = signal.position[(signal.position > rows.min()) & (signal.position < rows.max())]
         if not way or not within.size:
             continue
@@ -138,7 +140,7 @@ def skipped(scene: Scene) -> Iterator[str]:
         if off > SKIPPED * whole > 0.0:
             yield (
                 f"motion {i} has rows {abs(way) / motion.steps:.3g} mm apart, and between them what is "
-                f"prescribed over x varies by {off / whole:.0%} of its range: more steps show it"
+                f"prescribed over the position varies by {off / whole:.0%} of its range: more steps show it"
             )
 
 
