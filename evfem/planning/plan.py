@@ -176,7 +176,6 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         too_fast(scene),
         left_out(scene),
         unseen(closing),
-        *skipped(scene),
         *oscillating(scene, mesh),
         *drifting(scene, mesh, moduli),
     )
@@ -398,4 +397,5 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
         )
     if steps := steps_line(scene):
         yield steps
+    yield from skipped(scene)
     yield f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction"

@@ -32,6 +32,8 @@ class LinearTissue:
     """Linear tissue: no cell collapses, the pressure is no unknown; stresses are those of `whole`."""
 
     nearly_incompressible = False
+    #: no law is asked of it
+    regions = ()
 
     def __init__(self, body: LinearBody) -> None:
         self.groups, self._body = body.full.tissue.groups, body

@@ -102,7 +102,10 @@ def understood(text):
 
 
 @pytest.mark.parametrize("page", [pytest.param(p, marks=pytest.mark.slow) if p in LONG else p for p in PAGES])
-@pytest.mark.filterwarnings("ignore:at .* V touching skin")  # told to users of smooth screens, too
+@pytest.mark.filterwarnings(
+    "ignore:at .* V touching skin",  # told to users of smooth screens, too
+    "ignore:5 um of air between rough faces",
+)
 def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(space, "ELEMENTS", dict(space.ELEMENTS))  # a page adds one

@@ -60,7 +60,6 @@ def test_while_the_pad_sticks_the_voltage_at_which_it_would_slip_has_a_derivativ
             np.testing.assert_allclose(found[column, key], known, rtol=1e-5, atol=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore:motion 1 has rows 1.5 mm apart")
 def test_at_its_bounds_the_voltage_has_no_derivative_but_the_missed_force_has():
     for given, bound in (({"wish": 0.019}, 0.0), ({"largest": 2000.0}, 2000.0)):
         found = ev.sensitivities(followed(**given), ["surface.friction"], ["voltage", "missed_force"])

@@ -177,7 +177,6 @@ def test_a_hand_at_rest_pulls_across_the_slide_too():
     assert 0.5 < result.applied_tangential_force_z[-1] / still < 1.0
 
 
-@pytest.mark.filterwarnings("ignore:motion . has rows")
 @pytest.mark.parametrize("angle", [0.0, 60.0, 180.0])
 def test_a_friction_force_is_followed_along_the_slide_there_and_back(angle):
     """Wished over the way along the slide's direction: what a bare slide has, a tenth more of it."""
