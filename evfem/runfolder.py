@@ -181,7 +181,7 @@ class RunFolder:
         """The result that the rows so far make: without fields, and without what the solver did."""
         assert self.mesh is not None
         about = provenance(self.scene, self.mesh, {}) | {"warnings": doubtful(self.scene, self.rows)}
-        return Result.from_rows(self.rows, [], self.mesh, about)
+        return Result.from_rows(self.rows, [], self.mesh, about, simulated=self.scene)
 
     def _write_summary(self, result: Result) -> dict[str, Any]:
         summary = result.summary()
@@ -339,7 +339,7 @@ def result_in(path: Path) -> Result:
         mesh, _ = scene_mesh(scene)
         frames = [frame_in(series.frame_path(row["step"]), row, mesh) for row in series.rows]
         probes = read_csv(found, scene.output.probes, mesh.dim, len(rows)) if found else {}
-        return Result.from_rows(rows, frames, mesh, origin, probes)
+        return Result.from_rows(rows, frames, mesh, origin, probes, scene)
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise InputError("path", f"{path}, damaged: {error}", allowed) from error
 

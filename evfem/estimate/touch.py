@@ -93,7 +93,8 @@ def from_texture(result: Result) -> Result:
         replace(one, position=one.position - before, displacement=one.displacement - [before, 0.0])
         for one in result.frames
     ]
-    return replace(result, frames=frames, provenance=result.provenance | {"parameters": ""})
+    elsewhere = result.provenance | {"parameters": ""}
+    return replace(result, frames=frames, provenance=elsewhere, simulated=None)
 
 
 def _run_in(result: Result) -> float:

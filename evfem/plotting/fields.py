@@ -43,11 +43,10 @@ def height_of(result: Result, frame: Frame) -> Height:
 
 
 def _from_scene(result: Result) -> Height | None:
-    from evfem.scene.file import loads
     from evfem.simulation.model import placed
 
     with suppress(EvfemError):
-        surface = loads(result.provenance.get("parameters", "")).ground
+        surface = result.scene.ground
         surface, _ = placed(surface, result.mesh.points[result.mesh.node_sets["pad"]])
         return lambda x: surface.y + surface.height(x)
     return None

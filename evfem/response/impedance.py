@@ -112,8 +112,8 @@ def impedance(
     Raises
     ------
     InputError
-        Another axis or frequency; a result of a scene that no file can hold; an elastic surface; an
-        attraction whose charge is given or takes time.
+        Another axis or frequency; a result of a loop, or from a file that does not hold its
+        scene; an elastic surface; an attraction whose charge is given or takes time.
     NotConverged
         A step of the scene has no solution.
 

@@ -179,16 +179,8 @@ Parameter = Keyed | ShapeChange
 
 
 def scene_of(source: Any) -> Scene:
-    """The scene given as such, as the path of its file, or by its `Result`, if a file can hold it."""
-    if isinstance(source, Scene):
-        return source
-    if not isinstance(source, Result):
-        return scenefile.scene_at(source)
-    try:
-        return scenefile.loads(source.provenance.get("parameters", ""))
-    except InputError as error:
-        given = f"a result of a scene that no file holds ({error})"
-        raise InputError("scene", given, "the scene itself") from None
+    """The scene given as such, as the path of its file, or by its `Result`."""
+    return source.scene if isinstance(source, Result) else scenefile.scene_at(source)
 
 
 def parameter_of(scene: Scene, wanted: Any) -> Parameter:

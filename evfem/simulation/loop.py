@@ -199,7 +199,7 @@ class Loop:
         frames = self._run.frames.copy()
         if self._run.rows:
             self._run.keep_last_frame()
-        found = self._run.result()
+        found = replace(self._run.result(), simulated=None)  # its steps are no motion to be run again
         self._run.frames = frames
         if self._reasons:
             found.provenance["stopped"] = "; ".join(self._reasons)

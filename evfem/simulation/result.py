@@ -23,6 +23,7 @@ from evfem.common.views import curves, plus, table
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.archive import mesh_arrays, mesh_of
 from evfem.mesh.mesh import Mesh
+from evfem.scene.scene import Scene
 from evfem.simulation.history import (
     ABOUT,
     COLUMNS,
@@ -130,6 +131,7 @@ class Result(History, FurtherColumns):
     in_space: Mapping[str, Floats] = field(default_factory=dict)
     in_rooms: Mapping[str, Floats] = field(default_factory=dict)
     probes: Mapping[str, Any] = field(default_factory=dict)
+    simulated: Scene | None = None
 
     @classmethod
     def from_rows(
@@ -139,6 +141,7 @@ class Result(History, FurtherColumns):
         mesh: Mesh,
         provenance: dict[str, Any],
         probes: Mapping[str, Any] | None = None,
+        simulated: Scene | None = None,
     ) -> Result:
         """A result from rows as the solver reports them; each row has exactly the keys of `COLUMNS`."""
         for row in rows:
@@ -151,8 +154,22 @@ class Result(History, FurtherColumns):
         names = [name for name in (rows[0] if rows else ()) if name not in (*COLUMNS, *SPATIAL)]
         in_rooms = {name: column_of(name, [row[name] for row in rows]) for name in names}
         kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "in_rooms": in_rooms}
-        kept["probes"] = probes or {}
+        kept |= {"probes": probes or {}, "simulated": simulated}
         return cls(**columns, frames=list(frames), mesh=mesh, **kept)
+
+    @property
+    def scene(self) -> Scene:
+        """The scene: the one that was run, and of a result from a file the one that its provenance holds.
+
+        Raises InputError where that is none, as with a mesh in memory or a law of the user's own.
+        """
+        from evfem.scene.file import loads
+
+        try:
+            return self.simulated or loads(self.provenance.get("parameters", ""))
+        except InputError as error:
+            given = f"a result of a scene that no file holds ({error})"
+            raise InputError("scene", given, "the scene itself") from None
 
     @property
     def columns(self) -> tuple[str, ...]:

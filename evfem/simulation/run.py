@@ -419,7 +419,7 @@ class Run:
             about["columns"] = [[one.name, one.unit, one.meaning] for one in further]
         about["warnings"] = [*said, *doubtful(self.scene, self.rows)]
         probes = None if self.probes is None else self.probes.histories(self.probed)
-        return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes)
+        return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes, self.scene)
 
     # -- checkpoints
 

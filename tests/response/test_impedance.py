@@ -254,8 +254,27 @@ def test_a_result_is_run_again():
     again = ev.impedance(ev.simulate(scene), [1.0, 100.0])
     np.testing.assert_array_equal(again.stiffness, ev.impedance(scene, [1.0, 100.0]).stiffness)
     assert repr(again).startswith("Impedance, normal: ")
+
+
+def test_a_result_keeps_a_scene_that_no_file_holds(tmp_path):
+    """A mesh in memory has the impedance of its scene, and a force linear in its only modulus. A file
+    does not hold it, and no scene repeats the steps of a loop.
+    """
+    scene = stuck(block(4, 1, 8.0, 1.0), [tissue()])
+    result = ev.simulate(scene)
+    assert result.scene is scene
+    found, expected = ev.impedance(result, 10.0).stiffness, ev.impedance(scene, 10.0).stiffness
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+    key = f"finger.materials.{next(iter(scene.finger.materials))}.E"
+    by = ev.sensitivities(result, key, "normal_force").elasticity["normal_force", key]
+    np.testing.assert_allclose(by, 1.0, atol=1e-6)  # linear in the one modulus of the scene
+    result.save(tmp_path / "result.npz")
     with pytest.raises(ev.InputError, match="no file holds"):
-        ev.impedance(ev.simulate(stuck(block(), [tissue()])), 1.0)
+        ev.impedance(ev.load(tmp_path / "result.npz"), 10.0)
+    stepped = ev.loop(scene)
+    stepped.step(indentation=2.0 * TINY)
+    with pytest.raises(ev.InputError, match="no file holds"):
+        ev.impedance(stepped.result(), 10.0)
 
 
 @pytest.mark.parametrize("given", [0.0, -1.0, [], [[1.0]], "fast", [np.nan]])
