@@ -64,6 +64,7 @@ _NAMES = {
     "simulation.spectrum": ("spectrum",),
     "terms.hand": ("Hand",),
     "newton.strategy": ("Strategy",),
+    "sweeps.accurate": ("accurate",),
     "sweeps.check": ("check",),
     "sweeps.file": ("Sweep",),
     "sweeps.run": ("sweep",),

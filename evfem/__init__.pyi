@@ -98,6 +98,7 @@ from evfem.surface.surfaces import Sinusoid as Sinusoid
 from evfem.surface.textures import Grating as Grating
 from evfem.surface.textures import SelfAffine as SelfAffine
 from evfem.surface.ways import FrictionMap as FrictionMap
+from evfem.sweeps.accurate import accurate as accurate
 from evfem.sweeps.check import check as check
 from evfem.sweeps.file import Sweep as Sweep
 from evfem.sweeps.run import sweep as sweep

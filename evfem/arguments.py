@@ -70,7 +70,7 @@ def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
         ("run", "run a scene and write history, fields, summary and picture", _run_options),
         ("init", "write a commented scene to begin with", _init_options),
         ("plan", "check a scene; list its physics, unknowns and solver; solve nothing", _scene_argument),
-        ("check", "run a scene with other steps and solvers and compare the final forces", _scene_argument),
+        ("check", "compare final forces by other steps and solvers, and state errors", _check_options),
         ("sensitivities", "derivatives of forces, works and energies by keys of a scene", _response_options),
         ("impedance", "dynamic stiffness of the finger versus frequency", _impedance_options),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
@@ -97,6 +97,14 @@ def _run_options(run: argparse.ArgumentParser) -> None:
     _again(run, "continue the interrupted run in the folder", "replace the files of an earlier run")
     run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
+
+
+def _check_options(check: argparse.ArgumentParser) -> None:
+    _scene_argument(check)
+    said = "columns, or COLUMN.STATISTIC[.MOTION]; default: the forces and the extent of the contact"
+    check.add_argument("--outputs", nargs="+", metavar="NAME", help=said)
+    said = "leave out the runs on a finer and a coarser mesh, which take longest"
+    check.add_argument("--no-mesh", action="store_true", help=said)
 
 
 def _response_options(command: argparse.ArgumentParser) -> None:

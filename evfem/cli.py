@@ -296,7 +296,7 @@ def _plan(options: argparse.Namespace) -> None:
 def _check(options: argparse.Namespace) -> int:
     from evfem.sweeps.check import check
 
-    found = check(_scene(options.scene))
+    found = check(_scene(options.scene), options.outputs, mesh=not options.no_mesh)
     print(found, flush=True)
     return DONE if found.agrees else DIFFERENT
 

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -116,6 +116,18 @@ def dataset(variables: Mapping[str, Any], coordinates: Mapping[str, Any], attrib
         problem = f"a data set of xarray, and no {error.name}"
         raise InputError("to_xarray", problem, "pip install 'evfem[xarray]', or table()") from None
     return Dataset(variables, coordinates, attributes)
+
+
+def aligned(lines: Sequence[Sequence[str]]) -> str:
+    """Lines of cells as text, the first column to the left, the others to the right.
+
+    >>> print(aligned([["a", "b"], ["long", "1"], ["c", "-10"]]))
+    a       b
+    long    1
+    c     -10
+    """
+    first, *others = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join("  ".join([line[0].ljust(first), *map(str.rjust, line[1:], others)]) for line in lines)
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:

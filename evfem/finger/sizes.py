@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -35,7 +35,8 @@ def thickness_range(name: str) -> dict[str, Any]:
 
 NailThickness = Annotated[float, thickness_range("nail"), "of the nail"]
 NailWidth = Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"]
-CELLS = "an even whole number from 4 to 96"
+FEWEST, MOST = 4, 96
+CELLS = f"an even whole number from {FEWEST} to {MOST}"
 Viscosity = Annotated[float, between(0.0, 1e3, "s"), "relaxation time of materials without their own"]
 Relaxation = Annotated[Pairs, BRANCHES, "Maxwell branches of materials without their own"]
 Materials = Annotated[
@@ -111,7 +112,7 @@ class LayeredFinger:
     resolution: str = "medium"
     cells_per_ridge: Annotated[
         int | None,
-        whole(96, 4, CELLS),
+        whole(MOST, FEWEST, CELLS),
         "distances of nodes from crest to crest (half as many quadratic cells); without it by resolution",
     ] = None
     materials: Materials = field(default_factory=dict)
@@ -166,6 +167,21 @@ class LayeredFinger:
             raise InputError("order", quoted(order), "1 or 2")
         mesh: Mesh = self._shape.mesh(order)
         return mesh
+
+    def at(self, resolution: str) -> Self:
+        """The same finger on the mesh of another resolution; `cells_per_ridge` of its own change as those of
+        the resolutions do.
+
+        >>> from evfem.finger.fingerpad import FingerPad
+        >>> FingerPad(resolution="coarse", cells_per_ridge=16).at("medium")
+        FingerPad(cells_per_ridge=32)
+        """
+        usual: Any = replace(self, cells_per_ridge=None)
+        other: Any = replace(usual, resolution=resolution)
+        if self.cells_per_ridge is None:
+            return other
+        cells = 2 * round(0.5 * self.cells_per_ridge * other.ridge_cells / usual.ridge_cells)
+        return replace(other, cells_per_ridge=int(np.clip(cells, FEWEST, MOST)))
 
     @property
     def _shape(self) -> Any:

@@ -1,0 +1,144 @@
+"""How accurate a number is: the errors that `ev.check` states, against runs that are much more accurate, and
+`ev.accurate`, which keeps to an error asked for.
+"""
+
+import numpy as np
+import pytest
+from tools.meshes import block
+
+import evfem as ev
+from evfem import cli
+
+FORCES = ["normal_force", "tangential_force"]
+
+
+def pad(resolution="coarse", **more):
+    return ev.FingerPad(**{"ridges": False, "resolution": resolution} | more)
+
+
+def pressed(finger=None, **more):
+    usual = {"motion": ev.Press(indentation=0.8, steps=2)} | more
+    return ev.Scene(finger or pad(), ev.Flat(friction=0.0), **usual)
+
+
+def stuck(steps=2, **more):
+    """A block that sticks and slips: of first order in the steps."""
+    finger = ev.MeshedFinger(block(8, 3, sag=0.2), {"tissue": ev.NeoHookean(E=0.05, nu=0.4)})
+    motion = [ev.Press(indentation=0.3, steps=steps), ev.Slide(0.15, steps=steps)]
+    return ev.Scene(finger, ev.Flat(friction=0.3), motion=motion, **more)
+
+
+def off(found, reference):
+    """How far each output is from the end of another run, as a share of it."""
+    exact = ev.simulate(reference)
+    return [abs(exact[one.output][-1] / one.value - 1.0) for one in found.outputs]
+
+
+def ways(found):
+    return [row["way"] for row in found.rows]
+
+
+def test_the_error_of_the_mesh_is_that_against_a_much_finer_one():
+    """From a coarse mesh and the next one: no less than there is, and less than ten times it."""
+    scene, names = pressed(), ("normal_force", "contact_width")
+    found = ev.check(scene, names)
+    assert "a finer (medium) mesh" in ways(found)
+    for one, there in zip(found.outputs, off(found, pressed(pad("fine"))), strict=True):
+        assert there < one.mesh < 10.0 * there
+        assert one.mesh > 100.0 * max(one.steps, one.tolerance, one.path)  # nothing depends on the path
+        assert found.error[one.output] == pytest.approx(one.mesh, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_mesh_between_two_has_an_order_of_its_own():
+    """Three meshes leave less doubt than two: the medium one's error is above that against the finest."""
+    scene = pressed(pad("medium"))
+    found = ev.check(scene, "normal_force")
+    assert {"a finer (fine) mesh", "a coarser (coarse) mesh"} < set(ways(found))
+    (there,) = off(found, pressed(pad("fine")))
+    assert there < found.outputs[0].mesh < 3.0 * there
+
+
+def test_the_error_of_the_steps_is_that_against_many():
+    found = ev.check(stuck(), "tangential_force")
+    (there,) = off(found, stuck(32))
+    assert 1e-3 < there < 1.5 * found.outputs[0].steps < 4.0 * there
+
+
+def test_the_error_of_the_tolerance_is_that_against_the_finest():
+    found = ev.check(stuck(solver=ev.Solver(tolerance=1e-3)), FORCES)
+    exact = stuck(solver=ev.Solver(tolerance=1e-12))
+    for one, there in zip(found.outputs, off(found, exact), strict=True):
+        assert one.tolerance == pytest.approx(there, rel=0.05, abs=1e-9)
+    assert max(one.tolerance for one in found.outputs) > 1e-7
+    assert ev.check(stuck(), FORCES).outputs[1].tolerance < 1e-7
+
+
+def test_a_finger_with_one_mesh_says_that_its_error_is_not_known():
+    found = ev.check(stuck(), "normal_force")
+    assert np.isnan(found.outputs[0].mesh)
+    assert not [way for way in ways(found) if "mesh" in way]
+    assert "not known" in str(found)
+    assert "a sum is without what is not known" in str(found)
+
+
+def test_meshes_have_no_part_in_whether_the_ends_agree():
+    """Ridges on a coarse mesh: the depth changes by 1.2e-3 with the mesh, and by less with the path."""
+    motion = [ev.Press(force=0.05, steps=3), ev.Slide(0.3, steps=3)]
+    scene = ev.Scene(pad(ridges=True), ev.Flat(friction=0.3), motion=motion)
+    found = ev.check(scene, "real_contact_width.max.0")
+    by = {row["way"]: row["difference"] for row in found.rows}
+    assert by["a finer (medium) mesh"] > 1e-3
+    assert found.agrees
+    assert found.error["real_contact_width.max.0"] > 0.05
+    assert not [way for way in ways(ev.check(scene, mesh=False)) if "mesh" in way]
+
+
+def test_outputs_that_are_none():
+    for given in ("tangential", "normal_force.median", "normal_force.max.3", []):
+        with pytest.raises(ev.InputError, match="outputs"):
+            ev.check(pressed(), given)
+
+
+def test_the_command_prints_errors(tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    path.write_text(ev.scenefile.dump(pressed()))
+    outputs = ["normal_force", "contact_width.max.0"]
+    assert cli.main(["check", str(path), "--no-mesh", "--outputs", *outputs]) == 0
+    told = capsys.readouterr().out
+    lines = [line.split() for line in told.splitlines() if line]
+    assert ["output", "value", "mesh", "steps", "tolerance", "path", "sum"] in lines
+    assert [line[0] for line in lines[-3:-1]] == outputs
+    assert "the ends agree" in told
+    assert "finer" not in told
+
+
+@pytest.mark.slow
+def test_the_cheapest_mesh_that_is_accurate_enough():
+    """1 % on the coarse mesh, 0.3 % on the medium one; both hold against the finest."""
+    scene = pressed(pad("fine"))
+    for error, mesh in ((0.01, "coarse"), (0.003, "medium")):
+        found = ev.accurate(scene, error, "normal_force")
+        assert found.reached
+        assert found.scene.finger.resolution == mesh
+        assert found.error["normal_force"] <= error
+        assert off(found.chosen.checked, scene)[0] <= found.error["normal_force"]
+        assert found.result.normal_force[-1] == ev.simulate(found.scene).normal_force[-1]
+        assert found.seconds > 0.0
+        assert mesh in found.table()
+
+
+def test_steps_are_taken_until_they_are_enough():
+    """A mesh in memory stays, and its error is said to be missing; the steps become as many as are needed."""
+    with pytest.warns(UserWarning, match="the mesh where a finger has one alone"):
+        found = ev.accurate(stuck(), 2e-3, "tangential_force")
+    assert found.scene.total_steps > 4
+    assert found.error["tangential_force"] <= 2e-3
+    assert off(found.chosen.checked, stuck(64))[0] < 2e-3
+    assert not found.reached
+
+
+def test_refused_errors():
+    for given in (0.0, -0.1, 0.6, "small"):
+        with pytest.raises(ev.InputError, match="error: given"):
+            ev.accurate(pressed(), given)
