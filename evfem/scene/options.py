@@ -82,7 +82,8 @@ class Solver:
     @classmethod
     def within(cls, error: float = 1e-3) -> Solver:
         """What costs least where forces shall err by at most this share beside the mesh's own error:
-        residuals of a thousandth of it, and steps that are cut only where the path would err by more.
+        residuals of a thousandth of it, and steps that are cut only where the path would err by more. The
+        mesh may err by far more: `ev.check` states by how much, and `ev.accurate` chooses it too.
 
         >>> auto = Strategy(steps="auto", path_error=0.001)
         >>> Solver.within(0.001) == Solver(tolerance=1e-6, strategy=auto)

@@ -108,18 +108,22 @@ class Checked:
             for line in lines
         )
 
+    def error_table(self) -> str:
+        """Value and errors of each output, as text."""
+        unknown = "" if all(one.known for one in self.outputs) else "\na sum is without what is not known"
+        return f"{accuracy_table(self.outputs)}{unknown}"
+
     def __str__(self) -> str:
         """Both tables, and whether the ends agree."""
         said = "the ends agree" if self.agrees else "the ends differ: the result depends on the solution path"
-        unknown = "" if all(one.known for one in self.outputs) else "\na sum is without what is not known"
-        told = f"\n\nerrors\n{accuracy_table(self.outputs)}{unknown}" if self.outputs else ""
+        told = f"\n\nerrors\n{self.error_table()}" if self.outputs else ""
         return f"{self.table()}\n{said} (allowed: {AGREE:g}){told}"
 
 
 def check(
     scene: Scene | str | PathLike[str], outputs: Sequence[str] | str | None = None, *, mesh: bool = True
 ) -> Checked:
-    """Run a scene with other steps, solvers and meshes: compare final forces, and state errors of outputs.
+    """Run a scene with other steps and meshes; compare final forces, and state the errors of outputs.
 
     It takes about six times as long as a run, and with `mesh` a run on a mesh of two to five times the nodes
     more; the runs on a mesh cost most of it.

@@ -8,6 +8,7 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem import cli
+from evfem.sweeps.check import more_steps, remeshed
 
 FORCES = ["normal_force", "tangential_force"]
 
@@ -36,6 +37,44 @@ def off(found, reference):
 
 def ways(found):
     return [row["way"] for row in found.rows]
+
+
+PRESS, SLIDE = ev.Press, ev.Slide
+SOFT = {"relaxation": ((0.8, 0.04), (0.5, 0.7))}
+HELD = [PRESS(force=0.05, steps=3), SLIDE(0.6, steps=4)]
+DEEP = [PRESS(indentation=0.6, steps=3), SLIDE(1.0, steps=6)]
+RELAXES = [PRESS(indentation=0.6, steps=4, speed=5.0), ev.Wait(0.1, steps=4)]
+SLOW = ev.Solver(dynamics="viscous")
+SECOND = ev.FingerPad.participant("ii", resolution="coarse")
+#: of many kinds, on the coarse mesh
+SCENES = {
+    "press": pressed(),
+    "stick": ev.Scene(pad(), ev.Flat(friction=0.5), motion=[HELD[0], SLIDE(0.2, steps=2)]),
+    "slip": ev.Scene(pad(), ev.Flat(friction=0.3), motion=DEEP),
+    "ridges": ev.Scene(pad(ridges=True), ev.Flat(friction=0.0), motion=PRESS(force=0.05, steps=2)),
+    "ridges slip": ev.Scene(pad(ridges=True), ev.Flat(friction=0.4), motion=HELD),
+    "sine": ev.Scene(pad(), ev.Sinusoid(0.3, [[0.05, 3.14, 0.0]]), motion=DEEP),
+    "hover": ev.Scene(pad(), ev.Display(), ev.Kaczmarek(), 100.0, ev.Hover(gap=0.1, steps=1)),
+    "voltage": ev.Scene(pad(), ev.Display(friction=0.3), ev.Kaczmarek(), 100.0, HELD),
+    "relaxation": ev.Scene(pad(**SOFT), ev.Flat(friction=0.3), motion=RELAXES, solver=SLOW),
+    "participant": ev.Scene(SECOND, ev.Flat(friction=0.2), motion=[PRESS(force=0.03, steps=3), HELD[1]]),
+}
+OUTPUTS = [*FORCES, "electrostatic_force", "indentation", "contact_width", "peak_contact_pressure"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_stated_errors_hold(name):
+    """Against the finest mesh in four times the steps; an output that is held or 0 has none to rounding."""
+    scene = SCENES[name]
+    found = ev.check(scene, [*OUTPUTS, "real_contact_width"])
+    assert found.agrees
+    exact = ev.simulate(more_steps(remeshed(scene, "fine"), 4))
+    least = 1e-3 * max(abs(exact[force]).max() for force in (*FORCES, "electrostatic_force"))
+    for one in found.outputs:
+        there = abs(exact[one.output][-1] - one.value) / max(abs(one.value), least)
+        print(f"{name:12} {one.output:22} {100 * there:8.2g} % stated {100 * one.sum:8.2g} %")
+        assert there <= one.sum + 1e-7
 
 
 def test_the_error_of_the_mesh_is_that_against_a_much_finer_one():
