@@ -63,3 +63,34 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
         },
         "solver": {"tolerance": scene.solver.tolerance, **solver},
     }
+
+
+class Told:
+    """What the provenance of a result tells, and the scene itself where the result was `simulated` now."""
+
+    provenance: dict[str, Any]
+    simulated: Scene | None
+
+    @property
+    def scene(self) -> Scene:
+        """The scene: the one that was run, and of a result from a file the one that its provenance holds.
+
+        Raises InputError where that is none, as with a mesh in memory or a law of the user's own.
+        """
+        from evfem.scene.file import loads
+
+        try:
+            return self.simulated or loads(self.provenance.get("parameters", ""))
+        except InputError as error:
+            given = f"a result of a scene that no file holds ({error})"
+            raise InputError("scene", given, "the scene itself") from None
+
+    @property
+    def depth(self) -> float | None:
+        """The scene's depth (mm), None without one."""
+        return self.provenance.get("scene", {}).get("depth")
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of the run about its numbers, one sentence each."""
+        return list(self.provenance.get("warnings", []))

@@ -50,6 +50,7 @@ from evfem.simulation.history import (
 from evfem.simulation.history import (
     INTEGERS as INTEGERS,
 )
+from evfem.simulation.provenance import Told
 from evfem.simulation.provenance import provenance as provenance
 
 #: components of a stress, in the plane without those across it
@@ -110,7 +111,7 @@ CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
 
 @dataclass(frozen=True, eq=False)
-class Result(History, FurtherColumns):
+class Result(History, FurtherColumns, Told):
     """Every column of the history as an array over the steps, the frames kept, the mesh and the provenance.
 
     Forces are per mm of depth; `total` has them in N where the scene says how deep the finger is.
@@ -158,20 +159,6 @@ class Result(History, FurtherColumns):
         return cls(**columns, frames=list(frames), mesh=mesh, **kept)
 
     @property
-    def scene(self) -> Scene:
-        """The scene: the one that was run, and of a result from a file the one that its provenance holds.
-
-        Raises InputError where that is none, as with a mesh in memory or a law of the user's own.
-        """
-        from evfem.scene.file import loads
-
-        try:
-            return self.simulated or loads(self.provenance.get("parameters", ""))
-        except InputError as error:
-            given = f"a result of a scene that no file holds ({error})"
-            raise InputError("scene", given, "the scene itself") from None
-
-    @property
     def columns(self) -> tuple[str, ...]:
         """The names of its columns."""
         return (*COLUMNS, *self.in_space, *self.in_rooms)
@@ -196,11 +183,6 @@ class Result(History, FurtherColumns):
     def _room_columns(self) -> list[tuple[str, str, str]]:
         """Name, unit per mm of depth and meaning of the columns of rooms that the package does not know."""
         return [tuple(one) for one in self.provenance.get("columns", [])]
-
-    @property
-    def depth(self) -> float | None:
-        """The scene's depth (mm), None without one."""
-        return self.provenance.get("scene", {}).get("depth")
 
     @property
     def total(self) -> Result:
@@ -234,11 +216,6 @@ class Result(History, FurtherColumns):
     def real_contact_area(self) -> Floats:
         """Real contact area (mm2): in the plane `real_contact_width` times depth, or InputError."""
         return self.in_space["real_contact_area"] if self.in_space else self.total.real_contact_width
-
-    @property
-    def warnings(self) -> list[str]:
-        """Warnings of the run about its numbers, one sentence each."""
-        return list(self.provenance.get("warnings", []))
 
     def summary(self) -> dict[str, Any]:
         """Sizes, the last row, extremes and costs, in plain numbers ready for JSON."""

@@ -112,7 +112,7 @@ class Accurate:
 def accurate(
     scene: Scene | str | PathLike[str], error: float = 1e-2, outputs: Sequence[str] | str | None = None
 ) -> Accurate:
-    """Run a scene as cheaply as an error allows: choose mesh, steps and tolerance by the error that they have.
+    """Run a scene as cheaply as an error allows: choose mesh, steps and tolerance by their error.
 
     A `FingerPad` or `Fingertip` begins on its coarse mesh; with each mesh about six runs on it and one on the
     next finer one are needed. Of other fingers the mesh stays, and its error is not known.
