@@ -72,7 +72,10 @@ ROOMS = {
         {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works barrier ledger checkpoint run loop",
     ),
-    "sweeps": ({"numpy", "tomli_w", "tqdm", "pyarrow"}, "manifest samples file folder table means run accuracy check accurate"),
+    "sweeps": (
+        {"numpy", "tomli_w", "tqdm", "pyarrow"},
+        "manifest samples file folder table means run accuracy check accurate",
+    ),
     "response": (
         {"numpy", "scipy"},
         "parameters parts tangent differences lines sensitivities file uncertainty design impedance",
