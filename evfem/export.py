@@ -141,13 +141,14 @@ def touchsim(
     sample_rate
         Samples a second (Hz).
     pin_radius
-        In mm; without it half the mean distance of a pin from its nearest neighbour.
+        In mm; without it half the smallest distance of two pins, so that none overlap.
 
     Returns
     -------
     dict
-        `trace` (samples, pins) in mm, `location` (pins, 2) in mm, of the undeformed nodes, x and z, in the
-        plane z = 0; `fs` (Hz) and `pin_radius` (mm).
+        The arguments of `Stimulus` in Python's TouchSim (github.com/hsaal/touchsim): `trace` (pins, samples)
+        in mm, `location` (pins, 2) in mm, of the undeformed nodes, x and z, in the plane z = 0; `fs` (Hz) and
+        `pin_radius` (mm).
 
     Raises
     ------
@@ -172,7 +173,7 @@ def touchsim(
         pin_radius = 0.5 * _spacing(location)
     radius = real("pin_radius", pin_radius, "a radius in mm, larger than 0", Within(0.0, above=True))
     at = np.arange(int(np.floor(time[-1] * rate * (1.0 + 1e-12))) + 1) / rate
-    trace = np.column_stack([np.interp(at, time, depth[:, node]) for node in reached])
+    trace = np.stack([np.interp(at, time, depth[:, node]) for node in reached])
     return {"trace": trace, "location": location, "fs": rate, "pin_radius": radius}
 
 
@@ -195,12 +196,12 @@ def _stood(result: Result) -> tuple[Floats, Floats]:
 
 
 def _spacing(location: Floats) -> float:
-    """Mean distance (mm) of points (P, 2) from their nearest neighbour; 0.1 of a single one."""
+    """Smallest distance (mm) of two of the points (P, 2); 0.1 of a single one."""
     from scipy.spatial import KDTree
 
     if len(location) < 2:
         return 0.1
-    return float(KDTree(location).query(location, k=2)[0][:, 1].mean())
+    return float(KDTree(location).query(location, k=2)[0][:, 1].min())
 
 
 def skin_of(mesh: Mesh) -> tuple[Mesh, Ints, Ints]:
