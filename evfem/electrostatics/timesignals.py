@@ -404,7 +404,8 @@ class Sampled:
         the attraction grows with the square.
 
         A transient event lasts `tap` s. Of its sharpness nothing is left: the voltage is that of an envelope,
-        as `Carrier` takes it. Raises InputError for another file or one of more than 1,000,000 samples.
+        as `Carrier` takes it. Raises InputError for another file, one whose events have envelopes, or one of
+        more than 1,000,000 samples.
         """
         volts = above("full_scale", full_scale, 0.0, "a voltage in V above zero")
         above("rate", rate, 0.0, "a rate in Hz above zero")

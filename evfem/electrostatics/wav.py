@@ -29,6 +29,9 @@ KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
 LARGEST_SAMPLE = 32_767
 MOST_SAMPLES = 50_000_000
 MOST_PATTERN = 1_000_000
+#: events of an AHAP that are felt; parameters that shape them, and the value that does not
+HAPTIC = ("HapticTransient", "HapticContinuous")
+ENVELOPE = {"AttackTime": 0.0, "DecayTime": 0.0, "ReleaseTime": 0.0, "Sustained": 1.0}
 #: comment and headers of a file on top of its samples
 MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
 #: the first position in the description of a .hjif
@@ -107,13 +110,15 @@ def _parsed(path: Path, key: str, allowed: str) -> Iterator[Any]:
 
 def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
     """Intensity (n,), 0 to 1, of a haptic pattern (AHAP, JSON) at `rate` (Hz) from time 0 on: at every moment
-    that of its strongest event, times the curves and values of its HapticIntensityControl.
+    that of its strongest event, times the value that its HapticIntensityControl then has.
 
-    A transient event, which has no duration, lasts `tap` s. Sharpness, audio and envelopes are left out.
-    Raises InputError for a file that is missing, damaged, without events or longer than 1,000,000 samples.
+    A transient event, which has no duration, lasts `tap` s. Sharpness and audio are left out. Raises
+    InputError for a file that is missing, damaged, without events, with envelopes or longer than 1,000,000
+    samples.
     """
     with _parsed(path, key, "an AHAP file: JSON with a Pattern of haptic events") as whole:
         pattern = whole["Pattern"]
+        _check_envelopes(pattern, path, key)
         events = [_event(one["Event"], tap) for one in pattern if "Event" in one]
         events = [one for one in events if one[2] > 0.0]
         size = int(np.ceil(max(end for _, end, _ in events) * rate)) + 1
@@ -123,34 +128,62 @@ def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
         for start, end, strength in events:
             inside = (time >= start) & (time < end)
             found[inside] = np.maximum(found[inside], strength)
-        for one in pattern:
-            found *= _control(one, time)
-    return np.clip(found, 0.0, 1.0)
+        found *= _control(pattern, time)
+    return found
 
 
 def _event(event: dict[str, Any], tap: float) -> tuple[float, float, float]:
     """Start (s), end (s) and intensity of a haptic event; 0 of any other."""
-    start, kind = float(event["Time"]), event["EventType"]
-    if kind not in ("HapticTransient", "HapticContinuous"):
+    start = float(event["Time"])
+    if event["EventType"] not in HAPTIC:
         return start, start, 0.0
-    lasts = tap if kind == "HapticTransient" else float(event["EventDuration"])
-    own = {one["ParameterID"]: float(one["ParameterValue"]) for one in event.get("EventParameters", ())}
-    return start, start + lasts, own.get("HapticIntensity", 1.0)
+    lasts = tap if event["EventType"] == "HapticTransient" else float(event["EventDuration"])
+    return start, start + lasts, float(np.clip(_own(event).get("HapticIntensity", 1.0), 0.0, 1.0))
 
 
-def _control(chunk: dict[str, Any], time: Floats) -> Any:
-    """What a part of a pattern multiplies all intensities with: straight lines between the points of a curve,
-    a value from its time on.
+def _own(event: dict[str, Any]) -> dict[str, float]:
+    """Parameters of an event by their names."""
+    return {one["ParameterID"]: float(one["ParameterValue"]) for one in event.get("EventParameters", ())}
+
+
+def _check_envelopes(pattern: list[dict[str, Any]], path: Path, key: str) -> None:
+    """InputError for a haptic event that rises, decays or fades: Apple draws its course, without numbers."""
+    events = [one["Event"] for one in pattern if one.get("Event", {}).get("EventType") in HAPTIC]
+    changed = [(name, value) for event in events for name, value in _own(event).items()]
+    for chunk in pattern:
+        control = chunk.get("ParameterCurve") or chunk.get("Parameter") or {}
+        name = str(control.get("ParameterID")).removeprefix("Haptic").removesuffix("Control")
+        changed += [(name, float(value)) for _, value in _points(control)] if name in ENVELOPE else []
+    found = [name for name, value in changed if value != ENVELOPE.get(name, value)]
+    if found:
+        allowed = (
+            "events without an envelope; HapticIntensityControl, a ParameterCurve, says the same in numbers"
+        )
+        raise InputError(key, f"{path.name}, with {found[0]} of an event", allowed)
+
+
+def _points(control: dict[str, Any]) -> list[tuple[float, float]]:
+    """Times (s) and values of a parameter, one, or of a parameter curve."""
+    rows = control.get("ParameterCurveControlPoints", ())
+    if "ParameterValue" in control:
+        rows = [{"Time": 0.0, "ParameterValue": control["ParameterValue"]}]
+    start = float(control["Time"]) if rows else 0.0
+    points = [(start + float(row["Time"]), float(row["ParameterValue"])) for row in rows]
+    return sorted(points, key=lambda point: point[0])
+
+
+def _control(pattern: list[dict[str, Any]], time: Floats) -> Floats:
+    """What all intensities are multiplied with: 1, until a value or a curve, straight between its points,
+    replaces what was in force; the last point holds until the next one begins.
     """
-    own = chunk.get("ParameterCurve") or chunk.get("Parameter") or {}
-    if own.get("ParameterID") != "HapticIntensityControl":
-        return 1.0
-    start = float(own["Time"])
-    if "ParameterValue" in own:
-        return np.where(time >= start, float(own["ParameterValue"]), 1.0)
-    points = [(float(p["Time"]), float(p["ParameterValue"])) for p in own["ParameterCurveControlPoints"]]
-    places, values = np.array(points).T
-    return np.interp(time, start + places, values, left=1.0)
+    controls = [one.get("ParameterCurve") or one.get("Parameter") or {} for one in pattern]
+    rows = [_points(one) for one in controls if one.get("ParameterID") == "HapticIntensityControl"]
+    found = np.ones_like(time)
+    for points in sorted(filter(None, rows), key=lambda points: points[0][0]):
+        places, values = np.array(points).T
+        later = time >= places[0]
+        found[later] = np.interp(time[later], places, values)
+    return np.clip(found, 0.0, 1.0)
 
 
 def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:

@@ -262,6 +262,49 @@ def test_the_voltage_is_the_root_of_the_intensity(tmp_path):
     assert [found(0.2), found(0.4)] == pytest.approx([80.0, 40.0])
 
 
+def control(start, *points):
+    rows = [{"Time": t, "ParameterValue": v} for t, v in points]
+    own = {"ParameterID": "HapticIntensityControl", "Time": start, "ParameterCurveControlPoints": rows}
+    return {"ParameterCurve": own}
+
+
+def test_a_later_curve_or_value_replaces_the_one_in_force(tmp_path):
+    """Apple's page of CHHapticDynamicParameter: the value "is equal to the original event parameter value
+    multiplied by the dynamic parameter value", which "changes abruptly at the specified time".
+    """
+    whole = {"Event": {"EventType": "HapticContinuous", "Time": 0.0, "EventDuration": 2.0}}
+    value = {"Parameter": {"ParameterID": "HapticIntensityControl", "ParameterValue": 0.36, "Time": 1.5}}
+    # in any order; the second begins within the first, whose rest is not played
+    parts = (value, control(0.8, (0.0, 0.0), (0.4, 0.64)), control(0.1, (0.1, 1.0), (0.5, 0.5), (1.0, 0.2)))
+    found = ev.Sampled.from_ahap(pattern(tmp_path / "a.ahap", whole, *parts), 100.0)
+    share = (found(np.array([0.1, 0.3, 0.7, 0.8, 1.0, 1.4, 1.6])) / 100.0) ** 2
+    np.testing.assert_allclose(share, [1.0, 0.875, 0.44, 0.0, 0.32, 0.64, 0.36], atol=1e-9)
+
+
+def test_values_beyond_their_range_are_at_its_end(tmp_path):
+    """Apple's page of the format: it "clamps out-of-range values"."""
+    loud = [{"ParameterID": "HapticIntensity", "ParameterValue": 2.0}]
+    parts = {"Event": CONTINUOUS | {"EventParameters": loud}}, control(0.0, (0.0, 0.25))
+    found = ev.Sampled.from_ahap(pattern(tmp_path / "a.ahap", *parts), 100.0)
+    assert found(0.2) == pytest.approx(50.0)
+
+
+def test_envelopes_are_refused_by_name(tmp_path):
+    path = tmp_path / "a.ahap"
+
+    def shaped(kind=CONTINUOUS, **values):
+        own = [{"ParameterID": name, "ParameterValue": value} for name, value in values.items()]
+        return pattern(path, {"Event": CONTINUOUS}, {"Event": kind | {"EventParameters": own}})
+
+    for name, value in {"AttackTime": 0.3, "DecayTime": 0.1, "ReleaseTime": 0.5, "Sustained": 0.0}.items():
+        refuses(f"a.ahap, with {name} of an event", ev.Sampled.from_ahap, shaped(**{name: value}), 1.0)
+    plain = shaped(AttackTime=0.0, DecayTime=0.0, ReleaseTime=0.0, Sustained=1.0)
+    assert ev.Sampled.from_ahap(plain, 1.0)(0.2) == 1.0
+    assert ev.Sampled.from_ahap(shaped(AUDIO, AttackTime=0.3), 1.0)(0.2) == pytest.approx(0.8)
+    later = {"Parameter": {"ParameterID": "HapticAttackTimeControl", "ParameterValue": 0.5, "Time": 0.1}}
+    refuses("with AttackTime", ev.Sampled.from_ahap, pattern(path, {"Event": CONTINUOUS}, later), 1.0)
+
+
 def test_what_is_no_pattern_gets_a_sentence(tmp_path):
     path = tmp_path / "a.ahap"
     for text in ("", "[]", '{"Pattern": [{"Event": {"Time": 0}}]}', '{"Pattern": []}', '{"Pattern": 3}'):
