@@ -108,7 +108,7 @@ def _signal(path: Path) -> Found:
     try:
         return read_voltage(path)
     except InputError as error:
-        if path.suffix.lower() != ".csv":
+        if path.suffix.lower() != ".csv" or "." in error.key:  # a unit
             raise
         allowed = "a voltage (position,voltage or time,voltage) or the table of a sweep; measurements: "
         allowed += "`ev.MeasuredCurve.from_csv`, heights: `ev.Profile.from_csv`, `evfem texture import`"

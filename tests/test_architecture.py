@@ -23,7 +23,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray", "pypardiso"},
-        "constants arrays quadrature rooms notices checks views pools digest storage tables pictures",
+        "constants arrays rooms notices checks views pools digest storage units tables pictures",
     ),
     "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces solids quality groups file"),
     "tissue": (

@@ -39,6 +39,22 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
+def test_a_voltage_has_the_units_of_its_header(tmp_path):
+    """One file, through each door."""
+    path = tmp_path / "signal.csv"
+    path.write_text("time [ms],voltage [kV]\n0,0\n0.1,0.002\n0.2,0.003\n")
+    drawn = "version = 1\n[[motion]]\nkind = 'press'\nindentation = 0.1\nspeed = 10.0\n[electrostatics]\n"
+    (tmp_path / "scene.toml").write_text(f"{drawn}voltage_file = 'signal.csv'\n")
+    for signal in (ev.load(path), ev.Sampled.from_csv(path), ev.load(tmp_path / "scene.toml").voltage):
+        assert (signal(1e-4), signal.rate) == (pytest.approx(2.0), pytest.approx(1e4))
+    path.write_text("position,voltage\num,kV\n0,0\n500,0.2\n")
+    (tmp_path / "scene.toml").write_text(f"{drawn}voltage_file = 'signal.csv'\n")
+    for signal in (ev.load(path), ev.VoltageProfile.from_csv(path), ev.load(tmp_path / "scene.toml").voltage):
+        assert signal(0.25) == pytest.approx(100.0)
+    path.write_text("time [ms],voltage [furlong]\n0,0\n1,2\n")
+    refuses("voltage: given voltage in furlong; allowed: V | mV | kV", ev.load, path)
+
+
 def test_each_file_is_known_by_what_is_in_it(place):
     signal = ev.VoltageProfile([0.0, 1.0], [0.0, 300.0])
     signal.to_csv("ramp.csv")

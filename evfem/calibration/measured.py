@@ -11,7 +11,7 @@ doi:10.1137/0717021), from the state before the motion on; steps at the measured
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import choice, set_frozen
+from evfem.common.checks import choice, real, set_frozen
 from evfem.common.tables import numbers, read_headed, read_table
+from evfem.common.units import factor, named_unit
 from evfem.errors import InputError, quoted, readable, unknown
 from evfem.scene.keys import shown
 from evfem.scene.options import Solver
@@ -29,6 +30,7 @@ from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, SPATIAL_UNITS, UNITS
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
+from evfem.sweeps.table import unit_of
 
 NUMBERS = tuple(name for name in (*COLUMNS, *ROOM_COLUMNS, *SPATIAL) if name != "motion")
 #: most measured numbers of one kind
@@ -141,15 +143,18 @@ class MeasuredCurve:
         columns: Mapping[str, int | str] | None = None,
         zero: float = 0.0,
         branch: str | None = None,
+        factors: Mapping[str, float] | None = None,
     ) -> MeasuredCurve:
         """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of the history:
         `indentation,normal_force`; or with others, of which `columns` names those that are meant, OVER first,
         by names or numbers from 1: {"indentation": "Travel", "normal_force": 3}.
 
-        Units of the header are converted to mm, N, s, V and MPa. `zero` is the OVER (in these) at which OVER
-        shall be 0. `branch` is "loading", up to the largest OVER, or "unloading", from there on. Rows with
-        gaps are left out, rows at the same point are averaged. With a `depth` (mm) the file is in N, mm2
-        and mJ over it, as `Result.total` is, and what depends on it is divided by it, `sd` too.
+        Units of the header are converted to mm, N, s, V and MPa; a unit that is not known is refused, unless
+        `factors` has how many of these it is: {"normal_force": 9.80665e-3} for grams. `zero` is the OVER (in
+        these) at which OVER shall be 0. `branch` is "loading", up to the largest OVER, or "unloading", from
+        there on. Rows with gaps are left out, rows at the same point are averaged. With a `depth` (mm) the
+        file is in N, mm2 and mJ over it, as `Result.total` is, and what depends on it is divided by it,
+        `sd` too.
         """
         table = read_headed(Path(path), "data")
         wanted = dict(zip(table.names, table.names, strict=True)) if columns is None else dict(columns)
@@ -163,11 +168,16 @@ class MeasuredCurve:
             raise InputError("data", problem, allowed % tuple(map(readable, (over, *others))))
         for name in {over, *others} - {*NUMBERS}:
             raise unknown("data.columns", name, list(NUMBERS), f"{quoted(name)}, no column")
+        sizes = _factors(factors, wanted)
         found = []
         for name, of in zip((over, *others, "sd"), (over, *others, *others), strict=True):
             if name in wanted:  # per mm of depth, or in all
                 bases = UNITS.get(of), SPATIAL_UNITS.get(of)
-                found.append(table.column(f"data.columns.{name}", wanted[name], bases))
+                more = f'; or factors={{"{name}": how many {bases[0] or bases[1] or 1} one of these is}}'
+                key = f"data.columns.{name}"
+                like = wanted[others[0]] if name == "sd" else None
+                size = sizes.get(name, None if like is None else sizes.get(others[0]))
+                found.append(table.column(key, wanted[name], bases, size, more, like))
         at, values, *spread = _branch(np.column_stack(found), branch).T
         curve = cls(others[0], over, at - zero, values, motion, spread[0] if spread else sd, where or {})
         return curve if depth is None else curve._per_depth(DEPTH["check"]("data.depth", depth))
@@ -224,8 +234,10 @@ class MeasuredValues:
 
     @classmethod
     def from_csv(cls, path: str | Path, sd: float | None = None) -> MeasuredValues:
-        """The values in a file with the header `KEY,...,OUTPUT[,sd]`, keys as `motion.0.gap`."""
-        table = read_table(Path(path), "data")
+        """The values in a file with the header `KEY,...,OUTPUT[,sd]`, keys as `motion.0.gap`, perhaps with
+        units: `motion.0.gap [um]`.
+        """
+        table = _without_units(read_table(Path(path), "data"))
         spread = sd if "sd" not in table else table.pop("sd")
         *keys, last = table
         return cls(last, table[last], {key: table[key] for key in keys}, spread)
@@ -287,6 +299,33 @@ def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Float
     if len(spread) not in (1, count) or not (spread > 0.0).all():
         raise InputError("data.sd", shown(sd), rule)
     return {"values": found, "sd": np.broadcast_to(spread, count).copy()}
+
+
+def _without_units(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns of a table of runs without the units beside their names, in those of scenes and histories; a
+    deviation is in the unit of the column before it.
+    """
+    found: dict[str, Any] = {}
+    size, bases = 1.0, set[str | None]()
+    for cell, values in table.items():
+        name, unit = named_unit(cell)
+        if name != "sd":
+            column = name.split(".")[0]
+            bases = {unit_of(name), unit_of(name, "N"), UNITS.get(column), SPATIAL_UNITS.get(column)}
+        if name != "sd" or unit is not None:
+            size = factor(f"data.{name}", name, unit, bases)
+        found[name] = values if size == 1.0 else np.asarray(values) * size
+    return found
+
+
+def _factors(factors: Mapping[str, float] | None, wanted: Collection[str]) -> dict[str, float]:
+    """Factors of columns to the units of the history; one of a value is that of its deviation."""
+    found = {}
+    for name, size in (factors or {}).items():
+        if name not in wanted:
+            raise unknown("data.factors", name, list(wanted), f"{quoted(name)}, which is not read")
+        found[name] = real(f"data.factors.{name}", size, "a number that is not 0", lambda x: x != 0.0)
+    return found
 
 
 def _branch(rows: Floats, branch: str | None) -> Floats:

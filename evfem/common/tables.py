@@ -15,27 +15,17 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common import units
 from evfem.common.arrays import Floats
 from evfem.errors import InputError, quoted, unknown
 
 #: most rows of a csv file, and most bytes of one
 MOST_ROWS, MOST_BYTES = 1_000_000, 200_000_000
-#: unit -> the one that is meant without a word, and the number of these
-UNITS: Mapping[str, tuple[str, float]] = {
-    name: (base, size)
-    for base, sizes in {
-        "mm": {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "nm": 1e-6, "cm": 10.0, "m": 1e3},
-        "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-        "V": {"V": 1.0, "kV": 1e3},
-        "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-        "N/mm": {"N/mm": 1.0},
-        "mm2": {"mm2": 1.0},
-        "MPa": {"MPa": 1.0, "kPa": 1e-3, "Pa": 1e-6},
-    }.items()
-    for name, size in sizes.items()
-}
-#: name of a column -> what it is in
-IN = {"time": "s", "voltage": "V", **dict.fromkeys(("x", "y", "z", "height", "position"), "mm")}
+#: bytes that are read of a file to know its header
+BEGINNING = 65_536
+#: a number whose digits stand in threes, with points and with commas
+BY_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?")
+BY_POINTS = re.compile(r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+(?:,\d*)?")
 
 
 def piecewise_linear(position: Floats, value: Floats, x: Any) -> Floats:
@@ -170,8 +160,11 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Headed:
-    """Columns, NaN for gaps, with names and units; `commas`: whether numbers had decimal commas."""
+    """Columns, NaN for gaps, with names and units, of the `cells` of the header; `commas`: whether numbers
+    had decimal commas.
+    """
 
+    cells: list[str]
     names: list[str]
     units: list[str | None]
     columns: list[Floats]
@@ -183,37 +176,47 @@ class Headed:
         bare = self.names == [str(i) for i in range(1, len(self.names) + 1)]
         return "has no header" if bare else f"starts with {','.join(self.names)[:60]!r}"
 
-    def column(self, key: str, entry: int | str, bases: Collection[str | None]) -> Floats:
-        """A column by its name or its number from 1, in one of the units `bases`."""
-        called = [*self.names, *map(str, range(1, len(self.names) + 1))]
-        if (name := str(entry).lower()) not in called:
-            raise unknown(key, str(entry), called, f"{quoted(entry)}, which is no column")
-        i = called.index(name) % len(self.names)
+    def index(self, key: str, entry: int | str) -> int:
+        """The place of a column that is called by its name, its whole cell or its number from 1."""
+        numbers = [str(i) for i in range(1, len(self.names) + 1)]
+        name = str(entry).lower()
+        if name in numbers:
+            return int(name) - 1
+        found = [i for i, called in enumerate(zip(self.names, self.cells, strict=True)) if name in called]
+        if not found:
+            raise unknown(key, str(entry), [*self.names, *numbers], f"{quoted(entry)}, which is no column")
+        if len(found) > 1:
+            which = " | ".join(str(i + 1) for i in found)
+            raise InputError(
+                key, f"{quoted(entry)}, the name of {len(found)} columns", f"one by number: {which}"
+            )
+        return found[0]
+
+    def column(
+        self, key: str, entry: int | str, bases: Collection[str | None], factor: float | None = None,
+        more: str = "", like: int | str | None = None,
+    ) -> Floats:  # fmt: skip
+        """A column in one of the units `bases`, or `factor` times it where that is given; without a unit of
+        its own it has that of the column `like`. A message about its unit ends with `more`.
+        """
+        i = self.index(key, entry)
         unit = self.units[i]
-        base, factor = (None, 1.0) if unit is None else UNITS.get(unit, (unit, 1.0))
-        if unit is not None and base not in bases:
-            rule = " | ".join(name for name, (base, _) in UNITS.items() if base in bases) or "no unit"
-            raise InputError(key, f"{self.names[i]} in {unit}", rule)
-        return self.columns[i] if factor == 1.0 else self.columns[i] * factor
+        if unit is None and like is not None:
+            unit = self.units[self.index(key, like)]
+        size = units.factor(key, self.names[i], unit, bases, more) if factor is None else factor
+        return self.columns[i] if size == 1.0 else self.columns[i] * size
 
 
-def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
-    """Columns of a text with exactly the names `header` and a number everywhere, in mm, s and V."""
+def read_columns(path: Path, header: Mapping[str, str], key: str) -> list[Floats]:
+    """Columns of a text with exactly the names `header`, which has their units, and a number everywhere."""
     allowed = f"a readable csv file with the header {','.join(header)}"
     if path.suffix == ".json":
         allowed += f"; the rows of a texture stand in {path.stem}.csv"
     table = read_headed(path, key, allowed, gaps=False)
-    if table.names != header:
-        raise InputError(
-            key, f"{path.name}, which {table.start}", f"{allowed}, or {' [UNIT],'.join(header)} [UNIT]"
-        )
-    return [table.column(f"{key}.{name}", name, (IN.get(name),)) for name in header]
-
-
-#: a cell of a line of units
-UNIT = re.compile(r"[\[(]?([cµμunm]?m|[mu]?s|[mk]?N|N/mm|mm2|k?V|[kM]?Pa|g|m/s\^?2|1/mm|1|-|)[\])]?")
-#: name and unit in a header: x [mm], x (mm), x/mm, "x, mm", x_mm, x mm
-NAMED = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\)|[/,]\s*([^/,]+)|_([µμunm]?m|[mu]?s)|\s([µμunm]?m|[mk]?N))?")
+    if table.names != [*header]:
+        told = ",".join(name if unit == "1" else f"{name} [{unit}]" for name, unit in header.items())
+        raise InputError(key, f"{path.name}, which {table.start}", f"{allowed}, or {told}")
+    return [table.column(f"{key}.{name}", name, (unit,)) for name, unit in header.items()]
 
 
 def read_headed(
@@ -228,38 +231,54 @@ def read_headed(
     it; other lines that begin with # or % are left out. Raises `InputError` with `key` for anything
     else, and for missing numbers without `gaps`.
     """
-    text = enumerate(_text(path, key, allowed).split("\n"), 1)
-    lines = [(n, stripped) for n, line in text if (stripped := line.strip(" \r"))]
-    plain = [(n, line) for n, line in lines if line[0] not in "#%"]
-    found = (_numbers(_cells(line, _separator(line))) for _, line in plain)
-    first = next((i for i, row in enumerate(found) if len(row) > 1 and np.isfinite(row).any()), None)
-    if first is None:
+    lines = _lines(_text(path, key, allowed))
+    first, parts = _header(lines)
+    if first == len(lines):
         start = lines[0][1][:40] if lines else ""
         raise InputError(key, f"{path.name} without a line of numbers (it starts with {start!r})", allowed)
-    rows, separator = plain[first:], _separator(plain[first][1])
+    rows = [(number, line) for number, line in lines[first:] if line[0] not in "#%"]
     if len(rows) > MOST_ROWS:
         raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
-    width = len(_cells(rows[0][1], separator))
-    above = [_cells(line.lstrip("#% "), separator) for n, line in lines if n < rows[0][0]]
-    heads = [cells for cells in above if len(cells) == width] or above
-    parts = [_named(cell) for cell in heads[-1]] if heads else []
-    if len(heads) > 1 and len(heads[-2]) == len(parts) and all(map(UNIT.fullmatch, heads[-1])):
-        parts = [(name.lower(), unit.strip("[]()")) for name, unit in zip(*heads[-2:], strict=True)]
-    parts = parts or [(str(i), None) for i in range(1, width + 1)]
-    while len(parts) > 1 and not parts[-1][0]:  # a separator at the end of the header
-        parts.pop()
-    width = len(parts)
-    values = []
+    separator, width, values = _separator(rows[0][1]), len(parts), []
+    comma = _decimal_comma([line for _, line in rows], separator)
     for number, line in rows:
-        row = _numbers(_cells(line, separator))
+        row = _numbers(_cells(line, separator), comma)
         while len(row) > width and math.isnan(row[-1]):  # separators at the end of a line
             row.pop()
         if len(row) != width or not (gaps or all(map(math.isfinite, row))):
             rule = f"{width} {'' if gaps else 'finite '}numbers on each line"
             raise InputError(key, f"{path.name}, line {number}: {line[:60]!r}", rule)
         values.append(row)
-    commas = separator != "," and any("," in line for _, line in rows)
-    return Headed([name for name, _ in parts], [unit for _, unit in parts], list(np.array(values).T), commas)
+    cells, names = [cell for cell, _, _ in parts], [name for _, name, _ in parts]
+    return Headed(cells, names, [unit for *_, unit in parts], list(np.array(values).T), comma)
+
+
+def names_of(path: Path) -> list[str]:
+    """Names of the columns of a text, by its first lines; none where it cannot be read."""
+    with suppress(OSError, InputError), path.open("rb") as file:
+        start = _decoded(file.read(BEGINNING)) or ""
+        return [name for _, name, _ in _header(_lines(start))[1]]
+    return []
+
+
+def _lines(text: str) -> list[tuple[int, str]]:
+    """The lines of a text that are not empty, and their numbers."""
+    return [(n, plain) for n, line in enumerate(text.split("\n"), 1) if (plain := line.strip(" \r"))]
+
+
+def _header(lines: list[tuple[int, str]]) -> tuple[int, list[tuple[str, str, str | None]]]:
+    """Which line is the first one of numbers, and cells, names and units of the header above."""
+    first = next((i for i, (_, line) in enumerate(lines) if _holds_numbers(line)), None)
+    if first is None:
+        return len(lines), []
+    separator = _separator(lines[first][1])
+    row = _cells(lines[first][1], separator)
+    above = [_cells(one.lstrip("#% "), separator) for _, one in lines[:first]]
+    heads = [cells for cells in above if len(cells) == len(row)] or above
+    parts = units.header(heads) or [(str(i), str(i), None) for i in range(1, len(row) + 1)]
+    while len(parts) > 1 and not parts[-1][1]:  # a separator at the end of the header
+        parts.pop()
+    return first, parts
 
 
 def read_bytes(path: Path, key: str, allowed: str, most: int, limit: str) -> bytes:
@@ -274,14 +293,27 @@ def read_bytes(path: Path, key: str, allowed: str, most: int, limit: str) -> byt
     return data
 
 
+def _holds_numbers(line: str) -> bool:
+    cells = [] if line[0] in "#%" else _cells(line, _separator(line))
+    found = _numbers(cells, False) or _numbers(cells, True)
+    return len(found) > 1 and bool(np.isfinite(found).any())
+
+
 def _text(path: Path, key: str, allowed: str) -> str:
-    data = read_bytes(path, key, allowed, MOST_BYTES, f"at most {MOST_BYTES // 10**6} MB")
+    text = _decoded(read_bytes(path, key, allowed, MOST_BYTES, f"at most {MOST_BYTES // 10**6} MB"))
+    if text is None:
+        raise InputError(key, f"{path.name} (not a text file)", allowed)
+    return text
+
+
+def _decoded(data: bytes) -> str | None:
+    """The text, None of what is none."""
     codings = ("utf-16",) if data.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "latin-1")
     for coding in codings:
         with suppress(UnicodeDecodeError):
             if "\0" not in (text := data.decode(coding)):
                 return text
-    raise InputError(key, f"{path.name} (not a text file)", allowed)
+    return None
 
 
 def is_even(x: Floats) -> bool:
@@ -304,19 +336,36 @@ def _cells(line: str, separator: str | None) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _numbers(cells: list[str]) -> list[float]:
-    """Numbers of a line, NaN for gaps; none where one is something else."""
+def _numbers(cells: list[str], comma: bool) -> list[float]:
+    """Numbers of a line, with a decimal comma or point, NaN for gaps; none where one is something else."""
     try:
-        values = [float(cell.replace(",", ".") or "nan") for cell in cells]
+        values = [float(_pointed(cell, comma) or "nan") for cell in cells]
     except ValueError:
         return []
     return [] if any(map(math.isinf, values)) else values
 
 
-def _named(cell: str) -> tuple[str, str | None]:
-    found = NAMED.fullmatch(cell)
-    name, *units = found.groups() if found else (cell, None)
-    return name.lower(), next((unit.strip() for unit in units if unit), None)
+def _pointed(cell: str, comma: bool) -> str:
+    """A number with a decimal point, and nothing between its thousands."""
+    if "," not in cell and not (comma and "." in cell):
+        return cell
+    if comma:
+        return (cell.replace(".", "") if BY_POINTS.fullmatch(cell) else cell).replace(",", ".")
+    return cell.replace(",", "") if BY_COMMAS.fullmatch(cell) else cell
+
+
+def _decimal_comma(lines: list[str], separator: str | None) -> bool:
+    """Whether the commas in numbers are decimal ones: not if all stand before three digits, and points are
+    decimal elsewhere, or commas between the columns.
+    """
+    if separator == ",":
+        lines = [line for line in lines if '"' in line]
+    elif not any("," in line for line in lines):
+        return False
+    cells = [cell for line in lines for cell in _cells(line, separator)]
+    commas = [cell for cell in cells if "," in cell]
+    points = separator == "," or any("." in cell and not BY_POINTS.fullmatch(cell) for cell in cells)
+    return bool(commas) and not (points and all(map(BY_COMMAS.fullmatch, commas)))
 
 
 def words_or_numbers(words: Iterable[str]) -> Any:

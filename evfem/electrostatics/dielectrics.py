@@ -32,7 +32,7 @@ from evfem.common.tables import numbers, read_columns
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import InputError, quoted
 
-HEADER = ["frequency", "eps_r", "conductivity"]
+HEADER = {"frequency": "Hz", "eps_r": "1", "conductivity": "S/m"}
 _POLE = "(d_eps, tau in s, alpha), or with a fourth number for the lower exponent"
 _TOLERANCE = "a relative error above 0, up to 0.5"
 #: frequencies of a fit per decade; numbers of relaxation times that are tried, one after the other, and how
@@ -201,7 +201,8 @@ class DielectricTable(_Fitted):
 
     @classmethod
     def from_csv(cls, path: str | Path) -> DielectricTable:
-        """Read a file with the header ``frequency,eps_r,conductivity``, a row in Hz and S/m each.
+        """Read a file with the header ``frequency,eps_r,conductivity``, a row in Hz and S/m each, or in the
+        units of the header, ``frequency [kHz],eps_r,conductivity [S/cm]``.
 
         Raises InputError for a missing file, another header, and rows that are not three numbers.
         """

@@ -18,7 +18,6 @@ from __future__ import annotations
 import io
 import json
 import re
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -29,8 +28,8 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, check_fields, count, number, real, set_frozen
 from evfem.common.storage import replacing, write_text
-from evfem.common.tables import MOST_ROWS
-from evfem.electrostatics import timesignals, wav
+from evfem.common.tables import MOST_ROWS, names_of
+from evfem.electrostatics import wav
 from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
 from evfem.electrostatics.timesignals import Sampled
 from evfem.errors import ABSENT, InputError, quoted, readable
@@ -186,9 +185,8 @@ def read_signal(path: str | Path) -> VoltageProfile:
 def read_voltage(path: str | Path) -> VoltageProfile | Sampled:
     """The voltage in a file: over time (csv with the header ``time,voltage``), else over the position."""
     path = Path(path)
-    with suppress(OSError, UnicodeDecodeError), path.open(encoding="utf-8-sig") as lines:
-        if [cell.strip() for cell in lines.readline(100).split(",")] == timesignals.HEADER:
-            return Sampled.from_csv(path)
+    if path.suffix.lower() not in (".wav", ".hjif", ".png") and names_of(path)[:1] == ["time"]:
+        return Sampled.from_csv(path)
     return read_signal(path)
 
 

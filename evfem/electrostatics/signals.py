@@ -18,7 +18,7 @@ from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_colum
 from evfem.common.views import plus
 from evfem.errors import ABSENT, InputError
 
-HEADER = ["position", "voltage"]
+HEADER = {"position": "mm", "voltage": "V"}
 #: largest magnitude of a position (mm) and of a voltage (V)
 LARGEST = 1e6
 _POSITION = {"allowed": "positions in mm that never fall", "type": list[float], "unit": "mm"}
@@ -58,7 +58,8 @@ class VoltageProfile:
 
     @classmethod
     def from_csv(cls, path: str | Path) -> VoltageProfile:
-        """Read a file with the header ``position,voltage`` and a row of numbers in mm and V per point.
+        """Read a file with the header ``position,voltage`` and a row of numbers per point, in mm and V
+        or in the units of the header, ``position [um],voltage [kV]``.
 
         Raises InputError for a missing file, another header, or a row that is not two numbers.
         """

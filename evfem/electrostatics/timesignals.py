@@ -45,7 +45,7 @@ from evfem.electrostatics.alternating import PERIODS, SMOOTH, grouped, shares, s
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 
-HEADER = ["time", "voltage"]
+HEADER = {"time": "s", "voltage": "V"}
 #: largest voltage (V), and frequency and rate (Hz)
 LARGEST, FASTEST = 1e6, 1e9
 #: coulombs, or farads, per metre of depth in a nanocoulomb, or nanofarad, per millimetre
@@ -363,7 +363,8 @@ class Sampled:
 
     @classmethod
     def from_csv(cls, path: str | Path, *, repeat: bool = False) -> Sampled:
-        """Read a file with the header ``time,voltage`` and a row in s and V for each sample.
+        """Read a file with the header ``time,voltage`` and a row for each sample, in s and V or in the units
+        of the header, ``time [ms],voltage [kV]``.
 
         Raises InputError for a missing file, another header, a row that is not two numbers, and
         times that are not evenly spaced.

@@ -150,7 +150,7 @@ def read(path: Path, ridged: bool) -> Database:
     rows = np.column_stack([table[name][of] for name in RANGES]).tolist()
     textures = tuple(Parametric(**dict(zip(RANGES, row, strict=True)), ridged=ridged) for row in rows)
     friction, linear = (np.column_stack([table[name][of] for name in names]) for names in (CURVE, LINEAR))
-    kernels = read_columns(path.with_name(KERNELS), [*KERNEL], "database")
+    kernels = read_columns(path.with_name(KERNELS), dict.fromkeys(KERNEL, "1"), "database")
     _, *scale, smoothing, factor = np.column_stack(kernels)[int(ridged)].tolist()
     return Database(textures, friction, linear, table[ERROR][of], np.array(scale), smoothing, factor)
 

@@ -140,7 +140,10 @@ def read(path: Path, pixel: float, height: float, dark: str | None = None) -> He
     """
     if path.suffix.lower() == ".csv":
         return HeightMap(
-            *gridded("finger.ridges", *read_columns(path, ["x", "z", "height"], "finger.ridges"))
+            *gridded(
+                "finger.ridges",
+                *read_columns(path, dict.fromkeys(("x", "z", "height"), "mm"), "finger.ridges"),
+            )
         )
     return _from_image(path, pixel, height, dark)
 

@@ -85,9 +85,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import PART, SLIDE, Floats
 from evfem.common.constants import SMALLEST_FORCE
-from evfem.common.quadrature import PART, SLIDE
 from evfem.contact.signorini import STICK, sizes
 from evfem.newton.interface import slipped
 from evfem.newton.state import State

@@ -88,7 +88,7 @@ class Relief(RigidSurface):
     @classmethod
     def from_csv(cls, path: str | Path, **others: Any) -> Relief:
         """The surface in a file with the header `x,z,height`: every pair of some x and some z, in mm."""
-        rows = read_columns(Path(path), ["x", "z", "height"], "surface.file")
+        rows = read_columns(Path(path), dict.fromkeys(("x", "z", "height"), "mm"), "surface.file")
         return cls(*gridded("surface.file", *rows), **others)
 
     def __repr__(self) -> str:

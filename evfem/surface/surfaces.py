@@ -351,7 +351,7 @@ class Profile(RigidSurface):
         angle: float = 0.0,
     ) -> Profile:
         """The profile in a file with the header `x,height` and one point (mm) in each further line."""
-        x, height = read_columns(Path(path), ["x", "height"], "surface.file")
+        x, height = read_columns(Path(path), dict.fromkeys(("x", "height"), "mm"), "surface.file")
         return cls(x, height, friction, y, insulator, elastic, angle)
 
     def __repr__(self) -> str:

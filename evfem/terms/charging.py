@@ -18,9 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import SHARE, WAY, Floats
 from evfem.common.constants import KILOVOLT
-from evfem.common.quadrature import SHARE, WAY
 from evfem.common.rooms import Column, Room
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.relaxation import Sandwich

@@ -25,9 +25,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sparse
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import ENDS, Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
-from evfem.common.quadrature import ENDS
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum

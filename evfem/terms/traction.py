@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import FINE_SHARE, FINE_WAY, LEGENDRE, SEEN, SHARE, WAY, Floats, Ints
 from evfem.common.constants import LEFT_OVER, STABLE
-from evfem.common.quadrature import FINE_SHARE, FINE_WAY, LEGENDRE, SEEN, SHARE, WAY
 from evfem.common.rooms import Column, Room
 from evfem.contact.byforce import OF_GAP_ALONE, ByForce, OfGapAlone
 from evfem.surface.pad import Pad, SurfaceState, surface_state

@@ -9,6 +9,7 @@ are not known from such a file: `friction_profile` takes them.
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,17 +20,18 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, instance, number, one_of, real
 from evfem.common.pictures import read_grey
-from evfem.common.tables import UNITS, is_even, read_headed
+from evfem.common.tables import is_even, names_of, read_headed
+from evfem.common.units import UNITS, factor
 from evfem.electrostatics import wav
 from evfem.errors import InputError, quoted
 from evfem.textures.generate import phases
-from evfem.textures.importing import IMPORTERS, POSITIVE, Heights, Importer
+from evfem.textures.importing import IMPORTERS, POSITIVE, Heights, Importer, line_of
 from evfem.textures.texture import QUANTITIES, Texture
 
 #: units of length -> mm
 LENGTHS = {name: size for name, (base, size) in UNITS.items() if base == "mm"}
-#: columns that are no lengths
-PURE = ("friction", "frequency", "amplitude")
+#: units of columns that are no lengths
+PURE = {"friction": ("1",), "frequency": ("1/mm", "1"), "amplitude": ("1",)}
 #: endings of texts that may have a header
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".xyz")
 #: what is recorded -> how often it is integrated, and how that is said
@@ -53,10 +55,7 @@ def importer_of(path: Path) -> tuple[str, type[Importer]]:
 
 def header_of(path: Path) -> list[str]:
     """Names of the columns of a text, none where it cannot be read: whoever reads it says why."""
-    try:
-        return read_headed(path, "file").names if path.suffix.lower() in TEXTS else []
-    except InputError:
-        return []
+    return names_of(path) if path.suffix.lower() in TEXTS else []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,10 +92,12 @@ class Table(Heights, kind="csv"):
     """A text file with columns x and height (or z), x and friction, or frequency and amplitude (1/mm).
 
     Each length has the unit that its header says, as in `x [mm], z [um]`, or without one `unit`. Heights
-    are cleaned, the others kept as they are. What has no such columns is another program's: a `Scan`,
-    where SurfaceTopography is installed.
+    are cleaned, the others kept as they are. With a column y the heights are those of a straight line, which
+    keeps its length, or of a grid, of which one line along x is taken. What has no such columns is another
+    program's: a `Scan`, where SurfaceTopography is installed.
     """
 
+    row: Row = 0.5
     unit: Unit = None
 
     endings = (".csv",)
@@ -119,17 +120,23 @@ class Table(Heights, kind="csv"):
             value = f"{path.name}, which {table.start}"
             refusal = InputError("file", value, f"{headers}, so called in the file")
             return self._scanned(path, refusal, table.names[0] == "1")
-        used = [[_usual(name) for name in table.names].index(name) for name in QUANTITIES[quantity][0]]
-        first, second = (table.columns[i] * _scale(table.names[i], table.units[i], self.unit) for i in used)
+        usual = [_usual(name) for name in table.names]
+        across = ["y"] if quantity == "height" and usual.count("y") == 1 else []
+        x, value = QUANTITIES[quantity][0]
+        used = [usual.index(name) for name in (x, *across, value)]
+        rows = [table.columns[i] * _scale(table.names[i], table.units[i], self.unit) for i in used]
         lengths = [(table.names[i], table.units[i]) for i in used if table.names[i] not in PURE]
         own = [f"{name} in {unit}" for name, unit in lengths if unit]
         notes = [f"{', '.join(own)}, as the header says."] if own else []
         if self.unit not in (None, "mm") and len(own) < len(lengths):
             notes.append(f"{'Other lengths' if own else 'Lengths'} were in {self.unit}.")
         notes += ["Commas are decimal points."] if table.commas else []
+        if across:
+            rows, note = line_of(path, np.array(rows), self.row)
+            notes.append(note)
         if quantity != "height":
-            return self.texture(path, "measured", (first, second), notes, quantity)
-        return self.heights(path, "measured", first, second, notes)
+            return self.texture(path, "measured", (rows[0], rows[1]), notes, quantity)
+        return self.heights(path, "measured", rows[0], rows[1], notes)
 
     def _scanned(self, path: Path, error: InputError, perhaps: bool = True) -> Texture:
         """The texture of another program's text, or the `error` that says what this one has."""
@@ -154,11 +161,7 @@ def _usual(name: str) -> str:
 
 def _scale(name: str, own: str | None, unit: str | None) -> float:
     """Factor from the numbers of a column to mm, or of a frequency to 1/mm."""
-    units = dict.fromkeys(("1/mm", "1", "-", "mm^-1"), 1.0) if name in PURE else LENGTHS
-    found = own or (unit if name not in PURE else None) or next(iter(units))
-    if found not in units:
-        raise InputError("unit", f"{name} in {found}", " | ".join(units))
-    return units[found]
+    return factor("unit", name, own or (None if name in PURE else unit), PURE.get(name, ("mm",)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,11 +180,8 @@ class Scan(Heights, kind="scan"):
         if find_spec("SurfaceTopography") is None:
             raise InputError("file", path.name, 'the extra scans: pip install "evfem[scans]"')
         topography = _topography(path)
-        named = topography.unit or self.unit
-        if named not in LENGTHS:
-            value = f"{path.name}, {'without a unit' if named is None else f'in {named}'}"
-            raise InputError("unit", value, f"one of {', '.join(LENGTHS)}")
-        scale, note = LENGTHS[named], f"In {named}."
+        named, scale = _length(path, topography.unit, self.unit)
+        note = f"In {named}."
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * scale
         if topography.dim == 1:
             x = np.asarray(topography.positions()).ravel() * scale
@@ -191,6 +191,18 @@ class Scan(Heights, kind="scan"):
             note = f"Line {line + 1} of {heights.shape[1]} along x, in {named}."
             heights = heights[:, line]
         return self.heights(path, "scan", x, heights.ravel(), [note])
+
+
+def _length(path: Path, own: Any, unit: str | None) -> tuple[str, float]:
+    """The unit of a scan and its size in mm: the file's, if SurfaceTopography knows it, or `unit`."""
+    from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor, mangle_length_unit_utf8
+
+    with suppress(ValueError, TypeError, AttributeError):  # no unit, an unknown one, one for each axis
+        return str(own), float(get_unit_conversion_factor(mangle_length_unit_utf8(own), "mm"))
+    if unit is None:
+        value = f"{path.name}, {f'in {own}' if own else 'without a unit'}"
+        raise InputError("unit", value, f"one of {', '.join(LENGTHS)}")
+    return unit, LENGTHS[unit]
 
 
 def _topography(path: Path) -> Any:

@@ -5,14 +5,15 @@ options: the command line and the studio's page have them from there. A class th
 `Importer` with a `kind` is all that a further one needs, here or in a module that has been imported.
 
 Heights are cut, gaps filled, levelled, smoothed, in this order. Levelling subtracts the least-squares
-polynomial: a mean, a line or a parabola. Gaps are values that are not finite; they are filled by straight
-lines, as long as they are not most of the profile. Smoothing is the Gaussian profile filter with the
-cut-off wavelength of ISO 16610-21: a wave of that length keeps half its amplitude.
+polynomial: a mean, a line or a parabola. Gaps are values that are not finite, or a kilometre and more; they
+are filled by straight lines, as long as they are not most of the profile. Smoothing is the Gaussian profile
+filter with the cut-off wavelength of ISO 16610-21: a wave of that length keeps half its amplitude.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -21,13 +22,17 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, instance, number, one_of
-from evfem.common.tables import is_even
+from evfem.common.tables import gridded, is_even
 from evfem.errors import InputError
 from evfem.textures.texture import Texture
 
 LEVELS = ("none", "mean", "line", "parabola")
 #: largest fraction of gaps that is filled, and rms slope of heights that no finger slides over
 MOST_GAPS, STEEP = 0.5, 1.0
+#: how far points are from a straight line, or from lines of a grid, as a fraction of the length
+STRAIGHT, ON_GRID = 0.01, 1e-6
+#: a height (mm) that none has: programs write the largest number of their kind where a point is missing
+FAR = 1e6
 #: kind -> class of its files, in the order in which they are asked
 IMPORTERS: dict[str, type[Importer]] = {}
 
@@ -100,7 +105,7 @@ class Heights(Importer):
             problem = f"{inside.sum()} of {x.size} points"
             raise InputError("start, stop", problem, "at least four points between them")
         x, height = x[inside] - x[inside][0], height[inside]
-        known = np.isfinite(height)
+        known = np.abs(height) < FAR
         if missing := int((~known).sum()):
             if missing > MOST_GAPS * x.size:
                 problem = f"{missing} of {x.size} missing"
@@ -124,6 +129,28 @@ class Heights(Importer):
             steeper = "steeper than any surface that a finger slides over: is each unit right?"
             done.append(f"Rms slope {slope:.3g}, {steeper}")
         return self.texture(path, kind, (x, height), [*notes, *done], "height")
+
+
+def line_of(path: Path, rows: Floats, row: float) -> tuple[list[Floats], str]:
+    """Places along a line and heights there, of rows (3, n) of x, y and height (mm), and where the line is:
+    the one that the points are on, or the line `row` (0 to 1) of a grid.
+    """
+    rows = rows[:, np.isfinite(rows[:2]).all(axis=0)]
+    places = (rows[:2] - rows[:2].mean(axis=1, keepdims=True)).T
+    grain = ON_GRID * float(np.ptp(places, axis=0).max() or 1.0)
+    with suppress(InputError):
+        x, y = (np.rint(places / grain) * grain).T
+        xs, ys, heights = gridded("file", x, y, rows[2])
+        number = round(row * (len(ys) - 1))
+        return [xs - xs[0], heights[number]], f"Line {number + 1} of {len(ys)} along x."
+    direction = np.linalg.svd(places, full_matrices=False)[2]
+    along, *beside = direction @ places.T
+    if np.ptp(beside) > STRAIGHT * np.ptp(along):
+        allowed = "points of x,y,z on one straight line, or on every place of a grid"
+        raise InputError("file", f"{path.name}, {len(along)} points that are neither", allowed)
+    x = (along - along[0]) * (1.0 if along[-1] > along[0] else -1.0)
+    angle = float(np.degrees(np.arctan2(*np.abs(direction[0, ::-1]))))
+    return [x, rows[2]], f"Along a line at {angle:.3g} degrees to x."
 
 
 def _smoothed(x: Floats, height: Floats, cutoff: float) -> Floats:

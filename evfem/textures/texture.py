@@ -173,7 +173,7 @@ def read(path: str | Path) -> Texture:
     data = table["data"]
     if not isinstance(data, str) or Path(data).name != data or not data.endswith(".csv"):
         raise InputError("data", quoted(data), "the name of a csv file beside the .json")
-    x, values = read_columns(path.with_name(data), header, "data")
+    x, values = read_columns(path.with_name(data), dict(zip(header, units, strict=True)), "data")
     names = ("name", "kind", "licence", "quantity", "period", "provenance")
     found = Texture(x=x, values=values, **{name: table[name] for name in names})
     length = real("length", table["length"], "the length of the rows in mm")

@@ -29,8 +29,7 @@ from itertools import product
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
-from evfem.common.quadrature import gauss
+from evfem.common.arrays import Floats, Ints, gauss
 from evfem.errors import InputError
 from evfem.mesh import faces
 from evfem.mesh.mesh import CELLS, Mesh

@@ -8,7 +8,8 @@ from tools.builders import finger
 from tools.meshes import block
 from tools.refusals import refuses
 
-from evfem.calibration.measured import MeasuredCurve, MeasuredValues, along
+from evfem.calibration.measured import NUMBERS, MeasuredCurve, MeasuredValues, along
+from evfem.common.units import named_unit
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
@@ -110,6 +111,100 @@ def test_a_file_as_machines_write_it(tmp_path, coding, columns):
     np.testing.assert_allclose(unloading.values, [0.036, 0.035, 0.008])
 
 
+def pressed(path, text, **given):
+    """First place (mm) and force (N) of a file's rows, 100 um and 12 mN if it is read right."""
+    path.write_text(text, encoding="utf-8")
+    columns = {"indentation": 1, "normal_force": 2}
+    curve = MeasuredCurve.from_csv(path, 0, **{"columns": columns, **given})
+    return curve.at[0], curve.values[0]
+
+
+HEADS = {
+    "a speed beside": "Depth,Load,Speed\num,mN,mm/s",
+    "a temperature beside": "Depth,Load,T\nµm,mN,°C",
+    "a word beside": "Depth,Load,Gain\num,mN,counts",
+    "brackets": "Depth,Load,Gain\n[um],[mN],[counts]",
+    "units first": "um,mN,s\nDepth,Load,Time",
+    "underscore": "depth_um,load_mN,n",
+    "colon": "depth:um,load:mN,n",
+    "blank": "depth um,load mN,n",
+    "in": "depth in um,load in mN,n",
+    "a title": "Sample,B,3\nDepth [um],Load/mN,n",
+}
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_units_of_the_columns_that_are_read_count_whatever_the_others_are(tmp_path, head):
+    found = pressed(tmp_path / "press.csv", f"{HEADS[head]}\n100,12,1\n200,31,1\n")
+    assert found == pytest.approx((0.1, 0.012), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "newtons"), [("gf", 9.80665e-3), ("kgf", 9.80665), ("lbf", 4.4482216152605), ("µN", 1e-6)]
+)
+def test_forces_are_in_newtons_by_definition(tmp_path, unit, newtons):
+    """The kilogram-force and the pound-force of NIST SP 811 (2008), appendix B.8."""
+    text = f"depth,load\nmm,{unit}\n1,2\n2,3\n"
+    assert pressed(tmp_path / "press.csv", text)[1] == pytest.approx(2.0 * newtons, rel=1e-12)
+
+
+def test_a_deviation_without_a_unit_has_that_of_the_value(tmp_path):
+    path = tmp_path / "press.csv"
+    path.write_text("indentation [um],normal_force [mN],sd\n100,12,1\n200,31,2\n")
+    assert MeasuredCurve.from_csv(path).sd == pytest.approx([1e-3, 2e-3])
+    path.write_text("indentation [um],normal_force [mN],sd [uN]\n100,12,1\n200,31,2\n")
+    assert MeasuredCurve.from_csv(path).sd == pytest.approx([1e-6, 2e-6])
+
+
+def test_a_pressure_is_in_megapascal(tmp_path):
+    path = tmp_path / "p.csv"
+    path.write_text("position (in),pressure kPa\n1,12\n2,13\n")
+    curve = MeasuredCurve.from_csv(path, columns={"position": 1, "peak_contact_pressure": "pressure kPa"})
+    assert (curve.at[0], curve.values[0]) == pytest.approx((25.4, 0.012), rel=1e-12)
+
+
+@pytest.mark.parametrize("head", ["depth,load\nmm,furlong", "depth,load [furlong]", "depth,load:furlong"])
+def test_an_unknown_unit_is_refused_until_its_size_is_given(tmp_path, head):
+    path, text = tmp_path / "press.csv", f"{head}\n1,2\n2,3\n"
+    sentence = r'normal_force: given load in furlong; .* factors=\{"normal_force": how many N/mm one'
+    refuses(sentence, pressed, path, text)
+    assert pressed(path, text, factors={"normal_force": 0.5})[1] == 1.0
+    refuses("data.factors: .*normal_force", pressed, path, text, factors={"force": 0.5})
+    refuses("data.factors.normal_force: given 0", pressed, path, text, factors={"normal_force": 0})
+    volts = text.replace("furlong", "V")  # of a sensor
+    refuses("given load in V; allowed: N | mN", pressed, path, volts)
+
+
+def test_names_that_end_like_units_are_names():
+    for name in NUMBERS:
+        assert named_unit(name) == (name, None)
+
+
+@pytest.mark.parametrize(
+    ("rows", "right"),
+    [
+        ('depth,load\n1,"1,234"\n2,"2,000.5"\n', 1234.0),  # commas between columns: decimals have points
+        ("depth;load\n1,0;1.234,5\n2,0;2.000,5\n", 1234.5),
+        ("depth;load\n0.5;1,234\n2.5;1,234,567\n", 1234.0),
+        ("depth;load\n1;1,234\n2;2,345\n", 1.234),  # nothing says that these are thousands
+        ('depth,load\n1,"1,5"\n2,"2,25"\n', 1.5),
+    ],
+)
+def test_commas_between_thousands_are_no_decimal_commas(tmp_path, rows, right):
+    assert pressed(tmp_path / "press.csv", rows)[1] == right
+
+
+def test_of_two_columns_of_a_name_the_number_is_needed(tmp_path):
+    path, text = tmp_path / "press.csv", "depth,load,load\n1,2,7\n2,3,8\n"
+    columns = {"indentation": "depth", "normal_force": "load"}
+    refuses(
+        '"load", the name of 2 columns; allowed: one by number: 2 . 3', pressed, path, text, columns=columns
+    )
+    assert pressed(path, text, columns={"indentation": "depth", "normal_force": 3}) == (1.0, 7.0)
+    text = "depth,load_N,load_mN\n1,2,7\n2,3,8\n"
+    assert pressed(path, text, columns=columns | {"normal_force": "load_mN"}) == (1.0, 0.007)
+
+
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
@@ -124,6 +219,22 @@ def test_what_a_file_of_a_machine_lacks_is_said(tmp_path, given, sentence):
     (tmp_path / "press.csv").write_text(MACHINE)
     caught = refuses(sentence, MeasuredCurve.from_csv, tmp_path / "press.csv", **given)
     assert str(tmp_path) not in str(caught)
+
+
+def test_keys_and_outputs_of_a_file_have_units(tmp_path):
+    head = "electrostatics.voltage [kV],motion.0.gap_um,electrostatic_force.last (mN),sd"
+    (tmp_path / "hover.csv").write_text(f"{head}\n2,500,0.2,1\n1.5,250,0.1,1\n")
+    values = MeasuredValues.from_csv(tmp_path / "hover.csv")
+    assert values.where["electrostatics.voltage"] == [2000.0, 1500.0]
+    assert values.where["motion.0.gap"] == [0.5, 0.25]
+    assert values.values.tolist() == pytest.approx([2e-4, 1e-4])
+    assert values.sd.tolist() == pytest.approx([1e-3, 1e-3])  # in the unit of what it belongs to
+    (tmp_path / "hover.csv").write_text("motion.0.gap [V],electrostatic_force.last\n2,3\n")
+    refuses(
+        r"data.motion.0.gap: given motion.0.gap in V; allowed: mm",
+        MeasuredValues.from_csv,
+        tmp_path / "hover.csv",
+    )
 
 
 def test_values_from_a_file(tmp_path):

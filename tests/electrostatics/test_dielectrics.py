@@ -53,6 +53,24 @@ def test_no_debye_poles_for_what_is_not_passive():
     refuses("error that Debye poles can reach", odd.debye, 1.0, 1e3, 1e-2)
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "frequency [kHz],eps_r,conductivity [S/cm]",
+        "frequency:kHz,eps_r [-],conductivity (S/cm)",
+        "frequency,eps_r,conductivity\nkHz,-,S/cm",
+    ],
+)
+def test_tables_have_the_units_of_their_header(tmp_path, head):
+    path = tmp_path / "skin.csv"
+    path.write_text(f"{head}\n0.01,4000,1e-6\n1,1000,1e-5\n")
+    skin = dielectric(str(path))
+    assert skin.permittivity(100.0).real == pytest.approx(2000.0, rel=1e-13)
+    assert skin.conductivity_at(100.0) == pytest.approx(10**-3.5, rel=1e-13)
+    path.write_text("frequency [Hz],eps_r,conductivity [S]\n1,2,3\n")
+    refuses(r"skin.conductivity: given conductivity in S; allowed: S/m \|", dielectric, str(path))
+
+
 def test_tables_are_straight_on_logarithmic_scales_and_go_through_files(tmp_path):
     path = tmp_path / "skin.csv"
     path.write_text("frequency,eps_r,conductivity\n10,4000,1e-4\n1000,1000,1e-3\n")

@@ -1,5 +1,6 @@
 """Files of others: units, levelling, gaps, spectra, grey values, and what was done said."""
 
+import re
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,6 +122,51 @@ def test_columns_beside_the_two_and_rounded_places_are_no_obstacle(tmp_path):
     assert np.abs(texture.values).max() < 1.1e-3
     missing = csv(tmp_path / "b.csv", "x,height", [0.0, 1.0, np.nan, 3.0, 4.0], np.arange(5.0))
     assert Table(**SOURCE, level="none")(missing).x.tolist() == [0.0, 1.0, 3.0, 4.0]
+
+
+def xyz(path, *columns):
+    return csv(path, "x [um],y [um],z [um]", *(1e3 * one for one in columns))
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 135.0, 200.0])
+def test_a_line_keeps_its_length_however_it_lies(tmp_path, degrees):
+    t = np.linspace(0.0, 2.0, 41) ** 1.1
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    height = 0.01 * np.sin(3.0 * t)
+    path = xyz(tmp_path / "line.csv", 7.0 + cos * t, -3.0 + sin * t, height)
+    texture = Table(**SOURCE, level="none")(path)
+    np.testing.assert_allclose(texture.x, t, atol=1e-9)
+    np.testing.assert_allclose(texture.values, height, atol=1e-9)
+    found = re.search(r"Along a line at (\S+) degrees to x", " ".join(texture.provenance))
+    assert float(found.group(1)) == pytest.approx(min(degrees % 180.0, 180.0 - degrees % 180.0), abs=1e-3)
+
+
+@pytest.mark.parametrize(("row", "y"), [(0.0, 1.0), (0.5, 2.0), (1.0, 3.0)])
+def test_a_grid_of_points_is_a_line_of_it_along_x(tmp_path, row, y):
+    x, ys = np.meshgrid(np.linspace(0.0, 1.0, 5), [1.0, 2.0, 3.0])
+    order = np.random.default_rng(0).permutation(x.size)
+    rows = (one.ravel()[order] for one in (x, ys, ys * 0.01 * x**2))
+    texture = Table(**SOURCE, level="none", row=row)(xyz(tmp_path / "grid.csv", *rows))
+    np.testing.assert_allclose(texture.values, y * 0.01 * np.linspace(0.0, 1.0, 5) ** 2, atol=1e-12)
+    assert texture.length == pytest.approx(1.0)
+    assert f"Line {int(y)} of 3 along x." in texture.provenance
+
+
+def test_points_on_no_line_and_no_grid_are_refused(tmp_path):
+    x, y, z = np.random.default_rng(0).uniform(size=(3, 30))
+    refuses(
+        "30 points that are neither; allowed: points of x,y,z",
+        Table(**SOURCE),
+        xyz(tmp_path / "a.csv", x, y, z),
+    )
+
+
+@pytest.mark.parametrize("missing", [-1.7976931348623157e308, 3.4e38])
+def test_the_largest_number_of_a_program_is_a_missing_point(tmp_path, missing):
+    height = np.array([0.0, 1.0, missing, 3.0, 4.0])
+    texture = Table(**SOURCE, level="none")(csv(tmp_path / "a.csv", "x,height", np.arange(5.0), height))
+    assert texture.values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert "1 of 5 values missing, filled by straight lines." in texture.provenance
 
 
 def test_a_parabola_is_taken_off():

@@ -1,5 +1,7 @@
 """Scans through SurfaceTopography (evfem[scans]): units, lines, gaps."""
 
+import struct
+
 import numpy as np
 import pytest
 from tools.refusals import refuses
@@ -29,6 +31,35 @@ def test_a_line_of_a_scan_is_in_millimetres(tmp_path, name, unit, scale, row, fa
     np.testing.assert_allclose(texture.values, factor * HEIGHT, atol=1e-8)
     np.testing.assert_allclose(texture.x, X - X[0], atol=1e-9)
     assert f"Line {round(row * 2) + 1} of 3" in texture.provenance[1]
+
+
+@pytest.mark.parametrize(("unit", "size"), [("pm", 1e-9), ("Å", 1e-7), ("µm", 1e-3)])
+def test_units_are_those_of_surfacetopography(tmp_path, unit, size):
+    """By definition; Keyence's files are in pm."""
+    write_scan(tmp_path / "a.nc", unit, size)
+    texture = Scan(**SOURCE, unit="cm", row=0.0, level="none")(tmp_path / "a.nc")  # the file's own counts
+    np.testing.assert_allclose(texture.values, HEIGHT, rtol=1e-6, atol=1e-9)
+    assert texture.length == pytest.approx(X[-1] - X[0], rel=1e-6)
+
+
+def test_where_the_unit_of_a_file_is_unknown_the_one_that_is_said_counts(tmp_path):
+    write_scan(tmp_path / "a.nc", "pixels", 0.1)
+    refuses("unit: given a.nc, in pixels; allowed: one of mm", Scan(**SOURCE), tmp_path / "a.nc")
+    texture = Scan(**SOURCE, unit="um", row=0.0, level="none")(tmp_path / "a.nc")
+    np.testing.assert_allclose(texture.values, HEIGHT / 0.1 * 1e-3, rtol=1e-6, atol=1e-9)
+
+
+def test_a_lacking_point_of_an_sdf_is_filled(tmp_path):
+    """ISO 25178-71 in doubles, with the smallest one where a point is lacking, as surfalize writes it."""
+    heights = np.tile(np.arange(6.0), (3, 1))  # um
+    heights[1, 2] = -np.finfo(float).max
+    head = struct.pack(
+        "<8s10s12s12sHHddddBBB", b"bISO-1.0", b"test", b"0", b"0", 6, 3, 1e-4, 1e-4, 1e-6, -1.0, 0, 7, 0
+    )
+    (tmp_path / "a.sdf").write_bytes(head + heights.astype("<f8").tobytes())
+    texture = Scan(**SOURCE, level="none")(tmp_path / "a.sdf")
+    np.testing.assert_allclose(texture.values, 1e-3 * np.arange(6.0), atol=1e-12)
+    assert "1 of 6 values missing, filled by straight lines." in texture.provenance
 
 
 def test_a_file_without_a_unit_needs_one(tmp_path):

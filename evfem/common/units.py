@@ -1,0 +1,132 @@
+"""Units: what tables of others are in, and how a header says so."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+
+from evfem.errors import InputError
+
+#: unit that is meant without a word -> what else it is measured in, and how many of the first that is
+SIZES: Mapping[str, Mapping[str, float]] = {
+    "mm": {"mm": 1.0, "um": 1e-3, "nm": 1e-6, "pm": 1e-9, "cm": 10.0, "m": 1e3, "in": 25.4, "inch": 25.4},
+    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "V": {"V": 1.0, "mV": 1e-3, "kV": 1e3},
+    "N": {
+        "N": 1.0, "uN": 1e-6, "mN": 1e-3, "cN": 1e-2, "kN": 1e3,
+        "gf": 9.80665e-3, "kgf": 9.80665, "kp": 9.80665, "lbf": 4.4482216152605, "ozf": 0.27801385095378125,
+    },
+    "N/mm": {"N/mm": 1.0, "mN/mm": 1e-3, "N/cm": 0.1, "N/m": 1e-3, "kN/m": 1.0},
+    "mm2": {"mm2": 1.0, "um2": 1e-6, "cm2": 100.0, "m2": 1e6},
+    "mJ": {"mJ": 1.0, "uJ": 1e-3, "J": 1e3, "Nmm": 1.0, "N*mm": 1.0},
+    "MPa": {
+        "MPa": 1.0, "kPa": 1e-3, "hPa": 1e-4, "Pa": 1e-6, "GPa": 1e3, "N/mm2": 1.0, "N/cm2": 1e-2,
+        "N/m2": 1e-6, "bar": 0.1, "mbar": 1e-4, "psi": 6.894757293168361e-3,
+    },
+    "Hz": {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6, "GHz": 1e9},
+    "S/m": {
+        "S/m": 1.0, "uS/m": 1e-6, "mS/m": 1e-3, "S/cm": 100.0, "mS/cm": 0.1, "uS/cm": 1e-4, "S/mm": 1e3,
+    },
+    "mm/s": {"mm/s": 1.0, "um/s": 1e-3, "cm/s": 10.0, "m/s": 1e3, "mm/min": 1.0 / 60.0},
+    "1/mm": {"1/mm": 1.0, "mm-1": 1.0, "1/um": 1e3, "1/cm": 0.1, "1/m": 1e-3, "m-1": 1e-3},
+    "1": {"1": 1.0, "-": 1.0, "%": 0.01},
+}  # fmt: skip
+#: those that no column of evfem has, but by which a line is known as one of units
+OTHERS = (
+    "g kg mg lb lbs oz gram grams °C degC °F degF K A mA uA nA C nC uC pC F uF nF pF ohm Ohm kOhm MOhm Ω kΩ "
+    "W mW rad mrad deg ° rpm 1/s 1/min mm/s2 m/s2 N/s mN/s Pa/s MPa/s kPa/s V/s N*m Nm mNm T mT dB lx"
+)
+
+
+def spellings(unit: str) -> set[str]:
+    """A unit with either of the two signs for micro.
+
+    >>> sorted(spellings("um"))
+    ['um', 'µm', 'μm']
+    """
+    micro = re.compile(r"(?<![A-Za-z])u(?=[A-Z]|m)|(?<![A-Za-z])u(?=s\b)")
+    return {unit, micro.sub("µ", unit), micro.sub("μ", unit)}
+
+
+#: unit -> the one that is meant without a word, and the number of these
+UNITS: Mapping[str, tuple[str, float]] = {
+    spelled: (base, size)
+    for base, sizes in SIZES.items()
+    for name, size in sizes.items()
+    for spelled in sorted(spellings(name))
+} | {spelled: (name, 1.0) for name in OTHERS.split() for spelled in sorted(spellings(name))}
+#: those that a name can end with, and labels (`probe_A`) that are none
+LABELS = ("1", "-", "%", "A", "C", "F", "K", "T", "W")
+BRACKETS = re.compile(r"(.+?)\s*[_/,:]?\s*(?:\[(.*)\]|\((.*)\))")
+GAP = re.compile(r"\s+in\s+|\s*[/,:]\s*|_|\s+")
+SIGNED = re.compile(r"(.+?)\s*([/,:])\s*([^/,:]+)")
+
+
+def plain_unit(text: str | None) -> str | None:
+    """A unit as `UNITS` has it, without brackets and with plain exponents; None for nothing.
+
+    >>> [plain_unit(text) for text in ("[mm^2]", "m/s²", "(kPa)", "")]
+    ['mm2', 'm/s2', 'kPa', None]
+    """
+    text = (text or "").strip()
+    if text[:1] + text[-1:] in ("[]", "()"):
+        text = text[1:-1].strip()
+    for sign, plain in (("²", "2"), ("⁻¹", "-1"), ("**", ""), ("^", ""), ("·", "*")):
+        text = text.replace(sign, plain)
+    return text or None
+
+
+def named_unit(cell: str) -> tuple[str, str | None]:
+    """Name and unit of a column: x [mm], x (mm), x/mm, "x, mm", x:mm; x_mm and x mm, where
+    the end is a unit that is known.
+
+    >>> [named_unit(cell) for cell in ("Load [gf]", "pressure kPa", "v/mm/s", "normal_force", "z:furlong")]
+    [('Load', 'gf'), ('pressure', 'kPa'), ('v', 'mm/s'), ('normal_force', None), ('z', 'furlong')]
+    """
+    if found := BRACKETS.fullmatch(cell):
+        name, *units = found.groups()
+        return name, plain_unit(next(unit for unit in units if unit is not None))
+    for gap in GAP.finditer(cell, 1):
+        unit, signed = plain_unit(cell[gap.end() :]), any(sign in gap.group() for sign in "/,:")
+        if unit in UNITS and (signed or unit not in LABELS):
+            return cell[: gap.start()], unit
+    if found := SIGNED.fullmatch(cell):
+        return found.group(1), plain_unit(found.group(3))
+    return cell, None
+
+
+def header(heads: list[list[str]]) -> list[tuple[str, str, str | None]]:
+    """Whole cells and names, in small letters, and units of columns, of the lines of cells above the numbers:
+    the last line, or the one before and units in the last, of which one that is known, or brackets round
+    all, is a sign.
+    """
+    cells, said = (heads[-1] if heads else []), None
+    if len(heads) > 1 and len(heads[-2]) == len(cells):
+        if _says_units(cells):
+            cells, said = heads[-2], cells
+        elif _says_units(heads[-2]) and all(plain_unit(cell) in (None, *UNITS) for cell in heads[-2]):
+            said = heads[-2]
+    found = [(cell.lower(), *named_unit(cell)) for cell in cells]
+    told = [plain_unit(unit) for unit in said or [""] * len(cells)]
+    return [(cell, name.lower(), unit or own) for (cell, name, own), unit in zip(found, told, strict=True)]
+
+
+def _says_units(cells: list[str]) -> bool:
+    """Whether a line is one of units."""
+    told = [cell for cell in cells if plain_unit(cell) not in (None, "1", "-")]
+    bracketed = all(cell[0] + cell[-1] in ("[]", "()") for cell in told)
+    return bool(told) and (bracketed or any(plain_unit(cell) in UNITS for cell in told))
+
+
+def factor(key: str, name: str, unit: str | None, bases: Collection[str | None], more: str = "") -> float:
+    """What the numbers of the column `name` are multiplied with to be in one of `bases`; `InputError`, whose
+    end is `more`, where its `unit` is none of these.
+
+    >>> factor("x", "depth", "um", ("mm",))
+    0.001
+    """
+    base, size = UNITS.get(unit, (unit, 1.0)) if unit is not None else (None, 1.0)
+    if base is None or base in {one or "1" for one in bases if one is not None}:
+        return size
+    rule = " | ".join(name for name, (base, _) in UNITS.items() if base in bases and name.isascii())
+    raise InputError(key, f"{name} in {unit}", (rule or "no unit") + more)
