@@ -127,6 +127,7 @@ HEADS = {
     "units first": "um,mN,s\nDepth,Load,Time",
     "underscore": "depth_um,load_mN,n",
     "colon": "depth:um,load:mN,n",
+    "a quotient": "depth:um,load:mN/mm,n",
     "blank": "depth um,load mN,n",
     "in": "depth in um,load in mN,n",
     "a title": "Sample,B,3\nDepth [um],Load/mN,n",
