@@ -43,7 +43,9 @@ def test_a_voltage_has_the_units_of_its_header(tmp_path):
     """One file, through each door."""
     path = tmp_path / "signal.csv"
     path.write_text("time [ms],voltage [kV]\n0,0\n0.1,0.002\n0.2,0.003\n")
-    drawn = "version = 1\n[[motion]]\nkind = 'press'\nindentation = 0.1\nspeed = 10.0\n[surface]\nkind = 'flat'\n[electrostatics]\n"
+    motion = "[[motion]]\nkind = 'press'\nindentation = 0.1\nspeed = 10.0\n"
+    drawn = f"version = 1\n{motion}[surface]\nkind = 'flat'\n"
+    drawn += "[electrostatics]\nlaw = 'kaczmarek'\ninsulator = 'film'\n"
     (tmp_path / "scene.toml").write_text(f"{drawn}voltage_file = 'signal.csv'\n")
     for signal in (ev.load(path), ev.Sampled.from_csv(path), ev.load(tmp_path / "scene.toml").voltage):
         assert (signal(1e-4), signal.rate) == (pytest.approx(2.0), pytest.approx(1e4))

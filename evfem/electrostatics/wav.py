@@ -34,6 +34,8 @@ HAPTIC = ("HapticTransient", "HapticContinuous")
 ENVELOPE = {"AttackTime": 0.0, "DecayTime": 0.0, "ReleaseTime": 0.0, "Sustained": 1.0}
 #: comment and headers of a file on top of its samples
 MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
+#: exponent of a .hjif's unit of length (m) where it has none; straight pieces of a cubic
+MILLIMETRE, PIECES = -3, 64
 #: the first position in the description of a .hjif
 FROM = re.compile(r"from (\S+) mm")
 
@@ -188,23 +190,65 @@ def _control(pattern: list[dict[str, Any]], time: Floats) -> Floats:
 
 def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:
     """Places (n,) in mm and coefficients (n,) of the first friction perception of a `.hjif`, and all that it
-    says of that perception.
+    says of that perception, with the number of `others` after it.
 
-    Raises InputError for a file without one, or one that is no curve over a length.
+    As MPEG's reference software plays it (`source/Types`: `Effect::EvaluateKeyframes`): places count from the
+    effect's position, exponents are -3 (mm) and 0 where there are none, and cubic pieces are level at their
+    ends. Raises InputError for a file without one, or one that is not a curve over a length.
     """
     allowed = "a .hjif with a friction perception: a curve of two or more keyframes over a length"
     with _parsed(path, "path", allowed) as whole:
-        (told, *_) = (one for one in whole["perceptions"] if one["perception_modality"] == "Friction")
-        (channel,) = told["channels"]
-        ((frames,),) = ([effect["keyframes"] for effect in band["effects"]] for band in channel["bands"])
+        (told, *more) = (one for one in whole["perceptions"] if one["perception_modality"] == "Friction")
+        channel, band, effect = _curve(told, path, allowed)
+        frames = [frame for frame in effect["keyframes"] if "amplitude_modulation" in frame]
         ticks, fraction = (
             np.array([float(frame[name]) for frame in frames])
             for name in ("relative_position", "amplitude_modulation")
         )
+        if ticks.size < 2 or not (np.diff(ticks) > 0.0).all():
+            raise ValueError("keyframes")
+        if band["curve_type"] == "Cubic":
+            ticks, fraction = _smooth(ticks, fraction)
         found = FROM.search(str(whole.get("description")))
         start = float(found.group(1)) if found else 0.0
-        position = start + ticks * 10.0 ** (int(told["unit_exponent"]) + 3)
-        friction = float(channel["gain"]) * fraction
-        if ticks.size < 2 or not (np.diff(position) > 0.0).all() or not np.isfinite(friction).all():
+        ticks = ticks + float(effect["position"])
+        position = start + ticks * 10.0 ** (int(told.get("unit_exponent", MILLIMETRE)) + 3)
+        friction = float(channel["gain"]) * 10.0 ** int(told.get("perception_unit_exponent", 0)) * fraction
+        if not (np.diff(position) > 0.0).all() or not np.isfinite(friction).all():
             raise ValueError("keyframes")
-    return position, friction, dict(told)
+    return position, friction, {**told, "others": len(more)}
+
+
+def _curve(told: dict[str, Any], path: Path, allowed: str) -> tuple[dict[str, Any], ...]:
+    """The only channel, band and effect of a perception; InputError that names what else is there."""
+
+    def only(of: dict[str, Any], name: str) -> dict[str, Any]:
+        if len(of[name]) != 1:
+            raise InputError(
+                "path", f"{path.name}, with {len(of[name])} {name} of friction", f"{allowed}, one of each"
+            )
+        found: dict[str, Any] = of[name][0]
+        return found
+
+    channel = only(told, "channels")
+    band = only(channel, "bands")
+    effect = only(band, "effects")
+    curve = band.get("curve_type") if band["band_type"] == "Curve" else band["band_type"]
+    if curve not in ("Linear", "Cubic"):
+        what = f"a band of the type {band['band_type']}, curve {band.get('curve_type')}"
+        raise InputError("path", f"{path.name}, with {what}", f"{allowed}, Linear or Cubic")
+    if effect["effect_type"] != "Basis":
+        problem = f"{path.name}, with an effect of the type {effect['effect_type']}"
+        raise InputError("path", problem, f"{allowed} of its own, Basis")
+    return channel, band, effect
+
+
+def _smooth(ticks: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Rows on the cubics between keyframes, whose slope is 0 there; each straight to 2e-4 of its rise."""
+    share = np.arange(PIECES) / PIECES
+    rise = share**2 * (3.0 - 2.0 * share)
+    places, found = (
+        np.append((a[:-1, None] + np.diff(a)[:, None] * part).ravel(), a[-1])
+        for a, part in ((ticks, share), (values, rise))
+    )
+    return places, found

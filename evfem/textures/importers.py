@@ -234,7 +234,8 @@ class Haptics(Importer, kind="hjif"):
     def __call__(self, path: str | Path) -> Texture:
         path = Path(path)
         position, friction, told = wav.read_friction(path)
-        note = f"Friction perception {str(told.get('description', ''))[:100]!r}."
+        note = f"Friction perception {str(told.get('description', ''))[:100]!r}"
+        note += f", the first of {1 + told['others']}." if told["others"] else "."
         return self.texture(path, "measured", (position - position[0], friction), [note], "friction")
 
 

@@ -8,7 +8,7 @@ import pytest
 from tools.refusals import refuses
 
 import evfem as ev
-from evfem.electrostatics import signalfile
+from evfem.electrostatics import signalfile, wav
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.electrostatics.signalfile import Playback, write_signal
@@ -210,10 +210,68 @@ def test_files_of_others_are_textures_or_get_a_sentence(tmp_path):
     path.write_text(json.dumps(file | {"perceptions": [perception, other]}))
     refuses(r"a\.hjif, without them; allowed: a \.hjif with the largest", signalfile.read_signal, path)
     assert Haptics(licence="CC0-1.0")(path).length == pytest.approx(100.0)  # ten times as long
+    path.write_text(json.dumps(file | {"perceptions": [other, perception, other, other]}))
+    assert Haptics(licence="CC0-1.0")(path).provenance[-1].endswith(", the first of 3.")
     for text in ("", "[]", json.dumps(file | {"perceptions": [perception]}), '{"perceptions": [3]}'):
         path.write_text(text)
         refuses(r"path: given a\.hjif, of another kind or damaged; allowed: a", signalfile.read_signal, path)
     refuses("No such file", signalfile.read_signal, tmp_path / "none.hjif")
+
+
+def changed(path, **at):
+    """A file of 0.5 to 0.6 over 10 mm with other values in its perception, channel, band or effect."""
+    file = signalfile.haptics(VoltageProfile([0.0, 10.0], [0.0, 2000.0]), 2000.0, 20.0, (0.5, 0.6))
+    (perception,) = file["perceptions"]
+    (channel,) = perception["channels"]
+    (band,) = channel["bands"]
+    (effect,) = band["effects"]
+    places = {"perception": perception, "channel": channel, "band": band, "effect": effect}
+    for name, values in at.items():
+        places[name] |= values
+        for key in [key for key, value in values.items() if value is None]:
+            del places[name][key]
+    path.write_text(json.dumps(file))
+    return path
+
+
+FRAMES = [{"relative_position": 10 * k, "amplitude_modulation": v} for k, v in enumerate((0.0, 1.0, 0.5))]
+
+
+def test_exponents_positions_and_cubics_are_those_of_the_reference_software(tmp_path):
+    """`Effect::EvaluateKeyframes` of MPEG's reference software, by its formula at places of its own."""
+    path = tmp_path / "a.hjif"
+    found = Haptics(licence="CC0-1.0")(changed(path, perception={"perception_unit_exponent": -1}))
+    assert found.values.max() == pytest.approx(0.06)
+    assert (
+        Haptics(licence="CC0-1.0")(changed(path, perception={"perception_unit_exponent": None})).values[-1]
+        == 0.6
+    )
+    whole = {"perception": {"unit_exponent": None}, "effect": {"position": 5, "keyframes": FRAMES}}
+    place, friction, _ = wav.read_friction(changed(path, **whole))
+    assert (place.tolist(), friction.tolist()) == ([5.0, 15.0, 25.0], [0.0, 0.6, 0.3])  # mm
+    place, friction, _ = wav.read_friction(changed(path, band={"curve_type": "Cubic"}, **whole))
+    for t, (t0, f0, f1) in {8.0: (5.0, 0.0, 0.6), 17.5: (15.0, 0.6, 0.3)}.items():
+        h = 10.0
+        right = f0 + (f1 - f0) * (3.0 * h + 2.0 * (t0 - t)) * (t - t0) ** 2 / h**3
+        assert np.interp(t, place, friction) == pytest.approx(right, abs=2e-4 * abs(f1 - f0))
+
+
+@pytest.mark.parametrize(
+    ("at", "sentence"),
+    [
+        ({"band": {"band_type": "WaveletWave"}}, "a band of the type WaveletWave"),
+        ({"band": {"band_type": "VectorialWave"}}, "a band of the type VectorialWave"),
+        ({"band": {"band_type": "Transient"}}, "a band of the type Transient"),
+        ({"band": {"curve_type": "Akima"}}, "a band of the type Curve, curve Akima"),
+        ({"band": {"curve_type": None}}, "a band of the type Curve, curve None"),
+        ({"effect": {"effect_type": "Reference"}}, "an effect of the type Reference"),
+        ({"band": {"effects": [{}, {}]}}, "2 effects of friction; allowed: .*, one of each"),
+        ({"channel": {"bands": [{}, {}, {}]}}, "3 bands of friction"),
+        ({"perception": {"channels": []}}, "0 channels of friction"),
+    ],
+)
+def test_what_else_a_file_may_hold_is_refused_by_name(tmp_path, at, sentence):
+    refuses(sentence, Haptics(licence="CC0-1.0"), changed(tmp_path / "a.hjif", **at))
 
 
 # structure and names: developer.apple.com/documentation/corehaptics, "Representing haptic patterns in AHAP
