@@ -176,9 +176,12 @@ def test_an_unknown_unit_is_refused_until_its_size_is_given(tmp_path, head):
     refuses("given load in V; allowed: N | mN", pressed, path, volts)
 
 
-def test_names_that_end_like_units_are_names():
+def test_names_that_end_like_units_are_names(tmp_path):
     for name in NUMBERS:
         assert named_unit(name) == (name, None)
+    columns = {"indentation": "depth", "normal_force": "load_A"}  # of two sensors, A and C
+    text = "depth_um,load_C,load_A\n100,7,12\n200,8,31\n"
+    assert pressed(tmp_path / "press.csv", text, columns=columns) == pytest.approx((0.1, 12.0))
 
 
 @pytest.mark.parametrize(
