@@ -140,6 +140,7 @@ def test_rows_beyond_the_limit_are_refused(tmp_path, monkeypatch):
     [
         (lambda: ev.Sinusoid(terms=[[0.1, 1.0, 0.0]] * 1001), "1000 rows"),
         (lambda: ev.Sinusoid(terms=[[1e300, 1.0, 0.0]]), "within 1e3 mm"),
+        (lambda: ev.Sinusoid(terms=[[0.1, [1.0, 2.0], 0.0]]), "surface.terms: given"),
         (lambda: ev.Flat(friction=1e300), "0 to 100"),
         (lambda: ev.Flat(friction=10**400), "0 to 100"),
         (lambda: ev.Flat(friction=[[0.0, 0.1]] * 10_001), "10000 rows"),

@@ -412,10 +412,11 @@ def _friction(key: str, value: Any) -> float | Rows | FrictionMap:
 
 def _terms(key: str, value: Any) -> tuple[tuple[float, ...], ...]:
     """Rows of a sum of sines, with angles or without."""
-    rows = list(value) if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else value
-    long = isinstance(rows, list) and any(np.size(row) == 4 for row in rows)
-    if long:  # some rows with an angle, some without
-        rows = [[*row, 0.0] if np.size(row) == 3 else row for row in rows]
+    many = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    rows = list(value) if many else value
+    sizes = [len(row) if isinstance(row, list | tuple | np.ndarray) else 0 for row in rows] if many else []
+    if long := 4 in sizes:  # some rows with an angle, some without
+        rows = [[*row, 0.0] if size == 3 else row for row, size in zip(rows, sizes, strict=True)]
     found = _rows(key, rows, 4 if long else 3, TERMS, MOST_TERMS)
     if (np.abs(found) > [HIGHEST, FASTEST, FASTEST, 360.0][: len(found[0])]).any():
         raise InputError(key, quoted(value), TERMS)
