@@ -16,7 +16,6 @@ import contextlib
 import functools
 import io
 import os
-import re
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -27,6 +26,7 @@ import numpy as np
 from evfem.common.arrays import Ints
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
+from evfem.mesh import abaqus
 from evfem.mesh.groups import PHYSICAL, PREFIX, Name, dimension_of, groups_in, regions_in, sets_in
 from evfem.mesh.mesh import CELLS, KINDS, Mesh
 from evfem.mesh.quality import check
@@ -40,12 +40,6 @@ LARGEST = 128 * 2**20
 PIXELS: Mapping[str, tuple[str, list[int]]] = {
     "pixel": ("quad", [0, 1, 3, 2]),
     "voxel": ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6]),
-}
-#: elements of Abaqus for plane strain, which meshio does not know
-PLANE_STRAIN = {
-    f"CPE{nodes}{kind}": cell
-    for nodes, cell in ((3, "triangle"), (4, "quad"), (6, "triangle6"), (8, "quad8"))
-    for kind in ("", "H", "I", "IH", "M", "MH", "R", "RH")
 }
 #: kinds that are refused for what they lack
 _TETRAHEDRA = "Gmsh makes hexahedra of tetrahedra and wedges: docs/howto/mesh.md, From tetrahedra"
@@ -126,7 +120,6 @@ def parts(path: Path) -> meshio.Mesh:
     meshio._vtk_common.vtk_to_meshio_type[11] = "voxel"  # which it does not know, and pixels by name alone
     meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)
     meshio._mesh.topological_dimension.update(pixel=2, voxel=3)
-    meshio.abaqus._abaqus.abaqus_to_meshio_type.update(PLANE_STRAIN)
     # its messages are not searched for words to colour, which takes long in long ones
     console = meshio._common.Console
     meshio._common.Console = functools.partial(getattr(console, "func", console), highlighter=None)
@@ -135,7 +128,7 @@ def parts(path: Path) -> meshio.Mesh:
             warnings.simplefilter("ignore")
             warnings.filterwarnings("error", "string or file could not be read")  # no number
             warnings.simplefilter("error", RuntimeWarning)  # numbers out of range
-            raw = meshio.read(path)
+            raw = abaqus.read(path) if path.suffix.lower() == ".inp" else meshio.read(path)
         if raw.points.ndim != 2 or raw.points.shape[1] not in (2, 3):
             raise ValueError("no points in the plane or in space")
         for block in raw.cells:
@@ -156,8 +149,6 @@ def _reason(error: BaseException, said: str, path: Path) -> str:
         reason = f"a format that needs {error.name}: pip install 'evfem[meshes]'"
     elif isinstance(error, KeyError):
         reason = f"{error.args[0]}, which meshio does not know or misses"
-    if kind := re.search(r"Element type not available: (\S+)", reason):
-        reason = f"elements {kind[1]}, which meshio does not know: export plane or solid ones alone"
     if PHYSICAL in reason:
         reason = "version 4.1 with elements outside of physical groups: save without them, or as 2.2"
     return " ".join(reason.split())[:200] or "damaged, or of a kind that meshio does not know"
