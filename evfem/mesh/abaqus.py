@@ -22,8 +22,12 @@ from evfem.mesh.mesh import CELLS
 if TYPE_CHECKING:
     import meshio
 
-#: C3D27 has its centre before the middles of faces 1 to 6; here it is the last, and the faces are VTK's
-HEXAHEDRON27 = [*range(20), 26, 24, 23, 25, 21, 22, 20]
+#: kinds whose nodes Abaqus has in another order -> VTK's: lines with the middle between their ends,
+#: hexahedra with the centre before the middles of faces 1 to 6
+ORDER: Mapping[str, list[int]] = {
+    "line3": [0, 2, 1],
+    "hexahedron27": [*range(20), 26, 24, 23, 25, 21, 22, 20],
+}
 #: faces 1 to 6 of a solid element among those of VTK
 FACES = [4, 5, 2, 1, 3, 0]
 #: what to do with several bodies; Abaqus/CAE has it among the attributes of a model
@@ -56,7 +60,7 @@ def read(path: Path) -> meshio.Mesh:
     row = {number: i for i, number in enumerate(number for number in nodes if number in used)}
     points = moved(np.array([nodes[number] for number in row]), deck.places.get(body.instance.upper(), []))
     cells = [
-        _in_order(kind, np.array([[row[node] for node in cell] for cell in block]))
+        np.array([[row[node] for node in cell] for cell in block])[:, ORDER.get(kind, slice(None))]
         for kind, block in zip(body.scope.kinds, body.scope.blocks, strict=True)
     ]
     cell_sets = _cell_sets(deck, body)
@@ -102,10 +106,6 @@ def moved(points: Floats, place: list[list[float]]) -> Floats:
         else:
             raise ValueError("*INSTANCE with data that are no shift (3 numbers) and turn (7)")
     return points
-
-
-def _in_order(kind: str, cells: Ints) -> Ints:
-    return cells[:, HEXAHEDRON27] if kind == "hexahedron27" else cells
 
 
 def _sets(deck: Deck, body: Body, what: str) -> Iterator[tuple[str, str, list[int]]]:

@@ -127,9 +127,10 @@ def cards(lines: Iterable[str]) -> Iterator[Card]:
             data.append(line)
         else:
             card = _card(head, data)
-            inside = card.word == "STEP" or (inside and card.word != "ENDSTEP")
+            inside = inside or card.word == "STEP"
             if head and not inside:
                 yield card
+            inside = inside and card.word != "ENDSTEP"
             head, data = line, []
 
 
