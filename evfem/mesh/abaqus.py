@@ -175,9 +175,9 @@ def _surface(one: Surface, body: Body, row: Mapping[int, int], cells: list[Ints]
 
 
 def _side(kind: str, face: str, name: str) -> Ints:
-    """Places in a cell of the nodes of its face S1 ..., or of one side (SPOS, SNEG) of a shell."""
+    """Places in a cell of the nodes of its face S1 ...; all of a shell's, and of kinds of no finger."""
     sides = sides_of(kind)
-    if face in ("SPOS", "SNEG"):
+    if face in ("SPOS", "SNEG") or not len(sides):
         return np.arange(nodes_of(kind))
     if re.fullmatch(r"S\d", face) and 0 < int(face[1]) <= len(sides):
         return sides[int(face[1]) - 1]

@@ -195,7 +195,7 @@ class Deck:
             raise ValueError(f"*INSTANCE without PART=, which is not read: {REFUSED['IMPORT']}")
         name, self.scope = card.named("NAME"), card.named("PART").upper()
         self.instances[name.upper()] = name, self.scope
-        self.places[name.upper()] = card.numbers()
+        self.places[name.upper()], self.system = card.numbers(), []
 
     def _system(self, card: Card) -> None:
         self.system = card.numbers()
@@ -332,6 +332,8 @@ def from_axes(points: Floats, system: list[list[float]]) -> Floats:
     """
     if not system:
         return points
+    if len(system) > 2 or any(len(row) > most for row, most in zip(system, (6, 3), strict=False)):
+        raise ValueError("*SYSTEM with other data than two points and, on a second line, a third")
     origin, on_x = np.reshape((system[0] + 6 * [0.0])[:6], (2, 3))
     if len(system[0]) <= 3:
         return points + origin

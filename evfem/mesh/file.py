@@ -5,9 +5,9 @@ Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, 
 (`region:NAME` = number), so that no table is needed to read them back. Other formats:
 `evfem.mesh.groups`.
 
-Files are read by meshio, which knows no limits: `parts` bounds the file's size and turns all it
-raises into one reason. A small file that was made to fill the memory still may: see
-docs/commandline.md, "Nothing is trusted".
+Files are read by meshio, which knows no limits, `.inp` by `evfem.mesh.abaqus`: `parts` bounds the file's
+size and turns all that is raised into one reason. A small file that was made to fill the memory still may:
+see docs/commandline.md, "Nothing is trusted".
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _read(path: Path) -> meshio.Mesh:
 
 
 def parts(path: Path) -> meshio.Mesh:
-    """What meshio reads of a file: points, cells, data. Physical groups have positive numbers.
+    """What is read of a file, as meshio has it: points, cells, data. Physical groups have positive numbers.
 
     Raises ValueError with a reason on one line for whatever meshio cannot read, OSError when the
     disk refuses.

@@ -140,7 +140,7 @@ def test_an_instance_is_shifted_and_then_turned(plain, tmp_path):
 
 def test_axes_in_space_turn_the_nodes(tmp_path):
     # x' = y, y' = z, z' = x, by a third point that is not at a right angle to the second
-    points = np.multiply(CUBE, 2.0) + [1.0, 2.0, 3.0]
+    points = np.add(np.multiply(CUBE, 2.0), [1.0, 2.0, 3.0])
     local = np.array(CUBE)[:, [1, 2, 0]]
     text = "*SYSTEM\n1., 2., 3., 1., 4., 3.\n1., 7., 8.\n" + cube(local)
     np.testing.assert_allclose(mesh_of(tmp_path, text).points, points, rtol=0, atol=1e-12)
@@ -263,6 +263,10 @@ WRONG = {
     "an old instance": (instance(deck()).replace("PART=F\n*END I", "\n*END I"), "INSTANCE without PART="),
     "a wrong turn": (instance(deck(), data="0., 0., 0., 90.\n"), r"no shift \(3 numbers\) and turn \(7\)"),
     "a turn around no axis": (instance(deck(), data="0, 0, 0, 0, 0, 0, 9\n"), "two points in one place"),
+    "axes of one line": (
+        deck(head="*SYSTEM\n0, 0, 0, 1, 0, 0, 0, 1, 0\n*NODE\n"),
+        r"\*SYSTEM with other data",
+    ),
     "axes on one line": (
         deck(head="*SYSTEM\n0, 0, 0, 0, 0, 1\n*NODE\n"),
         r"\*SYSTEM with points on one line",
@@ -290,6 +294,20 @@ def test_what_is_not_read_is_refused_by_its_name(way, tmp_path):
     assert "\n" not in str(caught)
 
 
-def test_a_true_reason_is_given_for_quads_with_eight_nodes(tmp_path):
-    text = cube(EIGHT, "CPE8", nset("pad", [1, 2, 5]) + nset("bone", [3, 4, 7]))
-    refuses("quad8 cells; .*quad8 has no middle node: export quad9 or quad", mesh_of, tmp_path, text)
+@pytest.mark.parametrize(
+    ("kind", "points", "said"),
+    [
+        ("CPE8", EIGHT, "quad8 cells; .*quad8 has no middle node: export quad9 or quad"),
+        (
+            "C3D20R",
+            [*CUBE, *(np.random.default_rng(0).random((12, 3)))],
+            "hexahedron20 cells; .*a pressure pulls",
+        ),
+        ("C3D4H", CUBE[:4], "tetra cells; .*From tetrahedra"),
+    ],
+)
+def test_elements_of_which_no_finger_is_made_have_a_true_reason(kind, points, said, tmp_path):
+    text = cube(
+        points, kind, nset("bone", [3, 4]) + "*SURFACE, NAME=pad\ntissue, S1\n*SURFACE, NAME=all\ntissue\n"
+    )
+    refuses(said, mesh_of, tmp_path, text)
