@@ -109,7 +109,7 @@ SAME = {
     "a node of no element": deck(SETS + "*NODE, NSET=RP\n999, 0., 90., 7.\n"),
     "comments, steps, and a keyword on two lines": deck(
         "** bone\n*nset,\n nset=bone\n" + ",\n".join(map(str, BONE)) + ",\n\n" + _pad
-        + "*MATERIAL, NAME=pad\n*ELASTIC\n1., .3\n*STEP\n*STATIC\n*NSET, NSET=pad\n30\n*END STEP\n"),
+        + "*MATERIAL, NAME=pad\n*ELASTIC\n1., .3\n*STEP\n*STATIC\n*NSET, NSET=pad\n20\n*END STEP\n"),
     "numbers of Fortran": deck().replace(f"{POINTS[0, 0]:.12f}", "-0.6D+1"),
     "one instance": instance(deck()),
     "two parts, one with elements": "*PART, NAME=PLATE\n*NODE\n1, 0., -1.\n*END PART\n" + instance(
@@ -127,6 +127,9 @@ SAME = {
 @pytest.mark.parametrize("way", SAME)
 def test_one_body_written_in_many_ways_gives_one_force(way, plain, tmp_path):
     assert force(tmp_path / "block.inp", SAME[way]) == pytest.approx(plain, rel=1e-9)
+    mesh = read(tmp_path / "block.inp", {"tissue": "tissue"})
+    np.testing.assert_allclose(mesh.points, POINTS, rtol=0, atol=1e-9)
+    assert [(mesh.node_sets[name] + 1).tolist() for name in ("pad", "bone")] == [PAD, BONE]
 
 
 def test_an_instance_is_shifted_and_then_turned(plain, tmp_path):
@@ -138,11 +141,22 @@ def test_an_instance_is_shifted_and_then_turned(plain, tmp_path):
     assert force(tmp_path / "shift.inp", instance(deck(), data="3., 1.\n")) == pytest.approx(plain, rel=1e-9)
 
 
+def test_sets_with_a_card_are_numbered_before_those_of_elements(tmp_path):
+    """As meshio numbered them up to 0.3, for `regions = {tissue = 1}`."""
+    (tmp_path / "numbers.inp").write_text(SAME["two sets of elements in a line"])
+    assert (read(tmp_path / "numbers.inp", {"tissue": 1}).region == 1).all()
+    assert read(tmp_path / "numbers.inp", {"left": 2, "right": 3}).region.tolist() == [2] * 12 + [3] * 12
+
+
 def test_axes_in_space_turn_the_nodes(tmp_path):
     # x' = y, y' = z, z' = x, by a third point that is not at a right angle to the second
     points = np.add(np.multiply(CUBE, 2.0), [1.0, 2.0, 3.0])
-    local = np.array(CUBE)[:, [1, 2, 0]]
+    local = np.array(CUBE)[:, [1, 2, 0]]  # `cube` makes it 2 mm wide
     text = "*SYSTEM\n1., 2., 3., 1., 4., 3.\n1., 7., 8.\n" + cube(local)
+    np.testing.assert_allclose(mesh_of(tmp_path, text).points, points, rtol=0, atol=1e-12)
+    # without a third point z remains, and x' is taken in the plane: x' = y, y' = -x
+    local = np.array(CUBE)[:, [1, 0, 2]] * [1, -1, 1]
+    text = "*SYSTEM\n1., 2., 3., 1., 4., 9.\n" + cube(local)
     np.testing.assert_allclose(mesh_of(tmp_path, text).points, points, rtol=0, atol=1e-12)
 
 
@@ -224,7 +238,9 @@ def test_hexahedra_of_gmsh_keep_their_volume(tmp_path):
     """x + y^2 z / 5, y + z^2 / 7, z moves no volume, and is in the span of the 27 shape functions."""
     x, y, z = np.array([["-0+".index(one) - 1.0 for one in place] for place in GMSH]).T
     points = np.column_stack([x + 0.2 * y**2 * z, y + z**2 / 7.0, z])
-    mesh = mesh_of(tmp_path, cube(points, "C3D27", nset("pad", GMSH_LOW) + nset("bone", GMSH_HIGH)))
+    skin = f"*ELEMENT, TYPE=M3D9, ELSET=skin\n9, {', '.join(map(str, GMSH_LOW))}\n*SURFACE, NAME=pad\nskin\n"
+    mesh = mesh_of(tmp_path, cube(points, "C3D27", skin + nset("bone", GMSH_HIGH)))
+    assert (mesh.node_sets["pad"] + 1).tolist() == GMSH_LOW
     at, weight = np.polynomial.legendre.leggauss(4)
     places = np.stack(np.meshgrid(at, at, at), axis=-1).reshape(-1, 3)
     _, slope = shape_functions(27, places)
