@@ -16,6 +16,7 @@ import contextlib
 import functools
 import io
 import os
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -41,6 +42,11 @@ PIXELS: Mapping[str, tuple[str, list[int]]] = {
     "pixel": ("quad", [0, 1, 3, 2]),
     "voxel": ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6]),
 }
+#: what meshio passes over in decks of Nastran: axes of nodes (their third field), in three formats, and files
+NASTRAN = re.compile(
+    rb"^(GRID)(?:\*[^,\n]{19} {0,15}|[^,*\n]{12} {0,7}|\*? *,[^,\n]*, *)[1-9]|^ *(INCLUDE|GRDSET)\b",
+    re.I | re.M,
+)
 #: kinds that are refused for what they lack
 _TETRAHEDRA = "Gmsh makes hexahedra of tetrahedra and wedges: docs/howto/mesh.md, From tetrahedra"
 LACKING: Mapping[str, str] = {
@@ -116,6 +122,9 @@ def parts(path: Path) -> meshio.Mesh:
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:
         raise ValueError(f"meshio knows no format {path.suffix or 'without an ending'}")
+    if path.suffix.lower() in (".bdf", ".fem", ".nas") and (found := NASTRAN.search(path.read_bytes())):
+        card = "GRID in axes of its own" if found[1] else found[2].decode().upper()
+        raise ValueError(f"{card}, which is not read: give nodes in the basic axes, in one file")
     said = io.StringIO()
     meshio._vtk_common.vtk_to_meshio_type[11] = "voxel"  # which it does not know, and pixels by name alone
     meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)

@@ -109,7 +109,7 @@ SAME = {
     "a node of no element": deck(SETS + "*NODE, NSET=RP\n999, 0., 90., 7.\n"),
     "comments, steps, and a keyword on two lines": deck(
         "** bone\n*nset,\n nset=bone\n" + ",\n".join(map(str, BONE)) + ",\n\n" + _pad
-        + "*MATERIAL, NAME=pad\n*ELASTIC\n1., .3\n*STEP\n*STATIC\n*NSET, NSET=pad\n20\n*END STEP\n"),
+        + "*MATERIAL, NAME=pad\n*ELASTIC\n1., .3\n*STEP\n*STATIC\n*NSET, NSET=pad\n10\n*END STEP\n"),
     "numbers of Fortran": deck().replace(f"{POINTS[0, 0]:.12f}", "-0.6D+1"),
     "one instance": instance(deck()),
     "two parts, one with elements": "*PART, NAME=PLATE\n*NODE\n1, 0., -1.\n*END PART\n" + instance(

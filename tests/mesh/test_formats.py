@@ -9,7 +9,7 @@ from tools.meshes import square_mesh
 from tools.refusals import refuses
 
 import evfem as ev
-from evfem.mesh.file import read, write
+from evfem.mesh.file import parts, read, write
 
 
 @pytest.mark.parametrize(("ending", "options"), [(".vtk", {}), (".vtk", {"binary": False})])
@@ -168,3 +168,34 @@ def test_what_is_refused_says_what_to_do(tmp_path):
     assert "## From tetrahedra" in page
     (tmp_path / "old.msh").write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n")
     refuses(r"given old.msh \(version 1 .* save as 2\.2 or 4\.1", read, tmp_path / "old.msh")
+
+
+#: a quad of 4 mm in axes of its own (CORD2R 5), which turn it
+NASTRAN = """BEGIN BULK
+CORD2R         5       0      0.      0.      0.      0.      0.      1.
+              0.      1.      0.
+GRID           1              0.      0.      0.
+GRID           2              4.      0.      0.
+GRID           3              4.      4.      0.
+GRID           4              0.      4.      0.
+CQUAD4         1       7       1       2       3       4
+ENDDATA
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("GRID           4        ", "GRID           4       5", "GRID in axes of its own, which"),
+        ("GRID           4              0.      4.", "GRID,4,5,0.,4.", "GRID in axes of its own, which"),
+        ("GRID           4              0.      4.      0.\n",
+         f"GRID*   {4:16}{5:16}{'0.':>16}{'4.':>16}\n*       {'0.':>16}\n", "GRID in axes of its own, which"),
+        ("ENDDATA", "include 'more.bdf'\nENDDATA", "INCLUDE, which is not read"),
+        ("ENDDATA", "GRDSET,,5\nENDDATA", "GRDSET, which is not read"),
+    ],
+)  # fmt: skip
+def test_axes_and_files_that_meshio_passes_over_in_nastran_are_refused(old, new, said, tmp_path):
+    (tmp_path / "block.bdf").write_text(NASTRAN)
+    assert parts(tmp_path / "block.bdf").points.tolist() == [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]]
+    (tmp_path / "block.bdf").write_text(NASTRAN.replace(old, new))
+    refuses(rf"block.bdf \({said}", read, tmp_path / "block.bdf")
