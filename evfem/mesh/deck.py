@@ -225,10 +225,11 @@ class Deck:
         self._keep("ELSET", card.get("ELSET"), [(self.scope, [row[0] for row in rows])])
 
     def _keep(self, what: str, name: str | None, members: list[Members], internal: bool = False) -> None:
-        """Add to a set, which is made where there is none."""
+        """Add to a set, which is made where there is none, what it does not have of other sets already."""
         if name:
-            sets = self.here.sets[what]
-            sets.setdefault(name.upper(), Named(name, [], internal)).members.extend(members)
+            kept = self.here.sets[what].setdefault(name.upper(), Named(name, [], internal)).members
+            known = {id(numbers) for _, numbers in kept}
+            kept += {id(one[1]): one for one in members if id(one[1]) not in known}.values()
 
     def _set(self, card: Card) -> None:
         name, where = card.named(card.word), self._scope_of(card.get("INSTANCE"))
@@ -301,7 +302,8 @@ def existing(numbers: list[int] | range, table: Mapping[int, Any], what: str) ->
     [3]
     """
     if isinstance(numbers, range):
-        return [one for one in table if one in numbers]
+        few = len(numbers[: len(table) + 1]) <= len(table)
+        return [one for one in numbers if one in table] if few else [one for one in table if one in numbers]
     if lost := [one for one in numbers if one not in table]:
         raise ValueError(f"{what} {lost[0]}, which is used and not defined")
     return numbers

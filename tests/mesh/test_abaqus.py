@@ -132,6 +132,12 @@ def test_one_body_written_in_many_ways_gives_one_force(way, plain, tmp_path):
     assert [(mesh.node_sets[name] + 1).tolist() for name in ("pad", "bone")] == [PAD, BONE]
 
 
+def test_sets_of_sets_do_not_grow_beyond_their_members(tmp_path):
+    sets = "".join(nset(f"s{k + 1}", [f"s{k}", f"s{k}"]) for k in range(60))  # 2^60 if each were kept twice
+    (tmp_path / "sets.inp").write_text(deck(_pad + nset("s0", BONE) + sets + nset("bone", ["s60"])))
+    assert (read(tmp_path / "sets.inp").node_sets["bone"] + 1).tolist() == BONE
+
+
 def test_an_instance_is_shifted_and_then_turned(plain, tmp_path):
     data = f"{MOVED[0]}, {MOVED[1]}, 0.\n1., 2., 0., 1., 2., 1., {ANGLE}\n"
     found = force(tmp_path / "instance.inp", instance(deck(), data=data))
