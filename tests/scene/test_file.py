@@ -277,7 +277,7 @@ WRONG = [
     (SHORT, PRESSED, "", "motion", "missing; allowed:"),
     (SHORT, PRESSED, "[motion]\nkind = 'press'", "motion", "[[motion]]"),
     (SHORT, PRESSED, "[motion]\n[motion]", "scene", "; each motion is a table [[motion]]"),
-    (SHORT, FLAT, "kind = 'profile'\nfile = 'voltage.csv'", "surface.file", ", or x [UNIT],height [UNIT]"),
+    (SHORT, FLAT, "kind = 'profile'\nfile = 'voltage.csv'", "surface.file", ", or x [mm],height [mm]"),
     (SHORT, LOAD, "\n[[motion]]\nkind = 'jump'", "motion[1].kind", "press | slide"),
     (SHORT, LOAD, "", "motion[0].force", "neither force nor indentation"),
     (SHORT, LOAD, "\nindentation = 1", "motion[0].force", "force and indentation"),
