@@ -114,10 +114,10 @@ class Checked:
         return f"{accuracy_table(self.outputs)}{unknown}"
 
     def __str__(self) -> str:
-        """Both tables, and whether the ends agree."""
+        """Both tables, and in the last line whether the ends agree."""
         said = "the ends agree" if self.agrees else "the ends differ: the result depends on the solution path"
-        told = f"\n\nerrors\n{self.error_table()}" if self.outputs else ""
-        return f"{self.table()}\n{said} (allowed: {AGREE:g}){told}"
+        told = f"\n\nerrors\n{self.error_table()}\n" if self.outputs else ""
+        return f"{self.table()}{told}\n{said} (allowed: {AGREE:g})"
 
 
 def check(
