@@ -25,7 +25,10 @@ ROOMS = {
         {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray", "pypardiso"},
         "constants arrays rooms notices checks views pools digest storage units tables pictures",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces solids quality groups deck abaqus file"),
+    "mesh": (
+        {"numpy", "scipy", "meshio"},
+        "hexahedron mesh archive faces solids quality groups deck abaqus file",
+    ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "forms splitlaw ogden laws kernels.blocks space pattern assembly weakform userforms branches "
