@@ -115,5 +115,5 @@ def test_the_neuron_of_two_presses_is_the_published_one(ran):
     assert (steep[0], steep[-1]) == (pytest.approx(12.197205, abs=0.05), pytest.approx(1963.067494, abs=0.2))
     fast, slow = (np.diff(found["fired"][name]).min() for name in ("in 50 ms", "in 500 ms"))
     assert fast < slow
-    assert found["stimulus"]["trace"].shape[1] == len(found["stimulus"]["location"])
+    assert found["stimulus"]["trace"].shape[0] == len(found["stimulus"]["location"])
     assert not list(folder.iterdir())
