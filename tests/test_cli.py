@@ -26,8 +26,6 @@ from evfem.simulation.result import COLUMNS
 from evfem.studies.campaign import study
 from evfem.templates import TEMPLATES
 
-pytestmark = pytest.mark.solver
-
 SCENE = f"""{SQUARE_SCENE}
 [output]
 every = 2

@@ -23,8 +23,6 @@ from evfem.simulation.history import csv_header
 from evfem.simulation.result import COLUMNS
 from evfem.simulation.run import simulate
 
-pytestmark = pytest.mark.solver
-
 
 @pytest.mark.parametrize(
     ("name", "count"),

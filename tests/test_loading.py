@@ -100,7 +100,6 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
     refuses("path: given 3; allowed: the path of the folder", ev.load, 3)
 
 
-@pytest.mark.solver
 @pytest.mark.parametrize("output", ["", "precision = 'single'", "compression = true", "every = 2"])
 def test_the_folder_of_a_run_is_its_result(place, output):
     """What `evfem run` left is what `simulate` returns, as far as fields were written."""
@@ -121,7 +120,6 @@ def test_the_folder_of_a_run_is_its_result(place, output):
     assert ev.load("square-out").frames == []
 
 
-@pytest.mark.solver
 def test_a_folder_that_is_no_result_gets_a_sentence(place):
     assert called(place, "run", "square.toml", "--no-plots")[0] == 0
     folder = place / "square-out"
@@ -142,7 +140,6 @@ def test_a_folder_that_is_no_result_gets_a_sentence(place):
     refuses(r"without summary\.json or history\.csv", ev.load, folder)
 
 
-@pytest.mark.solver
 def test_a_scene_is_simulated_and_planned_by_its_path(place):
     by_path, by_scene = ev.simulate("square.toml"), ev.simulate(ev.load("square.toml"))
     np.testing.assert_array_equal(by_path.normal_force, by_scene.normal_force)

@@ -12,14 +12,14 @@ from tools.threading_count import CAPABILITIES, CHECKOUT, HEART, count, units_of
 from evfem.newton.state import State
 
 #: conditionals of the heart (newton, solver, contact, simulation) that know an optional capability
-CONDITIONALS = 93
+CONDITIONALS = 84
 #: files of the heart that know one, beside its own ones and `simulation/model`
 FILES = {
     "hand": 3,
     "elastic surface": 4,
     "adhesion": 2,
     "charges, drive, leakage": 3,
-    "viscosity, inertia, branches": 15,
+    "viscosity, inertia, branches": 7,
     "roughness": 0,
 }
 #: lines of heart and `response` that ask whether one of `ASKED` is None

@@ -4,6 +4,7 @@ A *room* holds one capability: its keys, equation, tangent, memory, energies and
 rooms of a scene in the order of a step and knows none by name (docs, Inside)::
 
     memory(state)           once, at rest            internal variables from substep to substep, by name
+    restart(old, target)    a step is requested      what changes in memory where prescribed speeds jump
     begin(old, seconds)     a trial begins           any number of times from the same accepted state
     accept(old, new)        a substep is accepted    the room's memory at its end
     stored, kinetic         of an accepted state     energies
@@ -79,6 +80,16 @@ class Room:
         that relax without motion.
         """
         return False
+
+    def outdates(self, made_for: float, seconds: float) -> bool:
+        """Whether a tangent made for a substep of `made_for` seconds is too old for one of `seconds`."""
+        return False
+
+    def restart(self, old: Any, target: Any) -> dict[str, Floats]:
+        """The part of its memory that changes where a requested step begins that leads to `target`, whose
+        prescribed speeds may jump.
+        """
+        return {}
 
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
         """Values in an accepted state of the `columns` that are no sums."""

@@ -79,8 +79,8 @@ class CondensedTangent:
     @classmethod
     def make(cls, schur: Floats, coupling: Floats | None, dim: int = 2) -> CondensedTangent:
         """From S (m, m) and the attraction's stiffness between nodes (m - dim, m - dim), or None."""
-        inner = schur[:-dim, :-dim] if coupling is None else schur[:-dim, :-dim] - coupling
-        return cls(schur, inverse(inner, symmetric=coupling is None), dim)
+        nodal = schur[:-dim, :-dim] if coupling is None else schur[:-dim, :-dim] - coupling
+        return cls(schur, inverse(nodal, symmetric=coupling is None), dim)
 
     def rows(self, nodes: Ints) -> Ints:
         """Rows of these candidates, (y, x[, z]) node by node."""

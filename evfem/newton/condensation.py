@@ -125,15 +125,15 @@ class Pardiso:
             return True
         import scipy.sparse as sparse
 
-        pattern, inner = self.pattern, np.ones(self.pattern.size)
-        inner[self.kept] = 0.0
+        pattern, interior = self.pattern, np.ones(self.pattern.size)
+        interior[self.kept] = 0.0
         A = sparse.csr_matrix((self._values, pattern.indices, pattern.indptr), 2 * (pattern.size,))
 
         def moved(b: Floats) -> Floats:
             return self.backward(self.forward(b)[0], np.zeros(self.kept.size))
 
-        x = moved(inner)
-        rest = inner * (1.0 - A @ x - A.T @ x + self._values[pattern.diagonal] * x)
+        x = moved(interior)
+        rest = interior * (1.0 - A @ x - A.T @ x + self._values[pattern.diagonal] * x)
         return bool(np.abs(moved(rest)).max() <= ACCURATE * np.abs(x).max())
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
@@ -197,8 +197,8 @@ class SuperLU:
         A = self.pattern.full(upper)
         try:
             if self._ordering is None:
-                inner = A[self._interior][:, self._interior].tocsc()
-                first = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+                interior = A[self._interior][:, self._interior].tocsc()
+                first = splu(interior, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
                 self._ordering = np.concatenate([self._interior[np.argsort(first.perm_c)], self.kept])
             order = self._ordering
             self._lu = splu(

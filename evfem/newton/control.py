@@ -420,17 +420,13 @@ class Target:
         """Whether the bone's translation is the prescribed one, to the last digit."""
         return bool((self.bone(bone) == bone).all())
 
-    def restart_if_speed_jumps(self, old: State, bone: int) -> State:
-        """`old`, without its time history where the prescribed speed of node `bone` or of the drive jumps."""
-        if not old.memory.get("seconds", 0.0) or self.duration == 0.0:
-            return old
-        before, now = (
-            old.memory["rates"][0][bone].tolist(),
-            ((self.bone(old.bone) - old.bone) / self.duration).tolist(),
-        )
-        pairs = list(zip(before, now, strict=True))
+    def speed_jumps(self, old: State, before: Floats) -> bool:
+        """Whether the prescribed speed of bone or drive from `old` on differs from that `before` (dim,)."""
+        if self.duration == 0.0:
+            return False
+        now = (self.bone(old.bone) - old.bone) / self.duration
+        pairs = list(zip(before.tolist(), now.tolist(), strict=True))
         pairs[::2] = self.drive.prescribed_speeds(old, self.place, self.duration, pairs[::2])
         if self.height.free:
             del pairs[1]
-        jumps = any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)
-        return old.remembering({"seconds": np.zeros(())}) if jumps else old
+        return any(abs(b - a) > JUMP * max(abs(a), abs(b)) for a, b in pairs)

@@ -76,6 +76,12 @@ class Equilibrium:
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
 
+    def restart(self, old: State, target: Target) -> State:
+        """The accepted state where a requested step to `target` begins, whose prescribed speeds may jump."""
+        for room in self.rooms:
+            old = old.remembering(room.restart(old, target))
+        return old
+
     def begin(self, old: State, target: Target) -> Target:
         """Start a trial step from `old`, from which every room takes its increments. Returns the target with
         the state of its drive.

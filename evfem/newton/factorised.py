@@ -79,7 +79,7 @@ class FactorisedBody:
         state = self._first_guess(start, target).remembering(self.pressure.first(start.u))
         travel = abs(target.bone(old.bone)[1] - old.bone[1])
         self.linearisation.choose_candidates(state, constants.REACH * travel)
-        self.linearisation.start_clock(old, target.duration)
+        self.linearisation.begin_step(old, target.duration)
         self._anderson.reset()
         self._renewed = self._scaled_down = False
         return state
@@ -225,7 +225,7 @@ class FactorisedBody:
         known = self.interface.candidates(old, state, c := linearisation.candidates, weakening, gain)
         known = replace(known, by_force=linearisation.by_force(state)[c])
         # inexact where contact takes many solves: a fraction of the residual
-        inner = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
+        within = constants.INNER * self.record.residuals[-1] if self.interface.follows else 0.0
         return LinearContactStep(
             body=tangent,
             candidates=known,
@@ -233,7 +233,7 @@ class FactorisedBody:
             bone=target.bone(state.bone) - state.bone,
             unknowns=target.unknowns(tangent, state.bone),
             below=self.interface.foundation.of(self.interface.positions(state.u), state, c),
-            tolerance=max(constants.ROUNDING, inner),
+            tolerance=max(constants.ROUNDING, within),
         )
 
     def _solve(self, step: LinearContactStep) -> StepSolution:
@@ -318,9 +318,9 @@ class FactorisedBody:
         present tangent and by the one there, else None: iterations may come to such a state from afar. Not
         tested in time, in three dimensions, and for the attraction, whose instability the iterations show.
         """
-        dynamics, linearisation = self.body.dynamics, self.linearisation
+        linearisation = self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature[:, 0, 0] < 0.0)
-        if dynamics.step > 0.0 or state.bone.size == 3 or not crests.any():
+        if self.body.takes_time(target.duration) or state.bone.size == 3 or not crests.any():
             return None
         if linearisation.outdated:
             linearisation.factorise(state)
@@ -355,9 +355,8 @@ class FactorisedBody:
         return findings(self.body, state, balance)
 
     def reusable(self) -> Reusable:
-        """Candidates, the point of the factorisation, and the last time step."""
-        linearisation = self.linearisation
-        return Reusable(linearisation.candidates, linearisation.reusable, self.body.dynamics.step)
+        """Candidates and the point of the factorisation."""
+        return Reusable(self.linearisation.candidates, self.linearisation.reusable)
 
     def resume(self, carried: Reusable) -> None:
         """Repeat the factorisation that the interrupted run had."""
@@ -365,4 +364,3 @@ class FactorisedBody:
         if (at := carried.tangent_point) is not None:
             self.pressure.check(at.state.memory.get("pressure", np.zeros((0, 0))))
             self.linearisation.restore(at)
-        self.body.dynamics.step = carried.duration

@@ -79,12 +79,11 @@ class Linearisation:
         if self.fringes:
             self.fringes, self._made_at = False, None
 
-    def start_clock(self, old: State, duration: float) -> None:
+    def begin_step(self, old: State, duration: float) -> None:
         """Start the time of a step from `old`; a factorisation for a much different duration is outdated."""
-        dynamics = self.body.dynamics
         self._outdated |= self.body.drag_rate != self._drag_rate
         if self._made_at is not None:
-            self._outdated |= dynamics.outdates(self._made_at.duration, duration)
+            self._outdated |= self.body.outdates(self._made_at.duration, duration)
         self._begin, self._seconds = Beginning.of(old), duration
 
     def choose_candidates(self, state: State, reach: float) -> None:
@@ -256,11 +255,11 @@ class Linearisation:
         # nodes beyond the candidates move along with their neighbours, so that sliding changes nothing
         along = np.where((column < 0) & (axis != 1), row - row % dim + axis, column)
         inside = (row >= 0) & (along >= 0)
-        inner = Entries(unknowns.size, row[inside], along[inside], whole.value[inside]).toarray()
+        added = Entries(unknowns.size, row[inside], along[inside], whole.value[inside]).toarray()
         normal = surface_state(self.interface.surface, pad.position[c]).axes[:, 0, COMPONENTS[:dim]]
         softening = self.weakening(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
         # softening with the node's own gap is in the contact problem already
-        blocks = inner.reshape(c.size, dim, c.size, dim)
+        blocks = added.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= softening
-        stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
-        return inner if stiffened.max() > constants.SMALLEST_STIFFENING else None
+        stiffened = np.abs(added).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
+        return added if stiffened.max() > constants.SMALLEST_STIFFENING else None

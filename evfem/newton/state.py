@@ -130,11 +130,10 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What the next step reuses: candidates (pad nodes), point of the factorisation, time step (s)."""
+    """What the next step reuses: candidates (pad nodes) and point of the factorisation."""
 
     candidates: Ints
     tangent_point: TangentPoint | None
-    duration: float
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ class _Differentiated:
 
     def _span(self) -> tuple[float, float]:
         """Which part of the step was accepted: the last one tried, or its halves one after the other."""
-        spans = self.run.stepper.scheme.spans(self._calls)
+        spans = self.run.stepper.parts.spans(self._calls)
         self._taken += 1
         return spans[self._taken - 1]
 

@@ -220,14 +220,13 @@ def read_csv(text: str, wanted: Wanted, dim: int, steps: int) -> dict[str, Probe
 
 
 class Probes:
-    """The points of all probes in the cells of a tissue (`evfem.tissue.weakform.Tissue`) with its branches
-    (`evfem.tissue.branches.Branches`), if it has any.
+    """The points of all probes in the cells of a body (`evfem.tissue.body.Body`) with its branches, if any.
 
     `points` (P, d) are their positions. Raises InputError for a point outside.
     """
 
-    def __init__(self, wanted: Wanted, tissue: Any, branches: Any = None) -> None:
-        self.wanted = wanted
+    def __init__(self, wanted: Wanted, body: Any) -> None:
+        self.wanted, tissue, branches = wanted, body.tissue, body.branches
         self.space, mesh = tissue.space, tissue.space.mesh
         positions, layers = [], []
         for name, one in wanted.items():
@@ -281,8 +280,8 @@ class Probes:
         """The history of each probe from the numbers of several steps."""
         return histories(self.wanted, self.space.dim, self.stacked(several))
 
-    def at(self, u: Floats, inner: Floats | None = None) -> Floats:
-        """The numbers (P, K) of `columns` at displacements u (N, d) and the branches' variables `inner`."""
+    def at(self, u: Floats, memory: Mapping[str, Floats]) -> Floats:
+        """The numbers (P, K) of `columns` at displacements u (N, d) and the `memory` of a state."""
         from evfem.tissue.forms import Field, embed
         from evfem.tissue.weakform import cauchy_stress
 
@@ -301,8 +300,8 @@ class Probes:
             stress[own, : len(sigma)] = sigma.T
             energy[own] = law.split_energy(F[:, :, own], theta)[:, 0]
         more = np.zeros(len(moved))
-        if self.relaxing is not None and inner is not None:
-            added, more = self.relaxing.at(u, inner, whole)
+        if self.relaxing is not None:
+            added, more = self.relaxing.at(u, memory["branches"], whole)
             stress, energy = stress + added, energy + more
         pressure = -stress[:, :3].mean(axis=1)
         deviator = stress + pressure[:, None] * [1, 1, 1, 0, 0, 0]

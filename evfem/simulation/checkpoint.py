@@ -50,7 +50,7 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """Data of the solver for the next step; of the same shapes with and without a factorisation."""
     nowhere = TangentPoint(state, state.touching, Beginning.of(state), 0.0)
     at = carried.tangent_point or nowhere
-    found = {"candidates": carried.candidates, "duration": carried.duration, "factorised": at is not nowhere}
+    found = {"candidates": carried.candidates, "factorised": at is not nowhere}
     found |= {f"factor_{name}": value for name, value in state_arrays(at.state).items()}
     found |= {"touched": at.touched, "factor_seconds": at.duration}
     found |= {f"begun_{name}": getattr(at.begin, name) for name in BEGUN}
@@ -69,7 +69,7 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
         u, force, status, voltage = (arrays[f"begun_{name}"] for name in BEGUN)
         begin = Beginning(u, force, status, float(voltage), kept)
         at = TangentPoint(made, arrays["touched"], begin, float(arrays["factor_seconds"]))
-    return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
+    return Reusable(arrays["candidates"].astype(np.int64), at)
 
 
 def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:

@@ -254,7 +254,7 @@ def _missed(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
-    if not (scene.solver.timed or drive_of(scene.hand).timed):
+    if not (scene.solver.timed or drive_of(scene.hand).takes_time(1.0)):
         return
     timed = np.diff(_column(rows, "time"), prepend=0.0) > 0.0
     own, energy = float(np.abs(_lost(rows, "integrator")[timed]).sum()), _energy(rows)
@@ -287,7 +287,7 @@ def _reason_for_failure(model: Model, failed: StepFailed) -> str:
     # a trial far from equilibrium may be unstable too: alone that shows nothing
     if margin is None or margin.ratio < (SOFTENED if failed.unstable else CRITICAL):
         return ""
-    passing = not model.body.dynamics.still(target.duration)
+    passing = model.body.takes_time(target.duration)
     rest = "within a time step as short as this" if passing else "at rest"
     released = ", and released there it does not come to rest" if failed.released else ""
     return (

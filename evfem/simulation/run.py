@@ -187,10 +187,10 @@ class Run:
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model, pull_off=pull_off_of(self.model.attraction))
         allowed, body = allowed_error(scene), self.model.body
-        scheme = Whole() if allowed is None else Halves(allowed)
+        parts = Whole() if allowed is None else Halves(allowed)
         self.slip_scale = np.inf if allowed is None else slip_scale(scene, self.model.mesh)
         equilibrium = self.model.equilibrium
-        self.stepper = Stepper(equilibrium, body=body, scheme=scheme, rise=partial(climb, self.model))
+        self.stepper = Stepper(equilibrium, body=body, parts=parts, rise=partial(climb, self.model))
         if self.model.closing.trapped and self.source.start != 0.0:
             self.stepper.substep = FIRST_PART
         self.free_nodes, self.sunk = free_nodes(self.model), np.zeros(2)
@@ -198,7 +198,7 @@ class Run:
         if scene.output.probes:
             from evfem.scene.probes import Probes
 
-            self.probes = Probes(scene.output.probes, self.model.body.tissue, self.model.body.branches)
+            self.probes = Probes(scene.output.probes, self.model.body)
         self.probed: list[Floats] = []
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
@@ -276,7 +276,7 @@ class Run:
         """Fractions (k,) of the next step at which the voltage turns, and so many that surface and friction
         do not turn unseen in between; none with prescribed steps.
         """
-        if not self.stepper.scheme.measures:
+        if not self.stepper.parts.measures:
             return np.zeros(0)
         ends = [
             self._moment(course, start, part, self.time + spent)
@@ -346,9 +346,7 @@ class Run:
         """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         released, snapped = self.stepper.relaxations, self.stepper.snaps
-        self.state = request.path(0.0, 1.0).restart_if_speed_jumps(
-            self.state, self.model.mesh.node_sets["bone"][0]
-        )
+        self.state = self.model.equilibrium.restart(self.state, request.path(0.0, 1.0))
         try:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger, request.turns)
         except StepFailed as error:
@@ -370,9 +368,7 @@ class Run:
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if self.probes is not None:
-            self.probed.append(
-                self.probes.at(self.model.body.whole(self.state.u), self.state.memory.get("branches"))
-            )
+            self.probed.append(self.probes.at(self.model.body.whole(self.state.u), self.state.memory))
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
@@ -405,7 +401,7 @@ class Run:
             "candidates": int(self.model.equilibrium.body.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",
-            **self.stepper.scheme.told,
+            **self.stepper.parts.told,
         }
         about = provenance(self.scene, self.model.mesh, solver)
         if (core := self.model.closing.core) is not None:

@@ -24,7 +24,6 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.newton.condensation import make_condensation
 from evfem.tissue.body import Body
-from evfem.tissue.dynamics import Static
 from evfem.tissue.pattern import Pattern
 
 
@@ -53,7 +52,7 @@ class LinearBody(Body):
     def __init__(self, full: Body, pad: Ints, u: Floats, threads: int = 1) -> None:
         self.full, self.pad, self.space = full, pad, full.space
         self.tissue: Any = LinearTissue(self)
-        self.dynamics, self.given, self.terms, self.drag_rate, self._own = Static(), (), (), 0.0, ()
+        self.rooms, self.given, self.terms, self.drag_rate, self._own = (), (), (), 0.0, ()
         dim = full.space.dim
         own = full.unknowns[pad]
         kept = np.concatenate([own.ravel(), full.bone])

@@ -64,16 +64,16 @@ LIFTED = (
 @dataclass
 class Relaxation:
     """Pseudo-transient continuation of `body`; `solve` finds an equilibrium with drag from a state;
-    `timed`: under tractions that take time.
+    `flows`: under tractions that take time.
     """
 
     body: Body
     solve: Callable[[State, Target], State]
-    timed: bool = False
+    flows: bool = False
 
     def applies(self, target: Target) -> bool:
         """Whether the step to `target` is quasi-static: neither viscosity nor inertia act."""
-        return self.body.dynamics.still(target.duration)
+        return not self.body.takes_time(target.duration)
 
     def follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
         """The equilibrium at `target` where the body comes to rest from `state`; `accept(old, new)` is called
@@ -113,7 +113,11 @@ class Relaxation:
     def _held_loads(self, state: State, target: Target) -> Target:
         """The loads of the steps with drag: without time, unless drive or tractions depend on it."""
         target = replace(target, voltage=target.voltage.held(state))
-        return target if self.timed or target.drive.timed else replace(target, duration=0.0)
+        return (
+            target
+            if self.flows or target.drive.takes_time(target.duration)
+            else replace(target, duration=0.0)
+        )
 
     def _dragged(self, state: State, target: Target, begin: Floats, drag: DragSchedule) -> State | None:
         """The equilibrium with drag from `begin` (N, dim); None, and a larger rate, if it is not found."""

@@ -62,7 +62,7 @@ class Release:
 class Stepper:
     """Follows load paths with an equilibrium solver; keeps the length of the next substep, as a fraction of a
     step. Without a `body` there is no pseudo-transient continuation, and a step without an equilibrium nearby
-    fails. `snaps`: substeps in which stability was lost without it. `scheme`: a substep is one equilibrium,
+    fails. `snaps`: substeps in which stability was lost without it. `parts`: a substep is one equilibrium,
     or two halves (`evfem.solver.path`).
     """
 
@@ -72,7 +72,7 @@ class Stepper:
     body: Body | None = None
     relaxations: int = 0
     snaps: int = 0
-    scheme: Whole = field(default_factory=Whole)
+    parts: Whole = field(default_factory=Whole)
     rise: Callable[[State, State, Target], float] | None = None
     barriers: int = 0
     held: int = 0
@@ -80,7 +80,7 @@ class Stepper:
 
     def __post_init__(self) -> None:
         self._release = Release(RELEASED, self.substep)
-        self.substep = self.scheme.first(self.substep)
+        self.substep = self.parts.first(self.substep)
 
     def follow(
         self, state: State, path: Path, accounts: Accounts, turns: Iterable[float] = ()
@@ -97,7 +97,7 @@ class Stepper:
             fraction = end if self.substep >= end - done - SAME else done + self.substep
             before = self.equilibrium.record.iterations
             try:
-                solved, error = self.scheme.solve(self.solve, state, path, (done, fraction))
+                solved, error = self.parts.solve(self.solve, state, path, (done, fraction))
             except StepFailed as failed:
                 left, target = 1.0 - done, path(done, fraction)
                 self.substep = 0.5 * (fraction - done)
@@ -105,7 +105,7 @@ class Stepper:
                 if rest is not None:
                     state, done, substeps = rest, fraction, substeps + 1
                 continue
-            shorter = self.scheme.shorter_length(error, fraction - done, strategy)
+            shorter = self.parts.shorter_length(error, fraction - done, strategy)
             if shorter is not None:
                 self.substep = shorter
                 continue
@@ -117,7 +117,7 @@ class Stepper:
                 self.snaps += bool(accounts.accept(state, new))
                 state, substeps = new, substeps + 1
             easy = self.equilibrium.record.iterations - before <= strategy.easy
-            self.substep = self.scheme.next_substep(self.substep, fraction - done, error, easy, strategy)
+            self.substep = self.parts.next_substep(self.substep, fraction - done, error, easy, strategy)
             done = fraction
         return state, substeps
 
@@ -149,8 +149,8 @@ class Stepper:
         time-dependent runs, where a shorter step stiffens the tissue and therefore helps.
         """
         least = self.equilibrium.strategy.smallest_part
-        timed = self.body is not None and not self._relaxation(self.body).applies(target)
-        return least**2 if timed else least
+        in_time = self.body is not None and not self._relaxation(self.body).applies(target)
+        return least**2 if in_time else least
 
     def _relaxation(self, body: Body) -> Relaxation:
         return Relaxation(body, self.solve, self.equilibrium.attraction.flows)
@@ -184,7 +184,7 @@ class Stepper:
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return
         relaxation = self._relaxation(self.body)
-        if relaxation.applies(target) or self.body.dynamics.mass is not None:
+        if relaxation.applies(target) or self.body.has_mass:
             return
         if pull(state, target) <= 0.0:
             return
@@ -205,11 +205,11 @@ class Stepper:
         if not self._crosses_barrier(target, state, new):
             return new
         self.barriers += 1
-        timed = self.body is None or not self._relaxation(self.body).applies(target)
-        if timed and not self.releasing and self.substep < RELEASED:
+        in_time = self.body is None or not self._relaxation(self.body).applies(target)
+        if in_time and not self.releasing and self.substep < RELEASED:
             self.snaps += 1
             return new
-        if self.body is None or timed or self.releasing:
+        if self.body is None or in_time or self.releasing:
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
         new = held(self.body, self._reach_without_barrier, self.equilibrium.strategy.hold, state, target)
         self.held += 1

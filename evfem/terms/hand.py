@@ -115,10 +115,10 @@ class Hand(Room):
 class Drive(Room):
     """What moves the bone along the display, here rigidly: its x[, z] is that of the drive.
 
-    `free`: whether the bone's position along the display is an unknown; `timed`: whether it depends on time.
+    `free`: whether the bone's position along the display is an unknown.
     """
 
-    free = timed = False
+    free = False
     #: further terms of the energy balance
     books: ClassVar[tuple[Any, ...]] = ()
 
@@ -187,9 +187,8 @@ class HandControl(Drive):
     rates: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
     difference: Difference = field(default_factory=Difference)
 
-    @property
-    def timed(self) -> bool:  # type: ignore[override]
-        return self.hand.timed
+    def takes_time(self, seconds: float) -> bool:
+        return self.hand.takes_time(seconds)
 
     @property
     def books(self) -> tuple[Any, ...]:  # type: ignore[override]

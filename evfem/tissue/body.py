@@ -37,6 +37,8 @@ class Body:
         self.dynamics = dynamics or Static()
         self.given = tuple(terms)
         self.terms = (*terms, *self.dynamics.forms)
+        #: its terms that keep something from substep to substep, or have energies of their own
+        self.rooms: tuple[Any, ...] = (self.dynamics, *rooms)
         self._own = tuple(rooms)
         for room in self._own:
             room.placed(space.mesh)
@@ -130,15 +132,23 @@ class Body:
         """Displacements (N, dim) of all nodes in a state that has u: here the same."""
         return u
 
-    @property
-    def rooms(self) -> tuple[Any, ...]:
-        """Its terms that keep something from substep to substep, or have energies of their own."""
-        return (self.dynamics, *self._own)
-
     def begin(self, old: Any, seconds: float) -> None:
         """A trial of so many seconds begins from an accepted state, or what is kept of it."""
         for room in self.rooms:
             room.begin(old, seconds)
+
+    def takes_time(self, seconds: float) -> bool:
+        """Whether rates count in a substep of so many seconds."""
+        return any(room.takes_time(seconds) for room in self.rooms)
+
+    def outdates(self, made_for: float, seconds: float) -> bool:
+        """Whether a tangent made for a substep of `made_for` seconds is too old for one of `seconds`."""
+        return any(room.outdates(made_for, seconds) for room in self.rooms)
+
+    @property
+    def has_mass(self) -> bool:
+        """Whether it resists rigid motion by itself."""
+        return self.dynamics.mass is not None
 
     @property
     def branches(self) -> Any:

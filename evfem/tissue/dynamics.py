@@ -93,17 +93,9 @@ class Difference:
 class Static(Room):
     """Tissue without viscosity and mass: no time passes in it. Answers what `Dynamics` does."""
 
-    acts, mass, branches, viscosity, step = False, None, None, None, 0.0
+    acts, mass, branches, viscosity = False, None, None, None
     #: further terms of the internal forces
     forms: tuple[Any, ...] = ()
-
-    def still(self, duration: float) -> bool:
-        """Whether tissue takes no time in a step of `duration` seconds."""
-        return True
-
-    def outdates(self, made_for: float, duration: float) -> bool:
-        """Whether a tangent made for a step of `made_for` seconds is too old for one of `duration`."""
-        return False
 
 
 class Dynamics(Room):
@@ -148,13 +140,8 @@ class Dynamics(Room):
         """Further terms of the internal forces."""
         return (self,)
 
-    def still(self, duration: float) -> bool:
-        """Whether tissue takes no time in a step of `duration` seconds."""
-        return duration == 0.0
-
-    def outdates(self, made_for: float, duration: float) -> bool:
-        """Whether a tangent made for a step of `made_for` seconds is too old for one of `duration`."""
-        return not SHORTER * made_for <= duration <= LONGER * made_for
+    def outdates(self, made_for: float, seconds: float) -> bool:
+        return not SHORTER * made_for <= seconds <= LONGER * made_for
 
     def memory(self, state: Any) -> dict[str, Floats]:
         return {} if self.branches is None else {"branches": self.branches.at_rest}
@@ -278,7 +265,7 @@ class Dynamics(Room):
         return held - held[0]
 
     def takes_time(self, seconds: float) -> bool:
-        return self.step > 0.0
+        return seconds > 0.0
 
     def potential_along(self, u: Floats, way: Floats, places: Floats) -> Floats:
         """What the forces of the step are the derivative of, at u plus the shares `places` (w,) of a way (N,
@@ -340,6 +327,12 @@ class Inertial(Dynamics, name="inertial"):
         still = np.zeros_like(state.u)
         own = {"velocity": still, "rates": np.stack([still, still]), "seconds": np.zeros(())}
         return super().memory(state) | own
+
+    def restart(self, old: Any, target: Any) -> dict[str, Floats]:
+        if not old.memory["seconds"]:
+            return {}
+        before = old.memory["rates"][0][self.space.mesh.node_sets["bone"][0]]
+        return {"seconds": np.zeros(())} if target.speed_jumps(old, before) else {}
 
     def begin(self, old: Any, seconds: float) -> None:
         kept = old.memory

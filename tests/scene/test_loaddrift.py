@@ -7,7 +7,6 @@ from evfem.planning.loaddrift import load_drift
 from evfem.planning.plan import plan
 from evfem.simulation.history import load_drift as measured
 
-pytestmark = pytest.mark.solver
 COARSE = ev.FingerPad(ridges=False, resolution="coarse")
 PRESS = ev.Press(force=0.05, steps=3)
 

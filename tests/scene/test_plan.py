@@ -17,7 +17,6 @@ from evfem.planning.rooms import KINDS, rooms_of
 from evfem.scene.schema import schema
 from evfem.simulation.model import make_model
 
-pytestmark = pytest.mark.solver
 BLOCK = block(40, 2, sag=1.0)
 
 

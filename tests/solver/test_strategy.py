@@ -76,10 +76,12 @@ class Timed:
 
 
 class Lasts:
-    """Dynamics that take time."""
+    """A body whose deformation takes time."""
 
-    def still(self, duration):
-        return duration == 0.0
+    drag_rate = 0.0
+
+    def takes_time(self, seconds):
+        return seconds > 0.0
 
 
 class Lasting(Steps):
@@ -95,7 +97,7 @@ def test_a_step_that_takes_time_has_parts_down_to_the_square_of_the_smallest(dur
 
     def followed(longest):
         steps = Lasting(Strategy(smallest_part=0.25, growth=1.0, relaxation=False), longest)
-        stepper = Stepper(steps, body=SimpleNamespace(dynamics=Lasts(), drag_rate=0.0))
+        stepper = Stepper(steps, body=Lasts())
         return stepper.follow(0.0, lambda _, share: Timed(share, duration), Unbooked())[1]
 
     assert followed(smallest) == round(1 / smallest)
@@ -236,7 +238,7 @@ class Decaying(Steps):
 def decayed(allowed):
     """How far the end is off, in parts of the exact one; the parts' lengths; the stepper."""
     steps, ends = Decaying(Strategy(), 1.0), [0.0]
-    stepper = Stepper(steps, scheme=Halves(allowed))
+    stepper = Stepper(steps, parts=Halves(allowed))
     start = SimpleNamespace(reaction=np.ones(1), bone=np.zeros(2))
     path = lambda done, fraction: SimpleNamespace(duration=fraction - done)  # noqa: E731
     kept = Unbooked()
@@ -254,7 +256,7 @@ def test_the_error_of_the_path_sets_the_length_of_its_parts():
     off, parts, stepper = decayed(1e-4)
     assert parts[-2] == pytest.approx(0.9 * 2.0 * np.sqrt(1e-4), rel=0.02)
     assert off == pytest.approx(parts[-2] / 4.0, rel=0.05)
-    assert 0.7e-4 < stepper.scheme.largest <= 1e-4
+    assert 0.7e-4 < stepper.parts.largest <= 1e-4
     finer, twice, _ = decayed(0.25e-4)
     assert len(twice) == pytest.approx(2 * len(parts), abs=4)
     assert finer == pytest.approx(off / 2.0, rel=0.1)
@@ -270,7 +272,7 @@ def test_shares_are_above_zero(name):
 def test_parts_that_err_too_much_are_done_again_shorter():
     _, parts, stepper = decayed(1e-6)
     assert parts[:3] == pytest.approx([1 / 16, 1 / 64, 1 / 256])
-    assert stepper.scheme.largest <= 1e-6
+    assert stepper.parts.largest <= 1e-6
 
 
 def test_few_automatic_steps_agree_with_many_given_ones():

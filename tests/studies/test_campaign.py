@@ -359,7 +359,6 @@ BY_ROUNDING = 20
 REST = [pytest.param(number, marks=pytest.mark.slow) for number in sorted({*range(40)} - {*FEW, BY_ROUNDING})]
 
 
-@pytest.mark.solver
 @pytest.mark.parametrize("number", [*FEW, *REST])
 def test_a_scene_nobody_chose_ends_in_equilibria(number):
     found = ending.judge(drawing.draw(0, number))

@@ -11,8 +11,6 @@ import pytest
 
 from evfem.studies.measured import participant_forces
 
-pytestmark = pytest.mark.solver
-
 NOTEBOOKS = Path(__file__).parents[2] / "studies" / "notebooks"
 NAMES = (
     "compare_participants",

@@ -11,8 +11,6 @@ from evfem.errors import InputError
 from evfem.estimate.rendering import ApparentFriction
 from evfem.studies import common, fig13, rendered
 
-pytestmark = pytest.mark.solver
-
 
 def curves(path):
     rows = [line.split(",") for line in path.read_text().splitlines()[1:]]
