@@ -20,6 +20,7 @@ from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
 from evfem.planning.core import Closing, unseen
+from evfem.planning.cost import needs
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_components
 from evfem.planning.plausibility import implausible, jumps, locking, touching_traction
@@ -30,7 +31,7 @@ from evfem.protocols import TimeSignal
 from evfem.scene.file import scene_at
 from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Scene
-from evfem.scene.spatial import check_space, needs
+from evfem.scene.spatial import check_space
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
 from evfem.terms.hand import Hand
@@ -384,8 +385,7 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     yield f"symmetric stiffness matrix, factorised rarely and reused: {backend}; cell loops: {cells}"
     yield f"contact: {scene.solver.contact}, active-set method on the nodes that may touch"
-    if mesh.dim == 3:
-        yield f"direct solver: {needs(scene, mesh)}"
+    yield needs(scene, mesh)
     laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
     if stiff := [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]:
         yield f"pressure is an additional unknown: {', '.join(stiff)} nearly incompressible"

@@ -1,4 +1,4 @@
-"""What a finger in three dimensions, or in the plane, cannot do yet, and the memory and time of its runs.
+"""What a finger in three dimensions, or in the plane, cannot do yet, and the memory of its runs.
 
 `check_space` refuses in one sentence each what no run could use; nothing has been computed then.
 """
@@ -18,10 +18,6 @@ SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
 #: nodes; of the dense matrices of contact, which grow with the square of the skin's nodes, of which a
 #: fifth may touch. Fitted to peaks of fingers with 5,000 to 53,000 nodes pressed to 0.5 or 1 N.
 PACKAGES, BODY, BODY_GROWTH, CONTACT = 0.13e9, 0.0226e9, 1.1, 27.0
-#: CPU time of a run (s): of packages and mesh; of a step that presses, which factorises about once, with
-#: 1,000 nodes, growing with the nodes to this power; of another step relative to that. Fitted to thirteen
-#: fingers like these, smooth and ridged, with and without voltage, relief, adhesion and time.
-BEGINNING, PRESSING, PRESSING_GROWTH, SLIDING = 0.7, 0.032, 1.5, 0.15
 
 
 def check_space(scene: Scene, mesh: Mesh) -> None:
@@ -65,23 +61,6 @@ def needed_memory(mesh: Mesh) -> float:
     """
     body = BODY * (len(mesh.points) / 1000.0) ** BODY_GROWTH
     return float(PACKAGES + body + CONTACT * float(len(mesh.node_sets["pad"])) ** 2)
-
-
-def needed_time(scene: Scene, mesh: Mesh) -> float:
-    """CPU time (s) of a run with a finger of hexahedra, within a factor of 1.5 with PARDISO and compiled
-    loops on the processor of `docs/performance.md`.
-    """
-    pressing = sum(motion.steps for motion in scene.motion if motion.course.presses)
-    others = sum(motion.steps for motion in scene.motion) - pressing
-    step = PRESSING * (len(mesh.points) / 1000.0) ** PRESSING_GROWTH
-    return float(BEGINNING + step * (pressing + SLIDING * others))
-
-
-def needs(scene: Scene, mesh: Mesh) -> str:
-    """Memory and time of a run with a finger in three dimensions, in a sentence."""
-    seconds = f"{float(f'{needed_time(scene, mesh):.2g}'):g}"
-    memory = f"{needed_memory(mesh) / 1e9:.2g} GB of memory"
-    return f"a run takes about {memory} and {seconds} s of CPU time with PARDISO"
 
 
 def check_memory(mesh: Mesh) -> None:

@@ -10,7 +10,7 @@ from evfem.errors import InputError
 from evfem.planning.plan import plan
 from evfem.scene import spatial
 from evfem.scene.file import dump, loads
-from evfem.scene.spatial import needed_memory, needed_time
+from evfem.scene.spatial import needed_memory
 from evfem.simulation.model import make_model
 
 PRESS = ev.Press(indentation=0.1)
@@ -89,7 +89,7 @@ def test_the_plan_says_what_a_whole_finger_needs():
     assert needed.unknowns == 3 * (5 * 81 - 81) + 3
     assert "three dimensions" in text
     assert "plane strain" not in text
-    assert "a run takes about 0.14 GB of memory and 0.78 s of CPU time with PARDISO" in text
+    assert "a run takes about 0.14 GB of memory and 0.4 to 2 s of CPU time with PARDISO" in text
 
 
 @pytest.mark.parametrize(
@@ -100,28 +100,6 @@ def test_the_memory_said_is_that_of_runs(resolution, ridges, peak):
     """Peaks (GB) of presses to 1 N under 1000 V and 3 mm of slide, measured once (fine: 0.3 N)."""
     mesh = ev.Fingertip(resolution=resolution, ridges=ridges).mesh()
     assert needed_memory(mesh) == pytest.approx(1e9 * peak, rel=0.25)
-
-
-@pytest.mark.parametrize(
-    ("resolution", "ridges", "steps", "seconds"),
-    [
-        ("coarse", "none", (4, 5), 2.5),
-        ("medium", "none", (4, 0), 6.5),
-        ("coarse", "none", (3, 40), 3.1),
-        ("coarse", "across", (3, 5), 12.7),
-        ("coarse", "along", (8, 15), 30.0),
-        ("fine", "none", (3, 3), 33.7),
-        ("coarse", "whorl", (8, 10), 106.0),
-    ],
-)
-def test_the_time_said_is_that_of_runs(resolution, ridges, steps, seconds):
-    """CPU seconds of presses to 0.3 to 1 N and slides under a voltage, measured once."""
-    pressed, slid = steps
-    motion = [ev.Press(force=0.5, steps=pressed), *([ev.Slide(1.0, steps=slid)] if slid else [])]
-    finger = ev.Fingertip(resolution=resolution, ridges=ridges)
-    scene = ev.Scene(finger, ev.Display(), motion=motion)
-    said = needed_time(scene, scene.finger.mesh())
-    assert seconds / 1.5 < said < 1.5 * seconds
 
 
 def test_a_finger_that_no_memory_holds_is_refused_before_it_is_solved(monkeypatch):
