@@ -69,7 +69,7 @@ ROOMS = {
     ),
     "planning": (
         {"numpy"},
-        "rooms resolution loaddrift parts attracted plausibility fieldchoice core timescales plan",
+        "rooms resolution loaddrift parts attracted plausibility fieldchoice core timescales cost plan",
     ),
     "simulation": (
         {"numpy", "scipy"},

@@ -23,8 +23,8 @@ from evfem.scene.scene import Scene
 from evfem.scene.spatial import needed_memory
 from evfem.tissue.laws import split
 
-#: seconds of packages and mesh, and of a step with 1,000 nodes, by dimension
-BEGINNING, STEP = {2: 0.27, 3: 0.7}, {2: 0.0069, 3: 0.032}
+#: seconds of packages and mesh, and of a step with 1,000 nodes by dimension
+BEGINNING, STEP = 0.7, {2: 0.0069, 3: 0.032}
 #: a step that slides relative to one that presses
 SLIDING = {2: 0.72, 3: 0.15}
 #: factors in the plane of a full field and of a relief; in space they are within the range
@@ -32,7 +32,7 @@ FULL_FIELD, RELIEF = 2.9, 1.6
 #: an attraction over the shear modulus that counts as strong, and what one not known beforehand is taken for
 STRONG, UNKNOWN = 0.1, 0.3
 #: range about the estimate: without a strong attraction, with it, and with it on a relief
-CALM, ATTRACTED, SNAPPING = (0.5, 2.5), (0.3, 3.5), (0.3, 10.0)
+CALM, ATTRACTED, SNAPPING = (0.4, 2.5), (0.3, 3.5), (0.3, 10.0)
 
 
 def needed_time(scene: Scene, mesh: Mesh) -> tuple[float, float]:
@@ -48,7 +48,7 @@ def needed_time(scene: Scene, mesh: Mesh) -> tuple[float, float]:
         stepping *= (FULL_FIELD if scene.field != "local" else 1.0) * (RELIEF if relief else 1.0)
     else:
         stepping = thousands**1.5 * steps
-    middle = BEGINNING[mesh.dim] + STEP[mesh.dim] * stepping
+    middle = BEGINNING + STEP[mesh.dim] * stepping
     least, most = CALM if pulled < STRONG else SNAPPING if relief else ATTRACTED
     return float(least * middle), float(most * middle)
 

@@ -23,10 +23,10 @@ from evfem.response.parameters import Parameter
 from evfem.response.parts import BOUND, GIVEN, WISH, ZERO, Equations
 from evfem.scene.scene import Scene
 from evfem.simulation.history import UNITS
-from evfem.simulation.ledger import Ledger
+from evfem.simulation.ledger import EnergyAccount
 from evfem.simulation.model import Model
 from evfem.simulation.run import Request, Run
-from evfem.simulation.works import Books
+from evfem.simulation.works import EnergyState
 from evfem.surface.ways import Steps
 
 #: relative change of a parameter between samples
@@ -91,7 +91,7 @@ class Accepted:
     margins: Floats
     span: tuple[float, float]
     pins: Floats
-    books: tuple[Books | None, Books]
+    books: tuple[EnergyState | None, EnergyState]
     sums: tuple[dict[str, float], dict[str, float]]
     voltage: str = GIVEN
 
@@ -124,16 +124,18 @@ class Beside:
             pins[node, axis] += own[nearest].place[jump] - jumps[nearest].place[jump]
         return Equations.begin(self.run.model, old, self.request.path(*substep.span), pins)
 
-    def booked(self, old: State, new: State, begin: Books | None, sums: dict[str, float]) -> Ledger:
+    def booked(
+        self, old: State, new: State, begin: EnergyState | None, sums: dict[str, float]
+    ) -> EnergyAccount:
         """The energy account after a substep that begins with these."""
-        ledger = Ledger(self.run.model, dict(sums), begin)
-        ledger.accept(old, new)
+        ledger = EnergyAccount(self.run.model, dict(sums), begin)
+        ledger.add_substep(old, new)
         return ledger
 
-    def row(self, state: State, books: Books, sums: dict[str, float]) -> dict[str, Any]:
+    def row(self, state: State, books: EnergyState, sums: dict[str, float]) -> dict[str, Any]:
         """The row at the end of the present step."""
         assert self.request is not None
-        return self.run.row(Ledger(self.run.model, sums, books), self.request, state)
+        return self.run.row(EnergyAccount(self.run.model, sums, books), self.request, state)
 
 
 @dataclass
@@ -367,7 +369,7 @@ class Line:
 
     # -- a step
 
-    def ends(self, state: State, books: Books, sums: dict[str, float], row: dict[str, Any]) -> None:
+    def ends(self, state: State, books: EnergyState, sums: dict[str, float], row: dict[str, Any]) -> None:
         """A step is done: the derivative of its row, and the range of the parameter with these statuses."""
         fixed = [one.row(state, books, sums) for one in self.beside]
         way, along = self.way, []

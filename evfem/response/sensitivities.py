@@ -67,10 +67,10 @@ from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
 from evfem.simulation.history import COLUMNS, ROOM_COLUMNS
-from evfem.simulation.ledger import Ledger
+from evfem.simulation.ledger import EnergyAccount
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
-from evfem.simulation.works import Books
+from evfem.simulation.works import EnergyState
 
 #: why columns have no derivative
 COUNTED = "it counts, or is measured by, whole nodes, steps or seconds"
@@ -79,15 +79,15 @@ SOUGHT = "the voltage that is sought in step {} obeys no equation: its force jum
 LIFTED = "a finger without a load that is touched is not differentiated (step {})"
 
 
-class _Followed(Ledger):
-    """Books that tell of every part: `told(old, new, books before)`, unless it snapped."""
+class _Followed(EnergyAccount):
+    """An account that tells of every substep: `told(old, new, account before)`, unless it snapped."""
 
-    told: Callable[[State, State, tuple[dict[str, float], Books | None]], None]
+    told: Callable[[State, State, tuple[dict[str, float], EnergyState | None]], None]
     snapped = False
 
-    def accept(self, old: State, new: State) -> bool:
-        before = self.mark()
-        if (found := super().accept(old, new)) and before[1] is not None:
+    def add_substep(self, old: State, new: State) -> bool:
+        before = self.snapshot()
+        if (found := super().add_substep(old, new)) and before[1] is not None:
             self.snapped = True  # in a first part, whose loads are raised in full, it is none of stability
         self.told(old, new, before)
         return found
@@ -169,7 +169,7 @@ class _Differentiated:
         self._taken += 1
         return spans[self._taken - 1]
 
-    def _accepted(self, old: State, new: State, before: tuple[dict[str, float], Books | None]) -> None:
+    def _accepted(self, old: State, new: State, before: tuple[dict[str, float], EnergyState | None]) -> None:
         """The run has accepted a part: its derivatives."""
         if not self._followed:
             return

@@ -23,10 +23,10 @@ from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
 from evfem.newton.state import Beginning, Reusable, State, TangentPoint
 from evfem.simulation.history import COLUMNS, NEEDED, columns_of
-from evfem.simulation.ledger import Ledger
+from evfem.simulation.ledger import EnergyAccount
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
-from evfem.simulation.works import Books
+from evfem.simulation.works import EnergyState
 from evfem.terms.tractions import pull_off_of
 
 CHECKPOINT_FORMAT = "evfem-checkpoint-9"
@@ -72,9 +72,9 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
     return Reusable(arrays["candidates"].astype(np.int64), at)
 
 
-def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
+def account_arrays(ledger: EnergyAccount, state: State) -> dict[str, Any]:
     """The works so far, and what is known of the last accepted state."""
-    end = ledger.end or Books.nothing(state.u.shape)
+    end = ledger.end or EnergyState.nothing(state.u.shape)
     return {
         "sums": np.array(list(ledger.sums.values())),
         "internal_forces": end.forces,
@@ -85,13 +85,13 @@ def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
     }
 
 
-def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
+def account_of(model: Model, arrays: Mapping[str, np.ndarray]) -> EnergyAccount:
     """The ledger from the arrays of a checkpoint."""
-    sums = dict(zip(Ledger(model).sums, arrays["sums"].tolist(), strict=True))
-    end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
+    sums = dict(zip(EnergyAccount(model).sums, arrays["sums"].tolist(), strict=True))
+    end = EnergyState(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
     pull_off = pull_off_of(model.attraction)
     pull_off.lift, pull_off.came_off = arrays["lift"], arrays["came_off"]
-    return Ledger(model, sums, end, pull_off)
+    return EnergyAccount(model, sums, end, pull_off)
 
 
 def usable(

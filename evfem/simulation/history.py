@@ -54,7 +54,7 @@ class History:
     """Every column of the history as an array over the steps.
 
     A field is a column: of `COLUMNS`, of rows and `history.csv`, of saved results and checkpoints.
-    `Ledger.row` computes its value. Its unit and meaning are in `UNITS` and `MEANINGS`.
+    `EnergyAccount.row` computes its value. Its unit and meaning are in `UNITS` and `MEANINGS`.
     `result["normal_force"]` is `result.normal_force`.
     """
 

@@ -16,7 +16,7 @@ from evfem.newton.state import State
 from evfem.simulation.history import ADDED, SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import Books, SubstepWork
+from evfem.simulation.works import EnergyState, SubstepWork
 from evfem.surface.pad import Pad, reach, surface_state
 from evfem.terms.attraction import ELECTROSTATIC
 from evfem.terms.tractions import NoPullOff, PullOff
@@ -29,25 +29,25 @@ def unloaded(state: State) -> State:
 
 
 @dataclass
-class Ledger:
+class EnergyAccount:
     """Energy account of a run: sums of works and dissipations by the history's columns, the energies at the
     end of its last substep, and the pull-off force.
     """
 
     model: Model
     sums: dict[str, float] = field(default_factory=dict)
-    end: Books | None = None
+    end: EnergyState | None = None
     pull_off: PullOff = field(default_factory=NoPullOff)
 
     def __post_init__(self) -> None:
         names = (one.name for one in self.model.columns if one.name.endswith(ADDED))
         self.sums = dict.fromkeys((*SUMS, *names), 0.0) | self.sums
 
-    def accept(self, old: State, new: State) -> bool:
+    def add_substep(self, old: State, new: State) -> bool:
         """Add the works of one converged substep; returns whether stability was lost in it."""
         substep = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
         self._watch(new)
-        begin = self.end or Books.nothing(old.u.shape)
+        begin = self.end or EnergyState.nothing(old.u.shape)
         self.end = substep.end()
         works = substep.works(begin, self.end)
         for name, work in works.items():
@@ -59,13 +59,13 @@ class Ledger:
         pulls, always = self.model.equilibrium.pulls(new), self.model.held_by
         self.pull_off.watch(new, {name: pulls[name] for name in always}, self.model.body.drag_rate == 0.0)
 
-    def mark(self) -> tuple[dict[str, float], Books | None]:
+    def snapshot(self) -> tuple[dict[str, float], EnergyState | None]:
         """Snapshot of the sums and energies."""
         return self.sums.copy(), self.end
 
-    def back(self, mark: tuple[dict[str, float], Books | None]) -> None:
-        """Restore the snapshot `mark`."""
-        self.sums, self.end = mark[0].copy(), mark[1]
+    def restore(self, kept: tuple[dict[str, float], EnergyState | None]) -> None:
+        """Restore a snapshot."""
+        self.sums, self.end = kept[0].copy(), kept[1]
 
     def row(self, state: State, step: int, motion_index: int, motion: str, time: float) -> dict[str, Any]:
         """The forces, widths and energies of a state; costs are added by the caller."""

@@ -298,7 +298,7 @@ class Loop:
     def _advance(self, course: Course, start: Start, wanted: StepRequest) -> Frame | None:
         """Do the step, or leave everything as it was."""
         run, before = self._run, self._interactive
-        mark, substep = run.ledger.mark(), run.stepper.substep
+        kept, substep = run.ledger.snapshot(), run.stepper.substep
         path = _exactly(run.path(course, start, (0.0, 1.0), course.duration), wanted)
         request = Request(len(run.rows) + 1, len(self._own), InteractiveMotion.kind, path, course.duration)
         self._move(before.and_then(course))
@@ -306,7 +306,7 @@ class Loop:
             frame = run.advance(request)
         except BaseException:
             self._move(before)
-            run.ledger.back(mark)
+            run.ledger.restore(kept)
             run.stepper.substep = substep
             raise
         self._move(replace(self._interactive, steps=before.steps + 1))

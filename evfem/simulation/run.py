@@ -40,8 +40,8 @@ from evfem.scene.scene import Scene
 from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
     PROBES,
-    ledger_arrays,
-    ledger_of,
+    account_arrays,
+    account_of,
     reusable_arrays,
     reusable_of,
     state_arrays,
@@ -59,7 +59,7 @@ from evfem.simulation.doubtful import (
     unstable_alone,
 )
 from evfem.simulation.history import ROOM_COLUMNS
-from evfem.simulation.ledger import Ledger, frame_of
+from evfem.simulation.ledger import EnergyAccount, frame_of
 from evfem.simulation.model import Model, linearised, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.simulation.works import SubstepWork
@@ -185,7 +185,7 @@ class Run:
         self.scene = scene
         self.source = source_of(scene.electrics.voltage)
         self.model: Model = make_model(scene)
-        self.ledger = Ledger(self.model, pull_off=pull_off_of(self.model.attraction))
+        self.ledger = EnergyAccount(self.model, pull_off=pull_off_of(self.model.attraction))
         allowed, body = allowed_error(scene), self.model.body
         parts = Whole() if allowed is None else Halves(allowed)
         self.slip_scale = np.inf if allowed is None else slip_scale(scene, self.model.mesh)
@@ -374,7 +374,7 @@ class Run:
         self.frames.append(frame_of(self.model, self.state, row))
         return self.frames[-1]
 
-    def row(self, ledger: Ledger, request: Request, state: State) -> dict[str, Any]:
+    def row(self, ledger: EnergyAccount, request: Request, state: State) -> dict[str, Any]:
         """The row of a state at the end of a request, without its costs."""
         at = request.step, request.motion_index, request.kind, self.time + request.duration
         voltage, tolerance = request.path(0.0, 1.0).voltage, self.model.equilibrium.tolerance
@@ -428,7 +428,7 @@ class Run:
             "time": np.array(self.time),
             "sunk": self.sunk,
             **({} if self.probes is None else {PROBES: self.probes.stacked(self.probed)}),
-            **ledger_arrays(self.ledger, self.state),
+            **account_arrays(self.ledger, self.state),
         }
 
     def _restore(self, saved: Saved) -> None:
@@ -437,5 +437,5 @@ class Run:
         self.state = state_of(arrays)
         self.model.equilibrium.body.resume(reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
-        self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
+        self.ledger, self.sunk = account_of(self.model, arrays), arrays["sunk"]
         self.rows, self.probed = list(saved.rows), list(arrays.get(PROBES, ()))

@@ -101,7 +101,7 @@ NOISE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Books:
+class EnergyState:
     """Energy balance, data of an accepted state: internal forces and forces of user-supplied forms (N, dim),
     energies of tissue, springs, motion.
     """
@@ -118,7 +118,7 @@ class Books:
         return self.stored + self.springs + self.kinetic
 
     @classmethod
-    def nothing(cls, shape: tuple[int, ...]) -> Books:
+    def nothing(cls, shape: tuple[int, ...]) -> EnergyState:
         """Before the first substep, with displacements of this shape."""
         none = np.zeros(shape)
         return cls(none, none, 0.0, 0.0, 0.0)
@@ -133,15 +133,17 @@ class SubstepWork:
     new: State
     first: bool = False
 
-    def end(self) -> Books:
+    def end(self) -> EnergyState:
         """Forces and energies at the end of the substep."""
         body, new = self.model.body, self.new
         user_forces = body.given_forces(new.u)
         springs = float(sum(term.stored(new) for term in self.model.terms))
         kinetic = float(sum(term.kinetic(new) for term in self.model.terms))
-        return Books(body.forces(new.u) - user_forces, user_forces, body.energy(new.u), springs, kinetic)
+        return EnergyState(
+            body.forces(new.u) - user_forces, user_forces, body.energy(new.u), springs, kinetic
+        )
 
-    def works(self, begin: Books, end: Books) -> dict[str, float]:
+    def works(self, begin: EnergyState, end: EnergyState) -> dict[str, float]:
         """Contributions of the substep to the columns that add up, N mm per mm of depth."""
         old, new, body = self.old, self.new, self.model.body
         moved, slip_onset = new.u - old.u, self._slip_onset_work()

@@ -36,14 +36,14 @@ SMALLEST_BARRIER = 1e-3
 class Accounts(Protocol):
     """Receives every accepted substep: the bookkeeping of works and energies."""
 
-    def accept(self, old: State, new: State) -> object:
+    def add_substep(self, old: State, new: State) -> object:
         """A substep from `old` to `new` was accepted; returns whether stability was lost in it."""
 
-    def mark(self) -> Any:
-        """Present state of the accounts."""
+    def snapshot(self) -> Any:
+        """Snapshot of the accounts."""
 
-    def back(self, mark: Any) -> None:
-        """Discards the substeps accepted since `mark`."""
+    def restore(self, kept: Any) -> None:
+        """Discards the substeps accepted since the snapshot `kept`."""
 
 
 @dataclass
@@ -114,7 +114,7 @@ class Stepper:
                 if len(solved) > 1:
                     # other trials were begun since: rooms compute works of the trial that began last
                     self.equilibrium.begin(state, target)
-                self.snaps += bool(accounts.accept(state, new))
+                self.snaps += bool(accounts.add_substep(state, new))
                 state, substeps = new, substeps + 1
             easy = self.equilibrium.record.iterations - before <= strategy.easy
             self.substep = self.parts.next_substep(self.substep, fraction - done, error, easy, strategy)
@@ -165,11 +165,11 @@ class Stepper:
             raise failed
         if not relaxation.applies(target):
             return None
-        failed.released, mark, self.releasing = True, accounts.mark(), True
+        failed.released, kept, self.releasing = True, accounts.snapshot(), True
         try:
-            rest = relaxation.follow(state, target, accounts.accept)
+            rest = relaxation.follow(state, target, accounts.add_substep)
         except StepFailed as error:
-            accounts.back(mark)
+            accounts.restore(kept)
             if isinstance(error, Folded | LiftedOff):
                 error.last = failed.last
                 raise

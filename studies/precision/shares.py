@@ -33,7 +33,7 @@ WORK: Mapping[str, tuple[tuple[str, str, str], ...]] = {
         ("newton.interface", "Interface", "candidates obeyed shallowest_penetration contact_forces"),
         ("newton.linearisation", "Linearisation", "choose_candidates"),
     ),
-    "output": (("simulation.ledger", "Ledger", "accept row"), ("simulation.run", "", "frame_of")),
+    "output": (("simulation.ledger", "EnergyAccount", "add_substep row"), ("simulation.run", "", "frame_of")),
 }
 #: ways through the run: which steps; everything slips from s = 2.7 mm on, and the last step keeps its fields
 PHASES = {"press": slice(0, 20), "stick_slip": slice(20, 44), "full_slip": slice(47, 49)}

@@ -31,19 +31,20 @@ def test_the_time_said_is_that_of_fingertips(resolution, ridges, steps, seconds)
     finger = ev.Fingertip(resolution=resolution, ridges=ridges)
     least, most = needed_time(ev.Scene(finger, ev.Display(), motion=motion), finger.mesh())
     assert least < seconds / 1.2 < 1.2 * seconds < most
-    assert most <= 5.0 * least
+    assert most <= 6.5 * least
 
 
 def test_the_time_said_is_that_of_nine_of_ten_drawn_scenes(tmp_path):
-    """Every sixteenth of the 370 scenes whose ends and CPU seconds are kept: in the plane and in space."""
+    """Every sixteenth of the 370 scenes whose ends and CPU seconds, without those of packages, are kept."""
     with (Path(__file__).parents[1] / "tools/ends.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["end"] == "equilibrium"][::16]
-    below, above = 0, 0
+    packages, below, above = 0.5, 0, 0
     for row in rows:
         drawn = with_files(draw(int(row["seed"]), int(row["scene"])), tmp_path)
         scene = loads(text_of(drawn), tmp_path)
         least, most = needed_time(scene, scene.finger.mesh())
-        below += float(row["cpu_s"]) < least
-        above += float(row["cpu_s"]) > most
+        seconds = packages + float(row["cpu_s"])
+        below += seconds < least
+        above += seconds > most
     assert below <= 0.1 * len(rows)
     assert above <= 0.1 * len(rows)

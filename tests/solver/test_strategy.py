@@ -23,13 +23,13 @@ from evfem.terms.traction import NoTraction
 class Unbooked:
     """Accounts that keep nothing."""
 
-    def accept(self, old, new):
+    def add_substep(self, old, new):
         pass
 
-    def mark(self):
+    def snapshot(self):
         pass
 
-    def back(self, mark):
+    def restore(self, kept):
         pass
 
 
@@ -164,14 +164,14 @@ def test_a_release_that_comes_to_no_rest_is_taken_back_and_smaller_parts_are_tri
         def __init__(self):
             self.parts = []
 
-        def accept(self, old, new):
+        def add_substep(self, old, new):
             self.parts.append((old, new))
 
-        def mark(self):
+        def snapshot(self):
             return len(self.parts)
 
-        def back(self, mark):
-            del self.parts[mark:]
+        def restore(self, kept):
+            del self.parts[kept:]
 
     monkeypatch.setattr("evfem.solver.stepping.Relaxation", Restless)
     kept, stepper = Kept(), Stepper(Steps(Strategy(), 1 / 100), body=object())
@@ -242,7 +242,7 @@ def decayed(allowed):
     start = SimpleNamespace(reaction=np.ones(1), bone=np.zeros(2))
     path = lambda done, fraction: SimpleNamespace(duration=fraction - done)  # noqa: E731
     kept = Unbooked()
-    kept.accept = lambda old, new: ends.append(float(new.reaction[0]))
+    kept.add_substep = lambda old, new: ends.append(float(new.reaction[0]))
     new, count = stepper.follow(start, path, kept)
     assert count == len(ends) - 1
     whole = [way for way, checked in steps.ways if checked]
