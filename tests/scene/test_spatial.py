@@ -89,7 +89,7 @@ def test_the_plan_says_what_a_whole_finger_needs():
     assert needed.unknowns == 3 * (5 * 81 - 81) + 3
     assert "three dimensions" in text
     assert "plane strain" not in text
-    assert "a run takes about 0.14 GB of memory and 0.4 to 2 s of CPU time with PARDISO" in text
+    assert "a run takes about 0.14 GB of memory and 0.3 to 2 s of CPU time with PARDISO" in text
 
 
 @pytest.mark.parametrize(
