@@ -26,7 +26,7 @@ from evfem.errors import InputError, quoted, readable, unknown
 from evfem.scene.keys import shown
 from evfem.scene.options import Solver
 from evfem.scene.scene import DEPTH
-from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, SPATIAL_UNITS, UNITS, over_depth
+from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, SPATIAL_UNITS, UNITS, no_column, over_depth
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
@@ -117,7 +117,7 @@ class MeasuredCurve:
     def __post_init__(self) -> None:
         for name, column in (("column", str(self.column)), ("over", str(self.over))):
             if column not in NUMBERS:
-                raise unknown(f"data.{name}", column, list(NUMBERS), f"{quoted(column)}, no column")
+                raise no_column(f"data.{name}", column, list(NUMBERS))
         set_frozen(self, at=numbers("data.at", self.at, f"a list of values of {self.over}"))
         set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as points"))
         if len(np.unique(self.at)) < len(self.at):
@@ -167,7 +167,7 @@ class MeasuredCurve:
             allowed = 'columns of the history, or columns={"indentation": %s, "normal_force": %s}'
             raise InputError("data", problem, allowed % tuple(map(readable, (over, *others))))
         for name in {over, *others} - {*NUMBERS}:
-            raise unknown("data.columns", name, list(NUMBERS), f"{quoted(name)}, no column")
+            raise no_column("data.columns", name, list(NUMBERS))
         sizes = _factors(factors, wanted)
         found = []
         for name, of in zip((over, *others, "sd"), (over, *others, *others), strict=True):

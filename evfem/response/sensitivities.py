@@ -66,7 +66,7 @@ from evfem.response.parameters import Parameter, parameter_of, scene_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
 from evfem.scene.scene import Scene
-from evfem.simulation.history import COLUMNS, ROOM_COLUMNS
+from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, no_column
 from evfem.simulation.ledger import EnergyAccount
 from evfem.simulation.result import Result
 from evfem.simulation.run import Request, Run
@@ -242,7 +242,7 @@ class Sensitivities:
         if parameter not in self.parameters:
             raise unknown("parameter", str(parameter), tuple(self.parameters), readable(parameter))
         if column not in self.columns:
-            raise unknown("column", str(column), self.columns, readable(column))
+            raise no_column("column", column, self.columns)
         return self.values[column, parameter]
 
     @property
@@ -397,7 +397,7 @@ def _columns(names: Sequence[str], columns: str | Sequence[str] | None) -> tuple
     numbers = tuple(name for name in names if name not in ("step", "motion_index", "motion"))
     for name in columns or ():
         if name not in (*numbers, *ROOM_COLUMNS):
-            raise unknown("columns", str(name), numbers, readable(name))
+            raise no_column("columns", name, numbers)
     return numbers if columns is None else tuple(columns)
 
 

@@ -20,11 +20,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, real
-from evfem.errors import InputError, quoted, unknown
+from evfem.errors import InputError, quoted
 from evfem.response.lines import differentiable
 from evfem.response.parameters import parameter_of, scene_of
 from evfem.response.sensitivities import Sensitivities, sensitivities
 from evfem.scene.scene import Scene
+from evfem.simulation.history import no_column
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 
@@ -55,16 +56,18 @@ class Uncertainty:
     def effects(self, column: str, step: int = -1) -> tuple[dict[str, float], str]:
         """The contribution of every parameter to a column at a step, counted from 0, and what it is."""
         if column not in self.sd:
-            raise unknown("column", str(column), tuple(self.sd))
+            raise no_column("column", column, tuple(self.sd))
         found = {key: float(self.contribution[column, key][step]) for key in self.found.parameters}
         return found, f"{column} for one sd ({self.result.units[column]})"
 
     def __repr__(self) -> str:
         """The check, and the standard deviations of the forces at the end."""
         one = self.checked
+        derived = f"{one.by_derivative:.4g} by its derivative"
         lines = [
-            f"Uncertainty of {len(self.result.step)} steps to first order; {one.key} larger by its sd "
-            f"changes {one.column} at the end by {one.by_derivative:.4g}, in a run by {one.by_run:.4g}"
+            f"Uncertainty of {len(self.result.step)} steps to first order; check of linearity: "
+            f"{one.key} larger by its sd changes {one.column} at the end by {one.by_run:.4g} in a run, "
+            f"{'no derivative is there' if np.isnan(one.by_derivative) else derived}"
         ]
         lines += [f"  {key}: {self.found.reasons[key]}" for key in self.found.missing]
         for name in ("normal_force", "tangential_force", "electrostatic_force"):

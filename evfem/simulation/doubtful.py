@@ -266,9 +266,9 @@ def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
 
 
 def advice(scene: Scene, model: Model, failed: StepFailed) -> str:
-    """Why the step failed, how its last iterate looked, and what to try, joined by semicolons."""
+    """Why the step failed, what to try, and how its last iterate looked, joined by semicolons."""
     lost = _reason_for_failure(model, failed)
-    sentences = [lost or failed.reason, failed.findings, _suggestions(scene, failed, bool(lost))]
+    sentences = [lost or failed.reason, _suggestions(scene, failed, bool(lost)), failed.findings]
     return "; ".join(sentence for sentence in sentences if sentence)
 
 

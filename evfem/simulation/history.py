@@ -19,7 +19,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints, Words
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
-from evfem.errors import readable, unknown
+from evfem.errors import InputError, near, readable
 from evfem.terms.columns import COLUMNS as OF_PACKAGE
 from evfem.terms.columns import OfRooms
 
@@ -38,6 +38,37 @@ def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> d
     if it counts something); of the last step what is `shown` is printed.
     """
     return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE_OF.get(unit, unit), "traits": traits}
+
+
+#: words that people try -> the column that they mean
+MEANT = {
+    "friction": "tangential_force",
+    "friction_force": "tangential_force",
+    "shear_force": "tangential_force",
+    "force": "applied_force",
+    "load": "applied_force",
+    "contact_force": "normal_force",
+    "attraction": "electrostatic_force",
+    "electric_force": "electrostatic_force",
+    "pressure": "peak_contact_pressure",
+    "area": "contact_width",
+    "depth": "indentation",
+    "displacement": "position",
+    "x": "position",
+}
+
+
+def no_column(key: str, name: Any, columns: Sequence[str]) -> InputError:
+    """The error for a name that is no column, with the one that was meant, by meaning or by letters.
+
+    >>> raise no_column("column", "friction", ["position", "tangential_force"])
+    Traceback (most recent call last):
+    evfem.errors.InputError: column: given "friction", no column; allowed: tangential_force? (docs, Notation)
+    """
+    meant = MEANT.get(str(name).lower())
+    close = [meant] if meant in columns else near(str(name), columns)
+    known = f"{close[0]}? (docs, Notation)" if close else f"{', '.join(columns)}"
+    return InputError(key, f"{readable(name)}, no column", known)
 
 
 class Values(dict[str, Any]):
@@ -112,7 +143,7 @@ class History:
     def __getitem__(self, name: str) -> Any:
         """A column by its name."""
         if name not in self.columns:
-            raise unknown("column", str(name), self.columns, readable(name))
+            raise no_column("column", name, self.columns)
         return getattr(self, name)
 
     def table(self) -> Any:

@@ -22,7 +22,7 @@ from typing import Annotated, Any
 import tomli_w
 
 from evfem.common.checks import instance, real, set_frozen
-from evfem.errors import InputError, quoted, unknown
+from evfem.errors import InputError, quoted
 from evfem.scene import schema as scenes
 from evfem.scene.file import read_text, scene_at, tables_of
 from evfem.scene.format import SceneTable
@@ -30,7 +30,7 @@ from evfem.scene.keys import VERSION, names, read, shown
 from evfem.scene.scene import Scene
 from evfem.scene.schema import DRAFT, Schema, Section, section
 from evfem.scene.serialiser import dump
-from evfem.simulation.history import ROOM_COLUMNS, SPATIAL
+from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, no_column
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import Distribution, Normal, Samples, Uniform
 
@@ -252,7 +252,7 @@ def check_output(output: Any, motions: int) -> None:
     if not 2 <= len(words) <= 3 or words[1] not in STATISTICS:
         raise InputError("outputs", shown(output), allowed)
     if words[0] not in columns:
-        raise unknown(f"outputs: {output}", words[0], columns)
+        raise no_column(f"outputs: {output}", words[0], columns)
     if len(words) == 3 and not (words[2].isdecimal() and int(words[2]) < motions):
         raise InputError("outputs", quoted(output), f"motions from 0 to {motions - 1}")
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from evfem.common.storage import disk, write_text
 from evfem.common.tables import csv_rows, frame
-from evfem.errors import InputError, quoted, readable, unknown
+from evfem.errors import InputError, quoted
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.fingertip import Fingertip
 from evfem.scene.scene import Scene
-from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS
+from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS, no_column
 from evfem.sweeps.file import FIRST, LAST
 from evfem.sweeps.folder import PROVENANCE, STATUS, TABLE, cell_of, sweep_csv
 
@@ -85,7 +85,7 @@ class SweepResult:
     def __getitem__(self, column: str) -> Any:
         """A column (points,): numbers as an array, NaN where there is none, else a list."""
         if column not in self.columns:
-            raise unknown("column", str(column), self.columns, readable(column))
+            raise no_column("column", column, self.columns)
         values = [row[column] for row in self.rows]
         if all(value is None or type(value) in (int, float) for value in values):
             return np.array([math.nan if value is None else value for value in values])

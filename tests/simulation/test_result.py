@@ -179,10 +179,11 @@ def test_a_column_is_found_by_its_name_and_a_misspelt_one_is_guessed():
     result = fake_result()
     for name in COLUMNS:
         assert result[name] is getattr(result, name)
-    with pytest.raises(
-        InputError, match='column: given "normal_forse"; allowed: normal_force\\? \\(step, motion'
-    ):
-        result["normal_forse"]
+    for given, meant in {"normal_forse": "normal_force", "friction": "tangential_force"}.items():
+        with pytest.raises(InputError, match=f'column: given "{given}", no column; allowed: {meant}\\?'):
+            result[given]
+    with pytest.raises(InputError, match="allowed: step, motion_index, motion"):
+        result["qqq"]
 
 
 def test_a_written_history_is_that_of_a_run_folder(tmp_path):

@@ -132,7 +132,10 @@ MISTAKES = [
         "surface.friction: given the same column twice",
     ),
     ("[grid]\nsurface.friction = [0.1]\n[gird]", "gird: given an unknown key; allowed: grid?"),
-    ("outputs = ['force.last']\n[grid]\nsurface.y = [0.1]", "outputs: force.last: given an unknown key"),
+    (
+        "outputs = ['force.last']\n[grid]\nsurface.y = [0.1]",
+        'outputs: force.last: given "force", no column; allowed: applied_force?',
+    ),
     ("outputs = ['voltage']\n[grid]\nsurface.y = [0.1]", 'outputs: given "voltage"; allowed'),
     (
         "outputs = ['voltage.max.2']\n[grid]\nsurface.y = [0.1]",
