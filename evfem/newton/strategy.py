@@ -17,9 +17,9 @@ from evfem.common.constants import FALLING, STUCK
 
 _COUNT = whole(10_000)
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
-_PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
+_PART = number("a fraction of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
 _GROWTH = number("a factor from 1 to 10", Within(1.0, 10.0))
-_ERROR = number("a share of a force, above 0, at most 1", Within(0.0, 1.0, above=True))
+_ERROR = number("a fraction of a force, above 0, at most 1", Within(0.0, 1.0, above=True))
 _RATE = number("a rate, larger than 0, at most 1e3", Within(0.0, 1e3, above=True))
 _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 
@@ -32,35 +32,35 @@ class Strategy:
     (40, 2.0)
     >>> Strategy(smallest_part=2.0)
     Traceback (most recent call last):
-    evfem.errors.InputError: smallest_part: given 2.0; allowed: a share of a step, above 0, at most 1
+    evfem.errors.InputError: smallest_part: given 2.0; allowed: a fraction of a step, above 0, at most 1
     """
 
     iterations: Annotated[
-        int, _COUNT, "most of one part of a step; half as many again if the end is near"
+        int, _COUNT, "most Newton iterations of a substep; half as many again if the end is near"
     ] = 40
-    patience: Annotated[float, _PATIENCE, "iterations with an old factorisation before it is renewed"] = 8.0
+    patience: Annotated[float, _PATIENCE, "iterations with a kept factorisation before it is renewed"] = 8.0
     smallest_part: Annotated[
-        float, _PART, "of what is left of a step before it counts as not converged; its square if time passes"
+        float, _PART, "smallest substep relative to what is left of a step; its square where time passes"
     ] = 1.0 / 1024.0
-    easy: Annotated[int, _COUNT, "iterations of a part after which the next one may be longer"] = 8
-    growth: Annotated[float, _GROWTH, "by which factor"] = 1.25
+    easy: Annotated[int, _COUNT, "iterations of a substep after which the next one may be longer"] = 8
+    growth: Annotated[float, _GROWTH, "factor by which a substep may be longer than the last one"] = 1.25
     reach: Annotated[
-        float, _REACH, "first guess: so many of the last part's displacements ahead, 0: none"
+        float, _REACH, "predictor: so many of the last displacement increments ahead, 0: none"
     ] = 1.5
     hold: Annotated[
-        float, _RATE, "first rate of the drag that holds a finger whose iterations came over a barrier"
+        float, _RATE, "first rate of drag continuation, where iterations came over an energy barrier"
     ] = 16.0
-    relaxation: Annotated[bool, yes_or_no(), "whether a finger without an equilibrium near is released"] = (
+    relaxation: Annotated[bool, yes_or_no(), "pseudo-transient continuation where no equilibrium is near"] = (
         True
     )
     steps: Annotated[
         str,
         one_of("given", "auto"),
-        "one part each unless it fails, or parts as the error of the path allows",
+        "one substep each unless it fails, or substeps by the step error",
     ] = "given"
-    path_error: Annotated[float, _ERROR, "of a part, with steps = auto: a share of the force on the bone"] = (
-        1e-3
-    )
+    path_error: Annotated[
+        float, _ERROR, "step error of a substep, with steps = auto, relative to the force on the bone"
+    ] = 1e-3
 
     def __post_init__(self) -> None:
         check_fields(self)
