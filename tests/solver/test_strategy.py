@@ -265,8 +265,8 @@ def test_the_error_of_the_path_sets_the_length_of_its_parts():
 
 
 @pytest.mark.parametrize("name", ["path_error", "smallest_part"])
-def test_shares_are_above_zero(name):
-    refuses(f"{name}: given 0.0; allowed: a share", Strategy, **{name: 0.0})
+def test_fractions_are_above_zero(name):
+    refuses(f"{name}: given 0.0; allowed: a fraction", Strategy, **{name: 0.0})
 
 
 def test_parts_that_err_too_much_are_done_again_shorter():
