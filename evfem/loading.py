@@ -145,5 +145,6 @@ READERS: Mapping[str, Callable[[Path], Found]] = {
     ".wav": _signal,
     ".hjif": _signal,
     ".toml": _tables,
-    **dict.fromkeys((".vtu", ".msh", ".inp", ".med", ".e", ".exo", ".xdmf", ".vtk", ".mesh", ".bdf"), _mesh),
+    **dict.fromkeys((".vtu", ".msh", ".inp", ".med", ".e", ".exo", ".gen", ".xdmf", ".vtk"), _mesh),
+    **dict.fromkeys((".mesh", ".bdf", ".su2"), _mesh),
 }

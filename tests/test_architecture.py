@@ -26,8 +26,9 @@ ROOMS = {
         "constants arrays rooms notices checks views pools digest storage units tables pictures",
     ),
     "mesh": (
-        {"numpy", "scipy", "meshio"},
-        "hexahedron mesh archive faces solids quality groups deck abaqus file",
+        {"numpy", "scipy", "meshio", "netCDF4", "h5py", "vtkmodules"},
+        "hexahedron mesh archive faces solids quality groups formats.deck formats.abaqus formats.exodus "
+        "formats.gmsh formats.med formats.medit formats.nastran formats.su2 formats.vtk formats.xdmf file",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
@@ -109,7 +110,7 @@ EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
 LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm"}
-LATE |= {"distributed", "pyarrow", "pandas", "xarray", "SurfaceTopography"}
+LATE |= {"distributed", "pyarrow", "pandas", "xarray", "SurfaceTopography", "netCDF4", "h5py", "vtkmodules"}
 #: compiled from C, without imports
 BUILT = {f"evfem.tissue.kernels.{name}" for name in ("loops", "solids", "contact")}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450

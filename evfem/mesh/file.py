@@ -5,9 +5,9 @@ Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, 
 (`region:NAME` = number), so that no table is needed to read them back. Other formats:
 `evfem.mesh.groups`.
 
-Files are read by meshio, which knows no limits, `.inp` by `evfem.mesh.abaqus`: `parts` bounds the file's
-size and turns all that is raised into one reason. A small file that was made to fill the memory still may:
-see docs/commandline.md, "Nothing is trusted".
+Files are read by meshio, which knows no limits, and what it reads in part by `evfem.mesh.formats`: `parts`
+bounds the file's size and turns all that is raised into one reason. A small file that was made to fill the
+memory still may: see docs/commandline.md, "Nothing is trusted".
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import os
 import re
 import warnings
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,9 +28,18 @@ import numpy as np
 from evfem.common.arrays import Ints
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
-from evfem.mesh import abaqus
-from evfem.mesh.groups import PHYSICAL, PREFIX, Name, dimension_of, groups_in, regions_in, sets_in
-from evfem.mesh.mesh import CELLS, KINDS, Mesh
+from evfem.mesh.groups import (
+    PHYSICAL,
+    PREFIX,
+    Name,
+    body_of,
+    dimension_of,
+    groups_in,
+    regions_in,
+    sets_in,
+    unused_in,
+)
+from evfem.mesh.mesh import KINDS, Mesh
 from evfem.mesh.quality import check
 
 if TYPE_CHECKING:
@@ -42,11 +52,20 @@ PIXELS: Mapping[str, tuple[str, list[int]]] = {
     "pixel": ("quad", [0, 1, 3, 2]),
     "voxel": ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6]),
 }
-#: what meshio passes over in decks of Nastran: axes of nodes (their third field), in three formats, and files
-NASTRAN = re.compile(
-    rb"^(GRID)(?:\*[^,\n]{19} {0,15}|[^,*\n]{12} {0,7}|\*? *,[^,\n]*, *)[1-9]|^ *(INCLUDE|GRDSET)\b",
-    re.I | re.M,
-)
+#: endings of the files that a module of `evfem.mesh.formats` reads
+FORMATS: Mapping[str, str] = {
+    ".inp": "abaqus",
+    **dict.fromkeys((".e", ".exo", ".ex2", ".gen"), "exodus"),
+    ".med": "med",
+    **dict.fromkeys((".mesh", ".meshb"), "medit"),
+    ".msh": "gmsh",
+    **dict.fromkeys((".bdf", ".fem", ".nas"), "nastran"),
+    ".su2": "su2",
+    **dict.fromkeys((".vtk", ".vtu"), "vtk"),
+    **dict.fromkeys((".xdmf", ".xmf"), "xdmf"),
+}
+#: the document type of FEniCSx, which declares nothing
+DOCTYPE = re.compile(rb'<!DOCTYPE\s+Xdmf\s+SYSTEM\s+"Xdmf\.dtd"\s*(\[\s*\]\s*)?>')
 #: kinds that are refused for what they lack
 _TETRAHEDRA = "Gmsh makes hexahedra of tetrahedra and wedges: docs/howto/mesh.md, From tetrahedra"
 LACKING: Mapping[str, str] = {
@@ -72,19 +91,21 @@ def read(
     """
     path = Path(path)
     raw = _read(path)
-    body = _body(raw)
+    body = body_of(raw)
     solid = [k for k, one in enumerate(raw.cells) if dimension_of(one.type, body) >= body and len(one)]
     kind = _one_kind(path, [raw.cells[k].type for k in solid])
     cells = np.vstack([raw.cells[k].data for k in solid]).astype(np.int64)
     try:
-        groups = groups_in(path, raw, body)
+        groups = groups_in(raw)
     except ValueError as error:
         raise InputError("finger.mesh", f"{path.name} with {error}", "one integer per cell") from None
-    region, region_names = regions_in(path, groups, {k: len(raw.cells[k]) for k in solid}, regions)
+    region, region_names = regions_in(
+        path, groups, {k: len(raw.cells[k]) for k in solid}, regions, raw.cell_data
+    )
     sets = sets_in(path, raw, [one for one in groups if one.block not in solid], boundaries)
     points = raw.points.astype(float) if body == 3 else _plane(path, raw.points)
     mesh = Mesh(points, cells, kind, region, region_names, sets)
-    return check(mesh, path.name)
+    return check(mesh, path.name, unused_in(raw, groups, sets))
 
 
 def _read(path: Path) -> meshio.Mesh:
@@ -112,19 +133,12 @@ def parts(path: Path) -> meshio.Mesh:
     """
     if path.stat().st_size > LARGEST:
         raise ValueError(f"more than {LARGEST // 2**20} MB")
-    with path.open("rb") as file:
-        start = file.read(1000)
-    if b"<!DOCTYPE" in start or b"<!ENTITY" in start or start.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise ValueError("a document type, or no UTF-8 text")
-    if start.startswith(b"$NOD"):
-        raise ValueError("version 1 of Gmsh's format: save as 2.2 or 4.1")
+    ending = path.suffix.lower()
+    _guard(path.read_bytes())
     import meshio
 
-    if path.suffix.lower() not in meshio.extension_to_filetypes:
-        raise ValueError(f"meshio knows no format {path.suffix or 'without an ending'}")
-    if path.suffix.lower() in (".bdf", ".fem", ".nas") and (found := NASTRAN.search(path.read_bytes())):
-        card = "GRID in axes of its own" if found[1] else found[2].decode().upper()
-        raise ValueError(f"{card}, which is not read: give nodes in the basic axes, in one file")
+    if ending not in meshio.extension_to_filetypes and ending not in FORMATS:
+        raise ValueError(f"no format {path.suffix or 'without an ending'} is known")
     said = io.StringIO()
     meshio._vtk_common.vtk_to_meshio_type[11] = "voxel"  # which it does not know, and pixels by name alone
     meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)
@@ -137,7 +151,8 @@ def parts(path: Path) -> meshio.Mesh:
             warnings.simplefilter("ignore")
             warnings.filterwarnings("error", "string or file could not be read")  # no number
             warnings.simplefilter("error", RuntimeWarning)  # numbers out of range
-            raw = abaqus.read(path) if path.suffix.lower() == ".inp" else meshio.read(path)
+            known = import_module(f"evfem.mesh.formats.{FORMATS[ending]}") if ending in FORMATS else meshio
+            raw = known.read(path)
         if raw.points.ndim != 2 or raw.points.shape[1] not in (2, 3):
             raise ValueError("no points in the plane or in space")
         for block in raw.cells:
@@ -151,6 +166,13 @@ def parts(path: Path) -> meshio.Mesh:
     return raw
 
 
+def _guard(content: bytes) -> None:
+    """Refuse XML that declares a type of document or entities, wherever it does, in every coding."""
+    declared = b"<!ENTITY" in content or b"<!DOCTYPE" in DOCTYPE.sub(b"", content, count=1)
+    if declared or content.startswith((b"\xff\xfe", b"\xfe\xff", b"<\0", b"\0<")):
+        raise ValueError("a document type, or no UTF-8 text")
+
+
 def _reason(error: BaseException, said: str, path: Path) -> str:
     """Why meshio could not read a file, on one line, without the folder."""
     reason = (said if isinstance(error, SystemExit) else str(error)).replace(str(path), path.name)
@@ -159,7 +181,7 @@ def _reason(error: BaseException, said: str, path: Path) -> str:
     elif isinstance(error, KeyError):
         reason = f"{error.args[0]}, which meshio does not know or misses"
     if PHYSICAL in reason:
-        reason = "version 4.1 with elements outside of physical groups: save without them, or as 2.2"
+        reason = "version 4.1 with elements outside of physical groups: save with Mesh.SaveAll = 0"
     return " ".join(reason.split())[:200] or "damaged, or of a kind that meshio does not know"
 
 
@@ -171,13 +193,6 @@ def _one_kind(path: Path, kinds: list[str]) -> str:
     allowed += "".join(f" ({why})" for why in dict.fromkeys(LACKING[n] for n in found if n in LACKING))
     problem = f"{path.name} with " + (" and ".join(found) if found else "no two-dimensional") + " cells"
     raise InputError("finger.mesh", problem, allowed)
-
-
-def _body(raw: meshio.Mesh) -> int:
-    """Dimension of the body's cells, 2 or 3; cells below it are kept only for the nodes of a
-    physical group.
-    """
-    return max([2, *(CELLS[one.type].dimension for one in raw.cells if one.type in CELLS and len(one))])
 
 
 def _plane(path: Path, points: np.ndarray) -> np.ndarray:

@@ -1,14 +1,13 @@
 """Groups of cells and sets of nodes in mesh files: what becomes a region, and what a boundary.
 
 Groups of cells of the body's dimension are regions, those of lower dimension, and sets of nodes, are
-boundaries: physical groups (`.msh`), sets (`.inp`), families (`.med`), blocks and sets of nodes (`.e`),
-numbers in cell data and sets in point data of all.
+boundaries. Readers that know the groups of their format (`evfem.mesh.formats`) give them as `groups` of the
+mesh; others have numbers in cell data, and sets in point data.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,8 +25,11 @@ PHYSICAL = "gmsh:physical"
 #: Prefix of the field data that carry the names of regions in a `.vtu` file.
 PREFIX = "region:"
 
-#: cell data that hold numbers of groups, in the order in which they are looked for
-NUMBERS = ("region", PHYSICAL, "medit:ref", "nastran:ref", "su2:tag")
+#: cell data that hold numbers of groups, in the order in which they are looked for; the last is what Gmsh
+#: writes into `.vtk`
+NUMBERS = ("region", PHYSICAL, "medit:ref", "nastran:ref", "CellEntityIds")
+#: what is 0 in point data: the rounding of a function that was interpolated
+NOUGHT = 1e-9
 Name = str | int
 
 
@@ -47,23 +49,32 @@ def dimension_of(kind: str, body: int) -> int:
     return CELLS[kind].dimension if kind in CELLS else body
 
 
-def groups_in(path: Path, raw: meshio.Mesh, body: int) -> list[Group]:
-    """All groups of cells in a file: by numbers, else by sets. ValueError where numbers are none."""
-    dimension = [dimension_of(one.type, body) for one in raw.cells]
-    if path.suffix.lower() == ".med":
-        return _families(raw)
-    if path.suffix.lower() in (".e", ".exo", ".ex2"):
-        return [Group(None, k + 1, k, np.arange(len(one))) for k, one in enumerate(raw.cells)]
-    content = path.read_bytes() if PHYSICAL in raw.cell_data else b""
-    names = _physical_names(content, raw)
-    if entities := _entities(path, content):
-        tags = [int(tag[0]) if len(tag) else 0 for tag in raw.cell_data["gmsh:geometrical"]]
-        return [
-            Group(names.get((d, abs(number))), abs(int(number)), k, np.arange(len(raw.cells[k])))
-            for k, (d, tag) in enumerate(zip(dimension, tags, strict=True))
-            for number in entities[d].get(tag, ())
-        ]
-    groups = []
+def body_of(raw: meshio.Mesh) -> int:
+    """Dimension of the body's cells, 2 or 3; cells below it are kept only for the nodes of a group."""
+    return max([2, *(CELLS[one.type].dimension for one in raw.cells if one.type in CELLS and len(one))])
+
+
+def groups_in(raw: meshio.Mesh) -> list[Group]:
+    """All groups of cells in a file: those that its reader found, else by numbers, else by sets."""
+    if hasattr(raw, "groups"):
+        found: list[Group] = raw.groups
+        return found
+    named = [(key.removeprefix(PREFIX), np.ravel(number)) for key, number in raw.field_data.items()
+             if key.startswith(PREFIX) and np.size(number) and np.isfinite(number).all()]  # fmt: skip
+    names = {(dimension, int(number[0])): name for name, number in named for dimension in (2, 3)}
+    return numbered(raw, names) or [
+        Group(name, i, k, np.asarray(cells))
+        for i, name in enumerate(raw.cell_sets, 1)
+        for k, cells in enumerate(raw.cell_sets[name])
+        if cells is not None and len(cells) and np.max(cells) < len(raw.cells[k])
+    ]
+
+
+def numbered(raw: meshio.Mesh, names: Mapping[tuple[int, int], str]) -> list[Group]:
+    """Groups by the numbers in cell data, with names by dimension and number. ValueError where they are no
+    integers.
+    """
+    groups, body = [], body_of(raw)
     for key in [key for key in NUMBERS if key in raw.cell_data][:1]:
         for k, numbers in enumerate(raw.cell_data[key]):
             numbers = np.asarray(numbers).reshape(-1)
@@ -72,71 +83,27 @@ def groups_in(path: Path, raw: meshio.Mesh, body: int) -> list[Group]:
             numbers = np.abs(numbers) if key == PHYSICAL else numbers  # curves may run backwards
             for number in np.unique(numbers).astype(int).tolist():
                 if number or key != PHYSICAL:
-                    cells = np.flatnonzero(numbers == number)
-                    groups.append(Group(names.get((dimension[k], number)), number, k, cells))
-    named = [name for name in raw.cell_sets if not name.startswith("gmsh:")]
-    return groups or [
-        Group(name, i, k, np.asarray(cells))
-        for i, name in enumerate(named, 1)
-        for k, cells in enumerate(raw.cell_sets[name])
-        if cells is not None and len(cells) and np.max(cells) < len(raw.cells[k])
-    ]
-
-
-def _families(raw: meshio.Mesh) -> list[Group]:
-    """Groups of a `.med`: a family of cells has the names of all groups that it is in."""
-    families = sorted({name for names in raw.cell_tags.values() for name in names})
-    return [
-        Group(name, families.index(name) + 1, k, np.flatnonzero(tags == family))
-        for k, tags in enumerate(raw.cell_data.get("cell_tags", ()))
-        for family in np.unique(tags)
-        for name in raw.cell_tags.get(family, ())
-    ]
-
-
-def _physical_names(content: bytes, raw: meshio.Mesh) -> dict[tuple[int, int], str]:
-    """(dimension, number) -> name, of a `.msh` or one of our `.vtu`: meshio keeps one group per name,
-    but `nail` may be a region and a boundary.
-    """
-    section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", content, re.DOTALL)
-    row = re.compile(rb'^\s*([0-3])\s+(\d{1,9})\s+"(.*)"\s*$', re.MULTILINE)
-    rows = row.findall(section[1]) if section else []
-    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in rows}
-    for key, number in raw.field_data.items():
-        if key.startswith(PREFIX) and np.size(number) and np.isfinite(number).all():
-            for dimension in (2, 3):
-                names[dimension, int(np.ravel(number)[0])] = key.removeprefix(PREFIX)
-    return names
-
-
-def _entities(path: Path, content: bytes) -> Sequence[Mapping[int, Ints]]:
-    """Numbers of all physical groups of each entity, by dimension; meshio keeps the first one. Empty
-    for other versions than 4.1.
-    """
-    start = content.find(b"$Entities")
-    head = re.match(rb"\s*\$MeshFormat\s+(?:4|4\.1)\s+([01])\s+([48])\s", content)
-    if start < 0 or head is None:
-        return ()
-    from meshio.gmsh import _gmsh41
-
-    with path.open("rb") as file:
-        file.seek(start)
-        file.readline()
-        found: Sequence[Mapping[int, Ints]] = _gmsh41._read_entities(file, head[1] == b"0", int(head[2]))[0]
-    return found
+                    name = names.get((dimension_of(raw.cells[k].type, body), number))
+                    groups.append(Group(name, number, k, np.flatnonzero(numbers == number)))
+    return groups
 
 
 def regions_in(
-    path: Path, groups: list[Group], sizes: Mapping[int, int], regions: Mapping[str, Name] | None
+    path: Path,
+    groups: list[Group],
+    sizes: Mapping[int, int],
+    regions: Mapping[str, Name] | None,
+    others: Iterable[str] = (),
 ) -> tuple[Ints, dict[str, int]]:
     """The number of the region of each cell of the body's blocks, whose `sizes` are given, and the
-    regions' names.
+    regions' names. `others` are the names of cell data for the sentence on a file without numbers.
     """
     start = dict(zip(sizes, np.cumsum([0, *sizes.values()]), strict=False))
     solid = [one for one in groups if one.block in start]
     if not solid:
-        allowed = "integer cell data `region`, or groups of cells with names (.msh, .inp, .med)"
-        raise InputError("finger.mesh", f"{path.name} without region numbers", allowed)
+        allowed = "integer cell data `region`, or groups of cells with names (.msh, .inp, .med, .exo)"
+        have = f" (its cell data: {', '.join(others)})" if others else ""
+        raise InputError("finger.mesh", f"{path.name} without region numbers{have}", allowed)
     if not regions:
         regions = {one.name: one.name for one in solid if one.name is not None}
     region, owner = np.zeros(sum(sizes.values()), dtype=np.int64), np.full(sum(sizes.values()), "", object)
@@ -146,8 +113,8 @@ def regions_in(
             if key in (one.name, one.number):
                 cells, found[name] = start[one.block] + one.cells, one.number
                 if both := next((other for other in owner[cells] if other not in ("", name)), None):
-                    problem = f"{both} and {name} with the same cells"
-                    allowed = f'one name per cell: those that count in [finger.regions], as {both} = "{both}"'
+                    problem, chosen = f"{both} and {name} with the same cells", f'{both} = "{regions[both]}"'
+                    allowed = f"one name per cell: those that count in [finger.regions], as {chosen}"
                     raise InputError("finger.regions", problem, allowed)
                 region[cells], owner[cells] = one.number, name
         if name not in found:
@@ -179,10 +146,6 @@ def sets_in(
         add(one.name or one.number, raw.cells[one.block].data[one.cells])
     for name, nodes in raw.point_sets.items():
         add(name, nodes)
-    for family, names in getattr(raw, "point_tags", {}).items():
-        for name in names:
-            add(name, np.flatnonzero(raw.point_data["point_tags"] == family))
-    raw.point_data.pop("point_tags", None)
     sets.update(_point_sets(path, raw))
     named = {name: nodes for name, nodes in sets.items() if isinstance(name, str)}
     for name, key in (boundaries or {}).items():
@@ -194,8 +157,8 @@ def sets_in(
 
 
 def _point_sets(path: Path, raw: meshio.Mesh) -> dict[Name, Ints]:
-    """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and
-    1.
+    """`pad` and `bone` of any type, in which less than `NOUGHT` is 0, and every other point data that holds
+    only the integers 0 and 1.
     """
     sets: dict[Name, Ints] = {}
     for name, values in raw.point_data.items():
@@ -209,5 +172,18 @@ def _point_sets(path: Path, raw: meshio.Mesh) -> dict[Name, Ints]:
                 raise InputError("finger.mesh", problem, "0 or 1 at every point")
         elif values.dtype.kind not in "iub" or not np.isin(values, (0, 1)).all():
             continue
-        sets[name] = np.flatnonzero(values).astype(np.int64)
+        sets[name] = np.flatnonzero(np.abs(values) > NOUGHT).astype(np.int64)
     return sets
+
+
+def unused_in(raw: meshio.Mesh, groups: list[Group], sets: Mapping[str, Ints]) -> list[str]:
+    """What else a file has that may have been meant as a boundary: numbers of groups below the body's
+    dimension, and point data that are no sets.
+    """
+    body = body_of(raw)
+    below = [one for one in groups if dimension_of(raw.cells[one.block].type, body) < body]
+    numbers = sorted({one.number for one in below if one.name is None})
+    data = [name for name in raw.point_data if name not in sets and name not in NUMBERS]
+    return [f"the number {one}" for one in numbers] + [
+        f"point data {one} that are not 0 and 1" for one in data
+    ]

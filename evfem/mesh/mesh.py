@@ -131,10 +131,7 @@ class Mesh:
         """Local nodes (m, k) of a cell's m sides: start, end[, middle] of the edges of a triangle or quad,
         counter-clockwise; the faces of a hexahedron as quads or quad9s that are seen so from outside.
         """
-        if self.dim == 3:
-            return face_nodes(self.order)
-        i, m = np.arange(self.corners), self.corners
-        return np.array([i, (i + 1) % m, m + i][: self.order + 1]).T
+        return sides_of(self.kind)
 
     @property
     def cell_sides(self) -> Ints:
@@ -166,6 +163,21 @@ class Mesh:
     def sides_of(self, name: str) -> Ints:
         """Outer sides all of whose nodes are in the set `name`, same columns as `outer_sides`."""
         return self.cell_sides[self.in_set(name)]
+
+
+def sides_of(kind: str) -> Ints:
+    """Local nodes (m, k) of the sides of a kind of cell, as `Mesh.local_sides` has them; (0, 1) where no
+    finger is made of it. Twenty nodes have the sides of eight.
+
+    >>> sides_of("triangle6").tolist(), sides_of("hexahedron").tolist()[2]
+    ([[0, 1, 3], [1, 2, 4], [2, 0, 5]], [0, 1, 5, 4])
+    """
+    if kind not in CELLS or CELLS[kind].dimension < 2 or kind.startswith("tetra"):
+        return np.empty((0, 1), dtype=np.int64)
+    if CELLS[kind].dimension == 3:
+        return face_nodes(CELLS[kind].order if kind != "hexahedron20" else 1)
+    i, m = np.arange(CELLS[kind].corners), CELLS[kind].corners
+    return np.array([i, (i + 1) % m, m + i][: CELLS[kind].order + 1]).T
 
 
 def once(parts: Ints) -> tuple[Ints, Ints]:

@@ -7,6 +7,8 @@ scaled Jacobian, at the end.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
@@ -27,12 +29,13 @@ MOST_PAIRS = 8_000_000
 ACROSS = np.sqrt([2.0, 3.0, 5.0])
 
 
-def check(mesh: Mesh, source: str = "mesh") -> Mesh:
+def check(mesh: Mesh, source: str = "mesh", others: Sequence[str] = ()) -> Mesh:
     """The same mesh, its cells counter-clockwise (hexahedra right-handed) and its set `pad` reduced
     to the outline or surface.
 
-    `source` names the mesh in messages. Raises `InputError` (key `finger.mesh`) for the first fault found:
-    values, numbers of nodes, units, names, double and unused nodes, orientation, connection, overlap.
+    `source` names the mesh in messages, `others` what else its file has. Raises `InputError` (key
+    `finger.mesh`) for the first fault found: values, numbers of nodes, units, names, double and unused nodes,
+    orientation, connection, overlap.
     """
 
     def refuse(fault: str, allowed: str) -> None:
@@ -46,7 +49,7 @@ def check(mesh: Mesh, source: str = "mesh") -> Mesh:
     _shapes(mesh, refuse)
     _connection(mesh, refuse)
     surface(mesh, refuse)
-    _names(mesh, refuse)
+    _names(mesh, others, refuse)
     return solids.with_sets(mesh, refuse)
 
 
@@ -214,8 +217,8 @@ def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     return across, (away * direction[:, None]).sum(axis=-1) / square
 
 
-def _names(mesh: Mesh, refuse: Refuse) -> None:
-    have = ", ".join(sorted(mesh.node_sets)) or "none"
+def _names(mesh: Mesh, others: Sequence[str], refuse: Refuse) -> None:
+    have = ", ".join([*sorted(mesh.node_sets), *others]) or "none"
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
             fault = f"no node in {name}" if name in mesh.node_sets else f"no boundary {name} (it has {have})"

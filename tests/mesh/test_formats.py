@@ -125,7 +125,7 @@ def grouped(path):
     ("name", "regions", "boundaries"),
     [
         ("a.med", None, None),
-        ("a.e", {"tissue": 1}, None),
+        ("a.e", {"tissue": 0}, None),  # meshio numbers the blocks from 0
         ("a.mesh", {"tissue": 5}, {"pad": 7, "low": 7, "bone": 8}),
         ("a.msh", {"tissue": 5}, {"pad": 7, "low": 7, "bone": 8}),
     ],

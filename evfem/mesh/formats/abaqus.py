@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.mesh.deck import ASSEMBLY, Deck, Scope, Surface, cards, existing, nodes_of
-from evfem.mesh.hexahedron import face_nodes
-from evfem.mesh.mesh import CELLS
+from evfem.mesh.formats.deck import ASSEMBLY, Deck, Scope, Surface, cards, existing, nodes_of
+from evfem.mesh.mesh import CELLS, sides_of
 
 if TYPE_CHECKING:
     import meshio
@@ -176,7 +175,7 @@ def _surface(one: Surface, body: Body, row: Mapping[int, int], cells: list[Ints]
 
 def _side(kind: str, face: str, name: str) -> Ints:
     """Places in a cell of the nodes of its face S1 ...; all of a shell's, and of kinds of no finger."""
-    sides = sides_of(kind)
+    sides = _sides_of(kind)
     if face in ("SPOS", "SNEG") or not len(sides):
         return np.arange(nodes_of(kind))
     if re.fullmatch(r"S\d", face) and 0 < int(face[1]) <= len(sides):
@@ -184,18 +183,10 @@ def _side(kind: str, face: str, name: str) -> Ints:
     raise ValueError(f"*SURFACE {name} with the face {face} of a {kind}, which it does not have")
 
 
-def sides_of(kind: str) -> Ints:
-    """Places of the nodes of the faces S1 ... of a cell (m, k), corners first; none where no finger has it.
-
-    >>> sides_of("triangle6").tolist(), sides_of("hexahedron").tolist()[0]
-    ([[0, 1, 3], [1, 2, 4], [2, 0, 5]], [0, 3, 2, 1])
-    """
-    if kind.startswith("hexahedron"):
-        return face_nodes(CELLS[kind].order if kind != "hexahedron20" else 1)[FACES]
-    if kind not in CELLS or CELLS[kind].dimension != 2:
-        return np.empty((0, 1), dtype=np.int64)
-    i, m = np.arange(CELLS[kind].corners), CELLS[kind].corners
-    return np.array([i, (i + 1) % m, m + i][: CELLS[kind].order + 1]).T
+def _sides_of(kind: str) -> Ints:
+    """Places of the nodes of the faces S1 ... of a cell (m, k), corners first."""
+    sides = sides_of(kind)
+    return sides[FACES] if kind.startswith("hexahedron") else sides
 
 
 def _exposed(chosen: list[tuple[int, int]], kinds: list[str], cells: list[Ints]) -> Iterator[Ints]:
@@ -205,13 +196,13 @@ def _exposed(chosen: list[tuple[int, int]], kinds: list[str], cells: list[Ints])
     corners = [4 if kind.startswith("hexahedron") else 2 for kind in kinds]
     count: Counter[tuple[int, ...]] = Counter()
     for kind, one, k in zip(kinds, cells, corners, strict=True) if chosen else ():
-        sides = np.sort(one[:, sides_of(kind)][..., :k], axis=2)
+        sides = np.sort(one[:, _sides_of(kind)][..., :k], axis=2)
         count.update(map(tuple, sides.reshape(-1, sides.shape[2]).tolist()))
     for block, place in chosen:
         cell = cells[block][place]
         if _dimension(kinds[block]) < max(map(_dimension, kinds)):
             yield cell
-        for side in cell[sides_of(kinds[block])]:
+        for side in cell[_sides_of(kinds[block])]:
             if count[tuple(sorted(side[: corners[block]].tolist()))] == 1:
                 yield side
 
