@@ -37,6 +37,8 @@ READ = {
     **{f"dolfinx_{name}.xdmf": NUMBERS for name in ("quad9", "hexahedron27")},
     "dolfinx_functions.xdmf": ({"skin": 1, "tissue": 2}, None),
 }
+NEED_VTK = [f"pyvista_{kind}{ending}" for kind in ("quad9", "hexahedron")
+            for ending in (".vtk", "_ascii.vtk", "_lz4.vtu")]  # fmt: skip
 
 
 def is_the_body(path, regions=None, boundaries=None):
@@ -61,6 +63,24 @@ def test_what_a_format_carries_is_read(name):
     kind = Path(name).stem.split("_")[1]
     others = {"metres": "quad9", "shell9": "quad9", "unnamed": "hexahedron27", "functions": "quad"}
     assert is_the_body(WRITTEN / name, *READ[name]).kind == others.get(kind, kind)
+
+
+def rows_of_the_table():
+    """Ending, second order, space and libraries of each row in the how-to."""
+    page = (WRITTEN.parents[2] / "docs/howto/mesh.md").read_text()
+    rows = (line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| `."))
+    return {row[0].strip("`."): (row[3], row[4], row[5].lower().split(",")) for row in rows}
+
+
+@pytest.mark.parametrize("ending", rows_of_the_table())
+def test_every_row_of_the_table_has_its_files(ending):
+    second, space, libraries = rows_of_the_table()[ending]
+    names = [*READ, *NEED_VTK, *(f"gmsh_{kind}.su2" for kind in (*FIRST, *SECOND))]
+    found = [name for name in names if name.endswith(f".{ending}")]
+    assert second == ("yes" if any(kind in name for name in found for kind in SECOND) else "no")
+    assert space == ("yes" if any("hexahedron" in name for name in found) else "no")
+    writers = {name.split("_")[0] for name in found} or {"gmsh"}  # whose file is refused
+    assert writers == {one.strip().split("_")[0].replace("fenicsx", "dolfinx") for one in libraries}
 
 
 def test_numbers_of_exodus_blocks_are_those_of_the_file_and_not_places(tmp_path):
@@ -186,7 +206,7 @@ def test_documents_that_declare_something_are_refused(head, tmp_path):
         refuses("a document type, or no UTF-8", read, tmp_path / "mesh.xdmf")
 
 
-@pytest.mark.parametrize("name", ["pyvista_quad9.vtk", "pyvista_quad9_ascii.vtk", "pyvista_quad9_lz4.vtu"])
+@pytest.mark.parametrize("name", NEED_VTK)
 def test_without_vtk_what_it_alone_reads_is_refused_with_what_to_do(name, monkeypatch):
     """Version 5.1 of .vtk, in which a bool array may be a colour that meshio passes over."""
     for module in ("vtkmodules", "vtkmodules.vtkCommonCore"):
@@ -195,8 +215,7 @@ def test_without_vtk_what_it_alone_reads_is_refused_with_what_to_do(name, monkey
 
 
 @pytest.mark.vtk
-@pytest.mark.parametrize("name", [f"pyvista_{kind}{ending}" for kind in ("quad9", "hexahedron")
-                                  for ending in (".vtk", "_ascii.vtk", "_lz4.vtu")])  # fmt: skip
+@pytest.mark.parametrize("name", NEED_VTK)
 def test_with_vtk_it_is_read(name, capfd):
     is_the_body(WRITTEN / name, {"skin": 1, "tissue": 2})
     assert capfd.readouterr() == ("", "")
