@@ -27,8 +27,8 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio", "netCDF4", "h5py", "vtkmodules"},
-        "hexahedron mesh archive faces solids quality groups formats.deck formats.abaqus formats.exodus "
-        "formats.gmsh formats.med formats.medit formats.nastran formats.su2 formats.vtk formats.xdmf file",
+        "hexahedron mesh archive faces solids quality groups places formats.deck formats.abaqus formats.exodus "
+        "formats.gmsh formats.med formats.medit formats.nastran formats.su2 formats.vtk formats.xdmf file memory",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},

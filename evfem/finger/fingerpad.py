@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import check_fields, instance, one_of, set_frozen, truth
+from evfem.common.checks import check_fields, one_of, set_frozen, truth
 from evfem.common.views import short
 from evfem.errors import ABSENT, InputError, Mistakes, quoted, unknown
 from evfem.finger.layers import NAIL, thickness_of
@@ -43,8 +43,8 @@ from evfem.finger.sizes import (
     pressure_error,
 )
 from evfem.mesh import file as meshfile
+from evfem.mesh import memory, places
 from evfem.mesh.mesh import Mesh, raised
-from evfem.mesh.quality import check
 from evfem.tissue.ogden import BulkRelaxes
 
 #: The smallest and the largest ratio of height and width.
@@ -73,19 +73,34 @@ def _ridges(key: str, value: Any) -> Any:
 
 RIDGES = {"allowed": "true | false", "type": bool, "check": _ridges}
 _SCAN = str | dict[str, list[float]]
-_MESH = instance("the path of a mesh file", str, os.PathLike, Mesh)
+
+
+def _mesh(key: str, value: Any) -> Any:
+    if not isinstance(value, str | os.PathLike) and not memory.is_mesh(value):
+        raise InputError(key, quoted(value), memory.ALLOWED)
+    return value
+
+
+_MESH = {"allowed": "the path of a mesh file", "check": _mesh}
 _MESH |= {"key": "mesh", "type": str, "file": meshfile.LARGEST}
-_REGIONS: dict[str, Any] = {"allowed": 'a table name = number, or name = "group of the file"'}
 
 
-def _regions(key: str, problem: Mapping[str, Any]) -> Mapping[str, Any]:
-    for region in problem.values():
-        if isinstance(region, bool) or not isinstance(region, Integral | str):
-            raise InputError(key, quoted(region), _REGIONS["allowed"])
-    return problem
+def _named(what: str, place: str) -> dict[str, Any]:
+    """Rule of names that a file has otherwise: a number, a group, or a place."""
+    allowed = f'a table name = number, name = "{what} of the file", or a place: {place}'
+
+    def check(key: str, names: Any) -> Mapping[str, Any]:
+        if not isinstance(names, Mapping):
+            raise InputError(key, quoted(names), allowed)
+        for one in names.values():
+            if isinstance(one, bool) or not isinstance(one, Integral | str | Mapping):
+                raise InputError(key, quoted(one), allowed)
+        return names
+
+    return {"allowed": allowed, "check": check}
 
 
-_REGIONS["check"] = _regions
+Named = Mapping[str, int | str | Mapping[str, Any]] | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -251,23 +266,24 @@ def _check_scan(ridges: ScannedRidges, slope: float, spacing: float) -> None:
 
 @dataclass(frozen=True)
 class MeshedFinger:
-    """A finger on a mesh of the user's own: a file or a `Mesh`, with the `regions`
-    and `boundaries` of `meshfile.read`.
+    """A finger on a mesh of the user's own: a file, a `Mesh`, a `meshio.Mesh`, a grid of PyVista, or the
+    module `gmsh` with its current model; with the `regions` and `boundaries` of `meshfile.read`.
 
-    The mesh is read and checked at once: raises `InputError` when it is faulty or does not fit the materials.
+    A mesh in memory is kept as a `Mesh` with these names. It is read and checked at once: raises `InputError`
+    when it is faulty or does not fit the materials.
     """
 
-    source: Annotated[str | os.PathLike[str] | Mesh, _MESH, "a mesh of your own, in mm"]
+    source: Annotated[Any, _MESH, "a mesh of your own, in mm"]
     materials: Annotated[Materials, "the law of each region"]
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0
     regions: Annotated[
-        Mapping[str, int | str] | None,
-        _REGIONS,
-        "names of the numbers in the cell data `region`, or of groups",
+        Named,
+        _named("group", f"{places.REST}, or {places.BOX}"),
+        "what the file has by number, or without a name",
     ] = None
     boundaries: Annotated[
-        Mapping[str, int | str] | None, _REGIONS, "names of sets that the file calls otherwise"
+        Named, _named("set", places.PLACES), "sets that the file calls otherwise, or has not"
     ] = None
     relaxation: Relaxation = ()
     bulk_relaxation: BulkRelaxes = False
@@ -275,8 +291,11 @@ class MeshedFinger:
     def __post_init__(self) -> None:
         check_fields(self, "finger.")
         set_frozen(self, materials=dict(self.materials))
-        if not isinstance(self.source, Mesh):
+        if isinstance(self.source, str | os.PathLike):
             set_frozen(self, source=Path(self.source))
+        else:
+            own = memory.mesh_of(self.source, self.regions, self.boundaries)
+            set_frozen(self, source=own, regions=None, boundaries=None)
         names = self._own.region_names
         for name in names:
             if name not in self.materials:
@@ -299,6 +318,4 @@ class MeshedFinger:
     @cached_property
     def _own(self) -> Mesh:
         source = self.source
-        if isinstance(source, Mesh):
-            return check(source)
-        return meshfile.read(source, self.regions, self.boundaries)
+        return source if isinstance(source, Mesh) else meshfile.read(source, self.regions, self.boundaries)

@@ -19,19 +19,20 @@ import os
 import re
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from evfem.common.arrays import Ints
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
+from evfem.mesh import places
 from evfem.mesh.groups import (
     PHYSICAL,
     PREFIX,
-    Name,
     body_of,
     dimension_of,
     groups_in,
@@ -40,7 +41,7 @@ from evfem.mesh.groups import (
     unused_in,
 )
 from evfem.mesh.mesh import KINDS, Mesh
-from evfem.mesh.quality import check
+from evfem.mesh.quality import named, sound
 
 if TYPE_CHECKING:
     import meshio
@@ -78,19 +79,25 @@ LACKING: Mapping[str, str] = {
 
 def read(
     path: str | os.PathLike[str],
-    regions: Mapping[str, Name] | None = None,
-    boundaries: Mapping[str, Name] | None = None,
+    regions: Mapping[str, Any] | None = None,
+    boundaries: Mapping[str, Any] | None = None,
 ) -> Mesh:
     """The checked mesh, in mm, of a file of at most 128 MB that meshio reads: `.vtu`, `.msh` and
     others.
 
-    `regions` maps a name to the name or number of a group of cells in the file; it is not needed where
-    each cell is in one group with a name. `boundaries` does it for sets of nodes. Nodes keep the
+    `regions` maps a name to the name or number of a group of cells in the file, or to a place; it is not
+    needed where each cell is in one group with a name. `boundaries` does it for sets of nodes. Nodes keep the
     numbers of the file, cells are turned counter-clockwise. Raises `InputError` naming `finger.mesh`,
     `finger.regions` or `finger.boundaries` for everything that cannot be a finger.
     """
     path = Path(path)
-    raw = _read(path)
+    return finger_of(path, _read(path), regions, boundaries)
+
+
+def finger_of(
+    path: Path, raw: meshio.Mesh, regions: Mapping[str, Any] | None, boundaries: Mapping[str, Any] | None
+) -> Mesh:
+    """The checked mesh of what was read of a file or is in memory; messages call it `path.name`."""
     body = body_of(raw)
     solid = [k for k, one in enumerate(raw.cells) if dimension_of(one.type, body) >= body and len(one)]
     kind = _one_kind(path, [raw.cells[k].type for k in solid])
@@ -99,13 +106,15 @@ def read(
         groups = groups_in(raw)
     except ValueError as error:
         raise InputError("finger.mesh", f"{path.name} with {error}", "one integer per cell") from None
-    region, region_names = regions_in(
-        path, groups, {k: len(raw.cells[k]) for k in solid}, regions, raw.cell_data
-    )
-    sets = sets_in(path, raw, [one for one in groups if one.block not in solid], boundaries)
     points = raw.points.astype(float) if body == 3 else _plane(path, raw.points)
-    mesh = Mesh(points, cells, kind, region, region_names, sets)
-    return check(mesh, path.name, unused_in(raw, groups, sets))
+    mesh = Mesh(points, cells, kind, np.zeros(len(cells), np.int64), {})
+    sizes = {k: len(raw.cells[k]) for k in solid}
+    groups, regions = places.with_regions(groups, sizes, regions or {}, mesh)
+    region, region_names = regions_in(path, groups, sizes, regions, raw.cell_data)
+    mesh = sound(replace(mesh, region=region, region_names=region_names), path.name)
+    below = [one for one in groups if one.block not in solid]
+    sets = sets_in(path, raw, below, boundaries, functools.partial(places.nodes_at, mesh))
+    return named(replace(mesh, node_sets=sets), path.name, unused_in(raw, groups, sets))
 
 
 def _read(path: Path) -> meshio.Mesh:
@@ -118,6 +127,11 @@ def _read(path: Path) -> meshio.Mesh:
         raise InputError("finger.mesh", f"{path.name} ({error})", allowed) from error
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
+    return without_pixels(raw)
+
+
+def without_pixels(raw: meshio.Mesh) -> meshio.Mesh:
+    """The same mesh, the cells of an image as quads and hexahedra."""
     for block in raw.cells:
         if block.type in PIXELS:
             block.type, order = PIXELS[block.type]
@@ -153,14 +167,7 @@ def parts(path: Path) -> meshio.Mesh:
             warnings.simplefilter("error", RuntimeWarning)  # numbers out of range
             known = import_module(f"evfem.mesh.formats.{FORMATS[ending]}") if ending in FORMATS else meshio
             raw = known.read(path)
-        if raw.points.ndim != 2 or raw.points.shape[1] not in (2, 3):
-            raise ValueError("no points in the plane or in space")
-        for block in raw.cells:
-            if len(block) and not 0 <= np.min(block.data) <= np.max(block.data) < len(raw.points):
-                raise ValueError("cells of nodes that do not exist")
-        for nodes in raw.point_sets.values():
-            if len(nodes) and not 0 <= np.min(nodes) <= np.max(nodes) < len(raw.points):
-                raise ValueError("sets of nodes that do not exist")
+        check_numbers(raw)
     except (Exception, SystemExit) as error:  # its readers raise anything, and leave where the file is wrong
         raise ValueError(_reason(error, said.getvalue(), path)) from error
     return raw
@@ -171,6 +178,18 @@ def _guard(content: bytes) -> None:
     declared = b"<!ENTITY" in content or b"<!DOCTYPE" in DOCTYPE.sub(b"", content, count=1)
     if declared or content.startswith((b"\xff\xfe", b"\xfe\xff", b"<\0", b"\0<")):
         raise ValueError("a document type, or no UTF-8 text")
+
+
+def check_numbers(raw: meshio.Mesh) -> None:
+    """Raise ValueError for points of another dimension, and for cells and sets of nodes that do not exist."""
+    if raw.points.ndim != 2 or raw.points.shape[1] not in (2, 3):
+        raise ValueError("no points in the plane or in space")
+    for block in raw.cells:
+        if len(block) and not 0 <= np.min(block.data) <= np.max(block.data) < len(raw.points):
+            raise ValueError("cells of nodes that do not exist")
+    for nodes in raw.point_sets.values():
+        if len(nodes) and not 0 <= np.min(nodes) <= np.max(nodes) < len(raw.points):
+            raise ValueError("sets of nodes that do not exist")
 
 
 def _reason(error: BaseException, said: str, path: Path) -> str:

@@ -7,7 +7,7 @@ mesh; others have numbers in cell data, and sets in point data.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -62,9 +62,12 @@ def groups_in(raw: meshio.Mesh) -> list[Group]:
     named = [(key.removeprefix(PREFIX), np.ravel(number)) for key, number in raw.field_data.items()
              if key.startswith(PREFIX) and np.size(number) and np.isfinite(number).all()]  # fmt: skip
     names = {(dimension, int(number[0])): name for name, number in named for dimension in (2, 3)}
+    if PHYSICAL in raw.cell_data:  # of a meshio.Mesh in memory: name -> number, dimension
+        own = {key: number for key, number in raw.field_data.items() if np.size(number) == 2}
+        names = {(int(number[1]), int(number[0])): key for key, number in own.items()} | names
     return numbered(raw, names) or [
         Group(name, i, k, np.asarray(cells))
-        for i, name in enumerate(raw.cell_sets, 1)
+        for i, name in enumerate([one for one in raw.cell_sets if not one.startswith("gmsh:")], 1)
         for k, cells in enumerate(raw.cell_sets[name])
         if cells is not None and len(cells) and np.max(cells) < len(raw.cells[k])
     ]
@@ -101,7 +104,10 @@ def regions_in(
     start = dict(zip(sizes, np.cumsum([0, *sizes.values()]), strict=False))
     solid = [one for one in groups if one.block in start]
     if not solid:
-        allowed = "integer cell data `region`, or groups of cells with names (.msh, .inp, .med, .exo)"
+        allowed = (
+            "integer cell data `region`, groups of cells with names (.msh, .inp, .med, .exo), or a place "
+        )
+        allowed += 'in [finger.regions], as tissue = "rest" for the whole mesh'
         have = f" (its cell data: {', '.join(others)})" if others else ""
         raise InputError("finger.mesh", f"{path.name} without region numbers{have}", allowed)
     if not regions:
@@ -133,9 +139,15 @@ def regions_in(
 
 
 def sets_in(
-    path: Path, raw: meshio.Mesh, groups: list[Group], boundaries: Mapping[str, Name] | None
+    path: Path,
+    raw: meshio.Mesh,
+    groups: list[Group],
+    boundaries: Mapping[str, Any] | None,
+    at: Callable[[str, Any, str], Ints],
 ) -> dict[str, Ints]:
-    """Sets of nodes: those of groups below the body's dimension, of the file, and of its point data."""
+    """Sets of nodes: those of groups below the body's dimension, of the file, and of its point data;
+    what `boundaries` calls neither is looked for `at` a place.
+    """
     sets: dict[Name, Ints] = {}
 
     def add(name: Name, nodes: Any) -> None:
@@ -149,10 +161,8 @@ def sets_in(
     sets.update(_point_sets(path, raw))
     named = {name: nodes for name, nodes in sets.items() if isinstance(name, str)}
     for name, key in (boundaries or {}).items():
-        if key not in sets:
-            allowed = f"sets of {path.name}: {', '.join(map(str, sets)) or 'none'}"
-            raise InputError("finger.boundaries", f"{name} = {key}", allowed)
-        named[name] = sets[key]
+        known = f"sets of {path.name}: {', '.join(map(str, sets)) or 'none'}"
+        named[name] = sets[key] if isinstance(key, Name) and key in sets else at(name, key, known)
     return named
 
 

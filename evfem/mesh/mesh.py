@@ -192,6 +192,22 @@ def once(parts: Ints) -> tuple[Ints, Ints]:
     return ordered[order[new]], number.reshape(parts.shape[:2])
 
 
+def joined(rows: Ints) -> Ints:
+    """Which rows of numbers (K, m) hang together by numbers that they share: the first row of each one's
+    part, (K,).
+
+    >>> joined(np.array([[0, 1], [5, 6], [2, 1]])).tolist()
+    [0, 1, 0]
+    """
+    first, before = np.arange(len(rows)), None
+    while before is None or (first != before).any():
+        before, of_number = first, np.full(rows.max(initial=-1) + 1, len(rows))
+        np.minimum.at(of_number, rows, before[:, None])
+        first = of_number[rows].min(axis=1)
+        first = first[first]  # twice as far each time
+    return first
+
+
 def raised(mesh: Mesh) -> Mesh:
     """The quadratic mesh on the same cells: straight edges, new nodes halfway.
 

@@ -16,7 +16,7 @@ from evfem.errors import InputError
 from evfem.mesh import solids
 from evfem.mesh.faces import node_places, shape_functions
 from evfem.mesh.hexahedron import EDGES
-from evfem.mesh.mesh import CELLS, KINDS, Mesh, once
+from evfem.mesh.mesh import CELLS, KINDS, Mesh, joined, once
 from evfem.mesh.solids import Refuse, listed, some, turned
 
 #: Extent of a finger's outline in mm: other numbers mean other units.
@@ -34,13 +34,16 @@ def check(mesh: Mesh, source: str = "mesh", others: Sequence[str] = ()) -> Mesh:
     to the outline or surface.
 
     `source` names the mesh in messages, `others` what else its file has. Raises `InputError` (key
-    `finger.mesh`) for the first fault found: values, numbers of nodes, units, names, double and unused nodes,
-    orientation, connection, overlap.
+    `finger.mesh`) for the first fault found: those of the body (`sound`), then those of its names (`named`).
     """
+    return named(sound(mesh, source), source, others)
 
-    def refuse(fault: str, allowed: str) -> None:
-        raise InputError("finger.mesh", f"{source} with {fault}", allowed)
 
+def sound(mesh: Mesh, source: str) -> Mesh:
+    """The same mesh, its cells turned. Raises `InputError` for values, numbers of nodes, units, double and
+    unused nodes, shapes, connection, overlap.
+    """
+    refuse = _refusing(source)
     _arrays(mesh, refuse)
     _extent(mesh, refuse)
     _nodes(mesh, refuse)
@@ -49,8 +52,21 @@ def check(mesh: Mesh, source: str = "mesh", others: Sequence[str] = ()) -> Mesh:
     _shapes(mesh, refuse)
     _connection(mesh, refuse)
     surface(mesh, refuse)
+    return mesh
+
+
+def named(mesh: Mesh, source: str, others: Sequence[str] = ()) -> Mesh:
+    """The same mesh, its set `pad` reduced. Raises `InputError` for a lack of `pad` or `bone`."""
+    refuse = _refusing(source)
     _names(mesh, others, refuse)
     return solids.with_sets(mesh, refuse)
+
+
+def _refusing(source: str) -> Refuse:
+    def refuse(fault: str, allowed: str) -> None:
+        raise InputError("finger.mesh", f"{source} with {fault}", allowed)
+
+    return refuse
 
 
 def _arrays(mesh: Mesh, refuse: Refuse) -> None:
@@ -133,12 +149,7 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
         if any(len(np.unique(nodes)) != len(parts) for parts, nodes in middles):
             fault = f"neighbouring cells with different mid-nodes on {sharing}"
             refuse(fault, "one mid-node per edge" + (" and face" if mesh.dim == 3 else ""))
-    lowest, before = np.arange(len(of_cell)), None  # number of a cell joined to each
-    while before is None or (lowest != before).any():
-        before, of_side = lowest, np.full(len(sides), len(of_cell))
-        np.minimum.at(of_side, of_cell, before[:, None])
-        lowest = of_side[of_cell].min(axis=1)
-        lowest = lowest[lowest]  # twice as far each time
+    lowest = joined(of_cell)
     if lowest.any():
         refuse(f"{len(np.unique(lowest))} separate parts", f"one body, its cells joined by common {side}s")
 
@@ -222,7 +233,7 @@ def _names(mesh: Mesh, others: Sequence[str], refuse: Refuse) -> None:
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
             fault = f"no node in {name}" if name in mesh.node_sets else f"no boundary {name} (it has {have})"
-            refuse(fault, "sets of nodes `pad` and `bone`, or [finger.boundaries] with their names")
+            refuse(fault, "sets of nodes `pad` and `bone`, or [finger.boundaries] with their names or places")
 
 
 def scaled_jacobian(mesh: Mesh) -> Floats:
