@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from evfem.common.storage import format_of
+from evfem.common.tables import TABLES
 from evfem.errors import InputError
 
 Found = Any  # Result, FitResult, VoltageProfile, Sampled, Scene, Sweep, SweepResult, Mesh or Texture
 ALLOWED = (
-    "the folder of a run or a sweep, a result (.npz), a fit (.json), a signal (.csv, .wav, .hjif), a scene "
-    "or a sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
+    "the folder of a run or a sweep, a result (.npz), a fit (.json), a signal (.csv, .xlsx, .mat, .wav, "
+    ".hjif), a scene or a sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
 )
 #: format of the fast models that 0.2 saved
 FAST_MODEL = "evfem-reduced-1"
@@ -35,7 +36,7 @@ def load(path: str | Path) -> Found:
     SweepResult
         From the folder of a sweep, its `sweep.json`, or a csv file with its table.
     VoltageProfile, Sampled
-        From .csv, .wav or .hjif; `Sampled` from a .csv over time.
+        From .csv, .xlsx, .mat, .wav or .hjif; `Sampled` from a table over time.
     Scene, Sweep
         From .toml.
     Mesh
@@ -108,7 +109,7 @@ def _signal(path: Path) -> Found:
     try:
         return read_voltage(path)
     except InputError as error:
-        if path.suffix.lower() != ".csv" or "." in error.key:  # a unit
+        if path.suffix.lower() not in TABLES or "." in error.key:  # a unit
             raise
         allowed = "a voltage (position,voltage or time,voltage) or the table of a sweep; measurements: "
         allowed += "`ev.MeasuredCurve.from_csv`, heights: `ev.Profile.from_csv`, `evfem texture import`"
@@ -140,7 +141,7 @@ def _mesh(path: Path) -> Found:
 
 
 READERS: Mapping[str, Callable[[Path], Found]] = {
-    ".csv": _signal,
+    **dict.fromkeys(TABLES, _signal),
     ".json": _fit,
     ".wav": _signal,
     ".hjif": _signal,

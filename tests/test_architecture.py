@@ -22,13 +22,25 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed", "xarray", "pypardiso"},
-        "constants arrays rooms notices checks views pools digest storage units tables pictures",
+        {
+            "numpy",
+            "scipy",
+            "PIL",
+            "openpyxl",
+            "tqdm",
+            "threadpoolctl",
+            "pandas",
+            "distributed",
+            "xarray",
+            "pypardiso",
+        },
+        "constants arrays rooms notices checks views pools digest storage units foreign tables",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio", "netCDF4", "h5py", "vtkmodules"},
-        "hexahedron mesh archive faces solids quality groups places formats.deck formats.abaqus formats.exodus "
-        "formats.gmsh formats.med formats.medit formats.nastran formats.su2 formats.vtk formats.xdmf file memory",
+        "hexahedron mesh archive faces solids quality groups places formats.deck formats.abaqus "
+        "formats.exodus formats.gmsh formats.med formats.medit formats.nastran formats.su2 formats.vtk "
+        "formats.xdmf file memory",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
@@ -111,6 +123,7 @@ NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
 LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm"}
 LATE |= {"distributed", "pyarrow", "pandas", "xarray", "SurfaceTopography", "netCDF4", "h5py", "vtkmodules"}
+LATE |= {"openpyxl"}
 #: compiled from C, without imports
 BUILT = {f"evfem.tissue.kernels.{name}" for name in ("loops", "solids", "contact")}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450

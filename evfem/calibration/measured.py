@@ -314,7 +314,11 @@ def _without_units(table: Mapping[str, Any]) -> dict[str, Any]:
             bases = {unit_of(name), unit_of(name, "N"), UNITS.get(column), SPATIAL_UNITS.get(column)}
         if name != "sd" or unit is not None:
             size = factor(f"data.{name}", name, unit, bases)
-        found[name] = values if size == 1.0 else np.asarray(values) * size
+        if size != 1.0 and isinstance(values, list):
+            raise InputError(
+                f"data.{name}", f"{quoted(values)} in {unit or 'a unit'}", "a number in each row"
+            )
+        found[name] = values if size == 1.0 else values * size
     return found
 
 

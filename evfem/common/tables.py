@@ -17,8 +17,11 @@ import numpy as np
 
 from evfem.common import units
 from evfem.common.arrays import Floats
+from evfem.common.foreign import BOOKS, cells_of
 from evfem.errors import InputError, quoted, unknown
 
+#: endings of tables
+TABLES = (".csv", *BOOKS)
 #: most rows of a csv file, and most bytes of one
 MOST_ROWS, MOST_BYTES = 1_000_000, 200_000_000
 #: bytes that are read of a file to know its header
@@ -134,8 +137,11 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
 def csv_rows(path: Path, key: str, allowed: str) -> list[list[str]]:
     """The lines of a csv file, the names first, then as many values in each; InputError for others."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as lines:
-            names, *body = [row for row in csv.reader(lines, strict=True) if row] or [[]]
+        if path.suffix.lower() in BOOKS:
+            names, *body = cells_of(path, key, allowed)
+        else:
+            with path.open(newline="", encoding="utf-8-sig") as lines:
+                names, *body = [row for row in csv.reader(lines, strict=True) if row] or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(key, f"{path.name} ({reason})", allowed) from None
@@ -208,24 +214,28 @@ class Headed:
 
 
 def read_columns(path: Path, header: Mapping[str, str], key: str) -> list[Floats]:
-    """Columns of a text with exactly the names `header`, which has their units, and a number everywhere."""
+    """Columns of a text with exactly the names `header`, which has their units, and a number everywhere; of a
+    file of MATLAB, whose variables have no order, those among others.
+    """
     allowed = f"a readable csv file with the header {','.join(header)}"
     if path.suffix == ".json":
         allowed += f"; the rows of a texture stand in {path.stem}.csv"
     table = read_headed(path, key, allowed, gaps=False)
-    if table.names != [*header]:
+    loose = path.suffix.lower() == ".mat" and {*header} <= {*table.names}
+    if table.names != [*header] and not loose:
         told = ",".join(name if unit == "1" else f"{name} [{unit}]" for name, unit in header.items())
         raise InputError(key, f"{path.name}, which {table.start}", f"{allowed}, or {told}")
     return [table.column(f"{key}.{name}", name, (unit,)) for name, unit in header.items()]
 
 
 def read_headed(
-    path: Path, key: str, allowed: str = "a text file with columns of numbers below a header",
+    path: Path, key: str, allowed: str = "columns of numbers below a header, in a text file, .xlsx or .mat",
     gaps: bool = True,
 ) -> Headed:  # fmt: skip
-    """Columns of a text file as instruments write it: below a header, with commas, semicolons, tabs or
-    blanks between them, units beside the names or in a line of their own, UTF-8, Latin-1, or UTF-16 with
-    its mark. Without a header columns are called 1, 2, ...
+    """Columns of a text file (or a workbook, or a file of MATLAB: `evfem.common.foreign`) as instruments
+    write it: below a header, with commas, semicolons, tabs or blanks between them, units beside the names
+    or in a line of their own, UTF-8, Latin-1, or UTF-16 with its mark. Without a header columns are called
+    1, 2, ...
 
     The header is the last line above the numbers that has as many columns, with or without a # before
     it; other lines that begin with # or % are left out. Raises `InputError` with `key` for anything
@@ -256,7 +266,8 @@ def read_headed(
 def names_of(path: Path) -> list[str]:
     """Names of the columns of a text, by its first lines; none where it cannot be read."""
     with suppress(OSError, InputError), path.open("rb") as file:
-        start = _decoded(file.read(BEGINNING)) or ""
+        book = path.suffix.lower() in BOOKS
+        start = _text(path, "", "") if book else _decoded(file.read(BEGINNING)) or ""
         return [name for _, name, _ in _header(_lines(start))[1]]
     return []
 
@@ -300,6 +311,8 @@ def _holds_numbers(line: str) -> bool:
 
 
 def _text(path: Path, key: str, allowed: str) -> str:
+    if path.suffix.lower() in BOOKS:
+        return "\n".join("\t".join(row).replace('"', "") for row in cells_of(path, key, allowed))
     text = _decoded(read_bytes(path, key, allowed, MOST_BYTES, f"at most {MOST_BYTES // 10**6} MB"))
     if text is None:
         raise InputError(key, f"{path.name} (not a text file)", allowed)

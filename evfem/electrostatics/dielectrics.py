@@ -28,7 +28,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, Within, above, at_least, plain, real, set_frozen
-from evfem.common.tables import numbers, read_columns
+from evfem.common.tables import TABLES, numbers, read_columns
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import InputError, quoted
 
@@ -231,7 +231,7 @@ def dielectric(skin: Any) -> Any:
     """
     if isinstance(skin, str) and skin in SKINS:
         return SKINS[skin]
-    if isinstance(skin, Path) or (isinstance(skin, str) and skin.lower().endswith(".csv")):
+    if isinstance(skin, Path) or (isinstance(skin, str) and skin.lower().endswith(TABLES)):
         return DielectricTable.from_csv(skin)
     if isinstance(skin, str):
         allowed = " | ".join([*SKINS, "a file .csv with the header " + ",".join(HEADER)])

@@ -27,8 +27,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
-from evfem.common.pictures import read_grey
-from evfem.common.tables import gridded, numbers, read_columns
+from evfem.common.foreign import read_grey
+from evfem.common.tables import TABLES, gridded, numbers, read_columns
 from evfem.errors import InputError
 from evfem.finger.outline import Ridges, quintic
 
@@ -138,7 +138,7 @@ def read(path: Path, pixel: float, height: float, dark: str | None = None) -> He
     it, "ridges" (ink, optical scanners) or "grooves" (a map of heights), which nothing in a picture
     does. Raises `InputError`.
     """
-    if path.suffix.lower() == ".csv":
+    if path.suffix.lower() in TABLES:
         return HeightMap(
             *gridded(
                 "finger.ridges",

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from evfem.common.checks import Within, among, instance, keys_of, number, one_of, yes_or_no
+from evfem.common.tables import TABLES
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
@@ -42,7 +43,7 @@ Table = Mapping[str, Any]
 Pairs = list[list[float]]
 _HEIGHTS = "the path of a csv file with the header x,height"
 _RELIEF = "the path of a csv file with the header x,z,height"
-_CSV = {"file": lambda name: name.lower().endswith(".csv")}
+_CSV = {"file": lambda name: name.lower().endswith(TABLES)}
 _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
 _VOLTAGE = number(f"{VOLTAGE['allowed']}, or a table with a kind: {' | '.join(FOUND)}", VOLTAGE["test"], "V")

@@ -19,8 +19,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, instance, number, one_of, real
-from evfem.common.pictures import read_grey
-from evfem.common.tables import is_even, names_of, read_headed
+from evfem.common.foreign import read_grey
+from evfem.common.tables import TABLES, is_even, names_of, read_headed
 from evfem.common.units import UNITS, factor
 from evfem.electrostatics import wav
 from evfem.errors import InputError, quoted
@@ -33,7 +33,7 @@ LENGTHS = {name: size for name, (base, size) in UNITS.items() if base == "mm"}
 #: units of columns that are no lengths
 PURE = {"friction": ("1",), "frequency": ("1/mm", "1"), "amplitude": ("1",)}
 #: endings of texts that may have a header
-TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".xyz")
+TEXTS = (*TABLES, ".txt", ".tsv", ".dat", ".asc", ".prn", ".xyz")
 #: what is recorded -> how often it is integrated, and how that is said
 RECORDED = {"acceleration": 2, "velocity": 1, "displacement": 0, "height": 0, "friction": 0}
 INTEGRATED = ("", ", integrated once", ", integrated twice")
@@ -63,7 +63,7 @@ class Image(Heights, kind="image"):
     """A line through a grey image, along its width: white lies `depth` above black.
 
     Pictures of 8 and 16 bits, and those of floats and longer integers, whose smallest and largest value are
-    then black and white (`evfem.common.pictures`); colours are turned to grey, transparent points are gaps.
+    then black and white (`evfem.common.foreign`); colours are turned to grey, transparent points are gaps.
     How deep something is cannot be read off a picture, and the provenance says that `depth` was set.
     """
 
@@ -100,7 +100,7 @@ class Table(Heights, kind="csv"):
     row: Row = 0.5
     unit: Unit = None
 
-    endings = (".csv",)
+    endings = TABLES
 
     @classmethod
     def takes(cls, path: Path) -> bool:

@@ -239,6 +239,9 @@ def test_keys_and_outputs_of_a_file_have_units(tmp_path):
         MeasuredValues.from_csv,
         tmp_path / "hover.csv",
     )
+    (tmp_path / "hover.csv").write_text("motion.0.gap [um],electrostatic_force.last\n250,2\n,3\n")
+    gap = "data.motion.0.gap: given .* in um; allowed: a number in each row"
+    refuses(gap, MeasuredValues.from_csv, tmp_path / "hover.csv")
 
 
 def test_values_from_a_file(tmp_path):
