@@ -209,7 +209,7 @@ def _texture_options(texture: argparse.ArgumentParser) -> None:
 def _texture_argument(command: argparse.ArgumentParser) -> None:
     from evfem.textures.library import names
 
-    said = "a reference texture, a .json or a folder"
+    said = "a reference texture, a .json, a folder, or a recording (of --speed)"
     _path(command, "name", "NAME", type=str, choices=Known(names()), help=said)
 
 
@@ -253,10 +253,10 @@ def _fields(command: argparse.ArgumentParser, *classes: type, **renamed: str) ->
 
 def _touch_options(command: argparse.ArgumentParser) -> None:
     from evfem.estimate.display import Device
-    from evfem.estimate.touch import Touch
+    from evfem.estimate.touch import Touch, Vibration
 
     _texture_argument(command)
-    _fields(command, Touch)
+    _fields(command, Touch, Vibration)
     _path(command, "--out", "FILE", help="csv file for the friction curve")
     _path(command, "--signal", "FILE", help="output file of the voltage; the suffix sets the format")
     _fields(command, Device, friction="display")

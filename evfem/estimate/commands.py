@@ -12,14 +12,14 @@ from evfem.common.checks import keys_of
 from evfem.common.notices import status, tell
 from evfem.common.storage import write_text
 from evfem.electrostatics.signalfile import write_signal
-from evfem.errors import InputError, quoted
+from evfem.errors import ABSENT, InputError, quoted
 from evfem.estimate.display import LOST, Device, Rendering, exact_voltage, playback, render, render_exact
 from evfem.estimate.estimate import estimate, known_error
 from evfem.estimate.rendering import record
-from evfem.estimate.touch import FrictionCurve, Touch, friction_of, touch_scene
+from evfem.estimate.touch import FrictionCurve, Touch, Vibration, friction_of, touch_scene
 from evfem.scene.keys import at, read
 from evfem.textures.generate import Knobs, make
-from evfem.textures.importers import IMPORTERS, importer_of
+from evfem.textures.importers import IMPORTERS, Recording, importer_of
 from evfem.textures.library import REFERENCES, about, find, names, reference
 from evfem.textures.texture import Texture, is_data, write
 
@@ -82,8 +82,21 @@ def _felt(args: argparse.Namespace) -> tuple[Touch, Device]:
     return Touch(**_passed(args, Touch)), Device(**_passed(args, Device, friction="display"))
 
 
+def _texture(args: argparse.Namespace, touch: Touch) -> Texture:
+    """The texture to slide over: of a name or a path, or the recording of a slide as fast as this one."""
+    vibration, path = Vibration(**_passed(args, Vibration)), Path(args.name)
+    flags = {key.name: f"--{key.name.replace('_', '-')}" for key in keys_of(Vibration)}
+    with at("", flags):
+        if not (path.is_file() and Recording.takes(path)):
+            return vibration.friction_of(find(args.name), touch)
+        if args.speed is None:
+            raise InputError("--speed", ABSENT, f"the speed in mm/s at which {path.name} was recorded")
+        return vibration.friction_of(vibration.recorded(path, touch.speed), touch)
+
+
 def _simulate(args: argparse.Namespace) -> int:
-    texture, (touch, device) = find(args.name), _felt(args)
+    touch, device = _felt(args)
+    texture = _texture(args, touch)
     _check_outputs(args)
     with status(f"sliding over {texture.name}"):
         reference = record(touch_scene(texture, touch))
@@ -98,7 +111,7 @@ def _simulate(args: argparse.Namespace) -> int:
 def _estimate(args: argparse.Namespace) -> int:
     touch, device = _felt(args)
     _check_outputs(args)
-    found = estimate(find(args.name), touch)
+    found = estimate(_texture(args, touch), touch)
     _curve(found.curve, args.out)
     if args.name in REFERENCES:
         finger = "ridged" if touch.ridged else "smooth"

@@ -8,18 +8,21 @@ rigid surface; a friction profile lies on a flat one.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Checked, between, yes_or_no
+from evfem.common.checks import SEED, Checked, Within, between, keys_of, number, yes_or_no
 from evfem.common.tables import csv_text
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError
 from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, sliding
+from evfem.scene.keys import at
 from evfem.scene.scene import Output, Scene
 from evfem.simulation.result import Result
 from evfem.surface.surfaces import Flat, Profile
+from evfem.textures.importers import Channel, Longest, Quantity, Recording, friction_profile
 from evfem.textures.texture import Texture
 
 #: steps per mm, largest number of steps of a slide and of rows of a friction table, mm beside the finger
@@ -40,6 +43,58 @@ class Touch(Checked):
     load: Annotated[float, between(0.001, 1.0, "N/mm"), "on the finger"] = 0.05
     speed: Annotated[float, between(0.1, 1000.0, "mm/s"), "of the slide"] = SPEED
     length: Annotated[float, between(0.5, 50.0, "mm"), "of the slide"] = 8.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vibration(Checked):
+    """What a spectrum of friction does not say, and a recording of one: size, phases, meaning.
+
+    >>> felt = Texture("felt", "recorded", [0.5, 1.0], [0.8, 0.6], "CC0-1.0", "friction_spectrum")
+    >>> Vibration(friction_mean=0.4, friction_rms=0.03).friction_of(felt, Touch(length=4.0)).length
+    24.0
+    >>> Vibration(friction_mean=0.4).friction_of(felt, Touch())
+    Traceback (most recent call last):
+    evfem.errors.InputError: friction_rms: missing; allowed: a number from 0 to the mean: felt is a spectrum \
+without a size
+    """
+
+    friction_mean: Annotated[
+        float | None, number("a friction coefficient from 0 to 10", Within(0.0, 10.0)), "of a spectrum"
+    ] = None
+    friction_rms: Annotated[
+        float | None, number("a number from 0 to the mean", Within(0.0, 10.0)), "of a spectrum"
+    ] = None
+    seed: Annotated[int, SEED, "of a spectrum's phases"] = 0
+    quantity: Quantity = None
+    longest: Longest = 10.0
+    channel: Channel = None
+
+    def recorded(self, path: Path, speed: float) -> Texture:
+        """The spectrum of a recording of a slide at that speed (mm/s)."""
+        return Recording(
+            licence="none given",
+            speed=speed,
+            quantity=self.quantity,
+            longest=self.longest,
+            channel=self.channel,
+        )(path)
+
+    def friction_of(self, texture: Texture, touch: Touch) -> Texture:
+        """The texture, or friction below the whole slide where it is a spectrum. Raises InputError for a
+        spectrum without a size, and for a size of what has one.
+        """
+        sizes = {"friction_mean": self.friction_mean, "friction_rms": self.friction_rms}
+        spectrum = texture.quantity == "friction_spectrum"
+        for key in keys_of(Vibration):
+            if key.name in sizes and (sizes[key.name] is None) is spectrum:
+                given = ABSENT if spectrum else f"{sizes[key.name]:g} beside {texture.name}, no spectrum"
+                about = f"{key.allowed}: {texture.name} is a spectrum without a size"
+                raise InputError(key.name, given, about if spectrum else "nothing here")
+        if self.friction_mean is None or self.friction_rms is None:
+            return texture
+        length = touch.length + 2.0 * BESIDE
+        with at("", {"rms": "friction_rms"}):
+            return friction_profile(texture, self.friction_mean, self.friction_rms, length, self.seed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,6 +46,11 @@ MOST_PIXELS, MOST_BYTES, MOST_POINTS = 40_000_000, 512_000_000, 50_000_000
 Unit = Annotated[str | None, one_of(*LENGTHS), "of lengths for which the file names none; default: mm"]
 _ROW = number("a place from 0 to 1", Within(0.0, 1.0))
 Row = Annotated[float, _ROW, "which line, from the first to the last"]
+Quantity = Annotated[str | None, one_of(*RECORDED), "what a recording holds"]
+Longest = Annotated[float, number("a wavelength above zero", POSITIVE, "mm"), "longest wave of a recording"]
+Channel = Annotated[
+    int | str | None, instance("a number or a name", int, str), "of a WAV, from 1; or a column"
+]
 
 
 def importer_of(path: Path) -> tuple[str, type[Importer]]:
@@ -251,13 +256,9 @@ class Recording(Importer, kind="recording"):
     """
 
     speed: Annotated[float, number("a speed above zero", POSITIVE, "mm/s"), "of the recorded slide"]
-    quantity: Annotated[str | None, one_of(*RECORDED), "what a recording holds"] = None
-    longest: Annotated[
-        float, number("a wavelength above zero", POSITIVE, "mm"), "longest wave of a recording"
-    ] = 10.0
-    channel: Annotated[
-        int | str | None, instance("a number or a name", int, str), "of a WAV, from 1; or a column"
-    ] = None
+    quantity: Quantity = None
+    longest: Longest = 10.0
+    channel: Channel = None
 
     endings = (".wav",)
 

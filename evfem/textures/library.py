@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.errors import quoted, unknown
+from evfem.errors import InputError, quoted, unknown
 from evfem.textures.generate import FREE, Knobs, make
 from evfem.textures.texture import Texture, read
 
@@ -60,7 +60,7 @@ def reference(name: Any) -> Texture:
     Texture('wave-2mm', sinusoids, 256 heights, period 16 mm, 0.06 mm from lowest to highest)
     """
     if not isinstance(name, str) or name not in names():
-        raise unknown("texture", str(name), [*names(), "a .json or folder"], str(quoted(name)))
+        raise unknown("texture", str(name), [*names(), "a .json or folder, a recording"], str(quoted(name)))
     if name in REFERENCES:
         _, kind, knobs = REFERENCES[name]
         return make(kind, knobs, name)
@@ -74,4 +74,7 @@ def find(name: str | Path) -> Texture:
     path = Path(name)
     if str(name) not in names() and (path.suffix == ".json" or path.is_dir()):
         return read(path)
+    if path.is_file() and str(name) not in names():
+        allowed = "`evfem texture import` makes a texture of it; or a recording, with --speed"
+        raise InputError("texture", path.name, allowed)
     return reference(str(name))

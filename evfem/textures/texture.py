@@ -106,7 +106,10 @@ class Texture:
     def over(self, start: float, stop: float) -> tuple[Floats, Floats]:
         """Rows from `start` to `stop` (mm) or beyond them, periods repeated, without one mirrored."""
         if self.quantity == "friction_spectrum":
-            raise InputError("texture", f"{self.name}, a spectrum", "heights or friction over x")
+            allowed = (
+                "heights or friction over x; `friction_profile`, or --friction-mean and --friction-rms, "
+            )
+            raise InputError("texture", f"{self.name}, a spectrum", f"{allowed}make some of a spectrum")
         x, values, period = self._repeated()
         first = int(np.floor((start - x[0]) / period))
         last = int(np.floor((stop - x[0]) / period)) + 1
@@ -146,8 +149,8 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
         path = path / NAME
     data = path.with_suffix(".csv")
     if data.exists() and not is_data(data):
-        problem = f"{path}, and {data} is there and no texture's"
-        raise InputError("path", problem, "a name whose .csv is free, or a texture to replace")
+        problem = f"{path}, whose rows would replace {data.name}, which is no texture's"
+        raise InputError("path", problem, f"another name, as {path.stem}-texture.json")
     header, units = QUANTITIES[texture.quantity]
     rows = zip(texture.x.tolist(), texture.values.tolist(), strict=True)
     write_text(data, csv_text([header, *rows]))

@@ -1,6 +1,7 @@
 """`evfem texture`: files in and out, one sentence for a mistake, and nothing written then."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -62,6 +63,63 @@ def test_a_recording_is_imported_with_what_it_holds(capsys):
     assert "- Waves of up to 4 mm." in capsys.readouterr().out
     assert read("hum").x[0] == pytest.approx(0.25, abs=0.03)
     assert run(*words, "--quantity", "velocity", "--channel", "1", "--longest", "0") == 2
+
+
+def friction_in(path):
+    return np.loadtxt(path, delimiter=",", skiprows=1).T
+
+
+def test_a_recording_becomes_a_signal_in_one_command(tmp_path, capsys):
+    """The same numbers as by import; waves of 20 mm/s / 40 Hz, whose friction under the finger is theirs."""
+    time = np.arange(8000) / 2000.0
+    np.savetxt("rec.csv", np.column_stack([time, np.sin(80.0 * np.pi * time)]), delimiter=",",
+               header="time,friction", comments="")  # fmt: skip
+    size = ("--friction-mean", "0.4", "--friction-rms", "0.05", "--load", "0.02")
+    whole = ("rec.csv", *size, "--speed", "20", "--length", "4")
+    assert run("import", "rec.csv", "--licence", "CC0-1.0", "--speed", "20", "--out", "rec.json") == 2
+    assert "would replace rec.csv, which is no texture's; allowed: another name, as rec-texture.json" in (
+        capsys.readouterr().err
+    )
+    words = ("import", "rec.csv", "--licence", "CC0-1.0", "--speed", "20", "--out", "rec-texture.json")
+    assert run(*words) == 0
+    for command in ("estimate", "simulate"):
+        assert run(command, *whole, "--out", f"{command}.csv", "--signal", f"{command}.wav") == 0
+        assert run(command, "rec-texture.json", *whole[1:], "--out", "other.csv") == 0
+        assert (tmp_path / "other.csv").read_text() == (tmp_path / f"{command}.csv").read_text()
+        x, friction = friction_in(f"{command}.csv")
+        assert np.mean(friction) == pytest.approx(0.4, rel=0.02)
+        turns = np.flatnonzero(np.diff(np.sign(friction - np.mean(friction))))
+        assert np.ptp(x[turns]) / (len(turns) - 1) == pytest.approx(0.25, rel=0.1)  # half a wave
+    assert np.std(friction) < 0.05  # averaged over the contact
+    assert run("estimate", *whole, "--seed", "1", "--out", "other.csv") == 0
+    assert not np.allclose(friction_in("other.csv")[1], friction_in("estimate.csv")[1], atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["rec.csv", "--friction-mean", "0.4"], "--speed: missing; allowed: the speed in mm/s at which rec"),
+        (["rec.csv", "--speed", "20"], "--friction-mean: missing; .*rec is a spectrum without a size"),
+        (
+            ["rec.csv", "--speed", "20", "--friction-mean", "0.4"],
+            "--friction-rms: missing; .*to the mean: rec",
+        ),
+        (
+            ["rec.csv", "--speed", "20", "--friction-mean", "0.4", "--friction-rms", "0.5"],
+            "--friction-rms: given 0.5; allowed: a number from 0 to the mean",
+        ),
+        (["weave", "--friction-rms", "0.1"], "--friction-rms: given 0.1 beside weave, no spectrum"),
+        (["rec.txt"], "texture: given rec.txt; allowed: `evfem texture import` makes a texture of it"),
+    ],
+)
+def test_what_a_recording_does_not_say_is_asked_for(tmp_path, capsys, words, said):
+    time = np.arange(800) / 2000.0
+    rows = np.column_stack([time, np.sin(80.0 * np.pi * time)])
+    np.savetxt("rec.csv", rows, delimiter=",", header="time,friction", comments="")
+    (tmp_path / "rec.txt").write_text("x,height\n0,0\n1,0\n")
+    for command in ("simulate", "estimate"):
+        assert run(command, *words) == 2
+        assert re.search(said, capsys.readouterr().err)
 
 
 def test_a_licence_is_needed(capsys):

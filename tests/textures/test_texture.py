@@ -115,7 +115,8 @@ def test_a_reference_texture_that_does_not_exist_is_refused_with_a_guess():
 def test_a_measurement_of_the_same_name_is_not_replaced(tmp_path):
     mine = tmp_path / "wave.csv"
     mine.write_text("x,height\n0,1\n")
-    refuses(r"wave\.csv is there and no texture's", write, WAVE, tmp_path / "wave.json")
+    said = r"whose rows would replace wave\.csv, .*as wave-texture\.json"
+    refuses(said, write, WAVE, tmp_path / "wave.json")
     assert mine.read_text() == "x,height\n0,1\n"
     assert not (tmp_path / "wave.json").exists()
     mine.unlink()
