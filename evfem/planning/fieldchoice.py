@@ -9,7 +9,7 @@ import numpy as np
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.electrics import without_field
-from evfem.scene.scene import Scene
+from evfem.scene.scene import IN_SPACE, Scene
 from evfem.surface.pad import make_pad
 from evfem.terms.fullfield import Bounds, certificate, facing, in_line
 
@@ -29,7 +29,7 @@ def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
     """The choice for a scene whose `field` is not `local`, from the widest bounds at the ends of motions."""
     if mesh.dim == 3:
         if scene.field == "full":
-            raise InputError("electrostatics.field", "full with a solid", "local or auto: the plane has it")
+            raise InputError("electrostatics.field", "full with a solid", f"local or auto: {IN_SPACE}")
         return FieldChoice(False, "not solved for: only the column law is available in three dimensions")
     against = without_field(scene)
     if against is not None:

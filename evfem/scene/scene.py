@@ -244,6 +244,10 @@ class Scene:
         return digest(self)
 
 
+#: what no field knows of a finger in space
+IN_SPACE = "in space there is only one electrode that never ends, under a grounded finger"
+
+
 def _volts(voltage: object) -> str:
     return f"{voltage:g} V" if isinstance(voltage, float) else type(voltage).__name__
 
@@ -331,7 +335,8 @@ def _check_field(scene: Scene) -> None:
     ended = getattr(scene.surface, "electrodes", None) is not None
     if scene.field != "full" and (ended or not scene.grounded):
         given = f"{scene.field} with {'electrodes that end' if ended else 'a finger that is not grounded'}"
-        raise InputError("electrostatics.field", given, "full: the column law knows neither")
+        allowed = f"full, with a finger in the plane: the column law knows neither; {IN_SPACE}"
+        raise InputError("electrostatics.field", given, allowed)
     against = without_field(scene)
     if against is not None and scene.field == "full":
         raise InputError("electrostatics.field", f"full with {against[0]}", f"local, or {against[1]}")

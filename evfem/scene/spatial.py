@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
-from evfem.scene.scene import Scene
+from evfem.scene.scene import IN_SPACE, Scene
 from evfem.surface.skin import make_skin
 
 SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
@@ -46,7 +46,7 @@ def _beyond_space(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, str, str]]:
     if scene.solver.contact != "exact":
         yield "solver.contact", f"{scene.solver.contact} {SOLID}", "exact"
     if scene.law is not None and scene.field != "local":
-        yield "electrostatics.field", f"{scene.field} {SOLID}", "local"
+        yield "electrostatics.field", f"{scene.field} {SOLID}", f"local: {IN_SPACE}"
     if scene.depth is not None:
         yield "depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"
 

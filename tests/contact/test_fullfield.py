@@ -258,7 +258,11 @@ def test_a_floating_finger_on_two_electrodes_feels_a_quarter():
 
 def test_electrodes_that_end_need_the_full_field():
     options = {"law": ev.StrongTroxel(), "voltage": 10.0, "motion": [ev.Press(force=0.05)]}
-    refuses("electrodes that end", ev.Scene, SMOOTH, ENDED, **options)
+    refuses("electrodes that end; .* in space there is only one", ev.Scene, SMOOTH, ENDED, **options)
+    tip, circle = ev.Fingertip(resolution="coarse"), "allowed: .*in space there is only one electrode"
+    for field in ("local", "auto"):
+        refuses(circle, ev.Scene, tip, ENDED, field=field, **options)
+    refuses(circle, ev.plan, ev.Scene(tip, ENDED, field="full", **options))
     refuses("not grounded", ev.Scene, SMOOTH, ev.Display(), grounded=False, **options)
     for rows in ([[0.0, 1.0, 2.0]], [[1.0, 0.0, 1.0]], [[0.0, 1.0, 1.0], [1.0, 2.0, -1.0]]):
         refuses(r"surface\.electrodes", ev.Display, electrodes=rows)
