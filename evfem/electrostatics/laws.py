@@ -27,14 +27,14 @@ broadcast, real or complex (for derivatives by complex step); scalars give a flo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from evfem.common.checks import Checked, Values, Within, above, at_least, finite, number, plain
-from evfem.errors import ABSENT, InputError
+from evfem.errors import ABSENT, InputError, quoted
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
 
@@ -63,6 +63,11 @@ class Layer:
             eps_r = at_least("layer eps_r", self.eps_r, 1.0, "a relative permittivity of at least 1")
             object.__setattr__(self, "eps_r", eps_r)
 
+    @property
+    def parts(self) -> tuple[Layer, ...]:
+        """The layers that it consists of: itself."""
+        return (self,)
+
     def permittivity(self, frequency: Values | None) -> Values:
         """Relative permittivity at `frequency` (Hz), complex of dielectrics: InputError without."""
         of: Any = getattr(self.eps_r, "permittivity", None)
@@ -74,6 +79,49 @@ class Layer:
         return of(frequency)
 
 
+@dataclass(frozen=True)
+class LayerStack(Layer):
+    """Solid layers from the top, as the one layer that the laws see: sum d thick, with sum d / eps_r as its
+    reduced thickness, so that no force depends on their order.
+
+    >>> coated = LayerStack((Layer(0.02, 2.5), Layer(0.09, 3.35)))
+    >>> round(coated.thickness, 9), round(coated.thickness / coated.eps_r, 9)
+    (0.11, 0.034865672)
+    """
+
+    thickness: Values = field(init=False)
+    eps_r: Values = field(init=False)
+    layers: tuple[Layer, ...] = ()
+
+    def __post_init__(self) -> None:
+        allowed = "layers (thickness, eps_r) that are numbers; a Dielectric is a single layer's"
+        for one in self.layers:
+            if not (type(one) is Layer and isinstance(one.thickness, float) and isinstance(one.eps_r, float)):
+                raise InputError("surface.insulator", one, allowed)
+        total = sum(one.thickness for one in self.layers)
+        if not total > 0.0:
+            raise InputError(
+                "surface.insulator", f"layers that are {total:g} mm thick together", "above 0 mm"
+            )
+        object.__setattr__(self, "thickness", total)
+        object.__setattr__(self, "eps_r", total / Layers.of(*self.layers).reduced)
+
+    @property
+    def parts(self) -> tuple[Layer, ...]:
+        """The layers."""
+        return self.layers
+
+
+def _insulator(key: str, value: Any) -> Layer | None:
+    if isinstance(value, (list, tuple)) and value:
+        return LayerStack(tuple(value))
+    if not isinstance(value, Layer | None):
+        raise InputError(key, quoted(value), LAYER)
+    return value
+
+
+LAYER = "Layer(thickness, eps_r), a list of them from the top, or None"
+Insulator = Annotated[Any, {"allowed": LAYER, "check": _insulator}]
 #: insulators of displays: the film of the paper's Table 2, driven with 1 to 2 kV, and a touchscreen, driven
 #: with about 100 V. Meyer et al. (2013) used 1 um at 140 V, as the paper reports in section 3.2.2; 3.9 is the
 #: permittivity of silicon dioxide (Sze and Ng 2006, doi:10.1002/0470068329).

@@ -214,7 +214,10 @@ def _breakdown(scene: Scene) -> Iterator[str]:
     if scene.law is None or found or any(course.gap is not None for course in scene.courses):
         return
     seen = scene.electrics
-    solids = {"stratum corneum": seen.lossless(seen.skin), "insulator": seen.lossless(seen.insulator)}
+    films = seen.insulator.parts
+    names = [f"insulator's layer {i}" for i in range(1, len(films) + 1)] if films[1:] else ["insulator"]
+    solids = {"stratum corneum": seen.lossless(seen.skin)}
+    solids |= {name: seen.lossless(film) for name, film in zip(names, films, strict=True)}
     yield from broken_down(seen.largest_voltage, seen.attraction[1].reduced, solids)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import fields_of
+from evfem.electrostatics.laws import LayerStack
 from evfem.errors import ABSENT, InputError, quoted, unknown
 from evfem.mesh.mesh import Mesh, raised
 from evfem.planning.plan import scene_mesh
@@ -145,6 +146,10 @@ class Keyed:
         if name == "voltage_profile":
             row, column = rest if len(rest) == 2 else ("", "")
             return ("voltage", {"0": "position", "1": "voltage"}.get(column, column), row)
+        insulator: Any = getattr(self.scene.surface, "insulator", None)
+        if name in ("insulator_thickness", "insulator_eps_r") and isinstance(insulator, LayerStack):
+            layer, *more = rest or ("",)
+            return ("surface", "insulator", "layers", layer, name.removeprefix("insulator_"), *more)
         if name in ELECTRIC:
             return (*ELECTRIC[name], *rest)
         if self.scene.drive is not None and _field(self.scene.drive, name) is not None:

@@ -10,7 +10,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
-from evfem.common.checks import Within, among, instance, keys_of, number, one_of, yes_or_no
+import numpy as np
+
+from evfem.common.checks import Within, among, instance, keys_of, number, one_of, real, yes_or_no
 from evfem.common.tables import TABLES
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.dielectrics import SKINS
@@ -48,6 +50,18 @@ _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.Ti
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
 _VOLTAGE = number(f"{VOLTAGE['allowed']}, or a table with a kind: {' | '.join(FOUND)}", VOLTAGE["test"], "V")
 _VOLTAGE |= {"type": float | dict, "kinds": lambda: FOUND}
+
+
+def _layers(allowed: str, test: Within, unit: str = "") -> dict[str, Any]:
+    """Rule of a number, or of one for each layer of an insulator."""
+    allowed += ", or a list of them from the top"
+
+    def check(key: str, value: Any) -> Any:
+        if isinstance(value, list) and value:
+            return [real(f"{key}.{i}", one, allowed, test) for i, one in enumerate(value)]
+        return real(key, value, allowed, test)
+
+    return {"allowed": allowed, "check": check, "test": test, "unit": unit}
 
 
 def _rows(allowed: str, unit: str) -> dict[str, Any]:
@@ -262,12 +276,14 @@ class Electrostatics:
     signal: Annotated[Any, _SIGNAL, "voltage over time, instead of a number"] = None
     insulator: Annotated[str | None, one_of(*INSULATORS), "a usual insulator by its name"] = None
     insulator_thickness: Annotated[
-        float | None,
-        number("a thickness in mm, not negative", Within(0.0), "mm"),
+        float | list[float] | None,
+        _layers("a thickness in mm, not negative", Within(0.0), "mm"),
         "of the display's insulator",
     ] = None
     insulator_eps_r: Annotated[
-        float | None, number("a relative permittivity, at least 1", Within(1.0)), "its relative permittivity"
+        float | list[float] | None,
+        _layers("a relative permittivity, at least 1", Within(1.0)),
+        "its relative permittivity",
     ] = None
     air_layer: AirLayer = True
     direction: Direction = "vertical"
@@ -281,13 +297,14 @@ class Electrostatics:
     coupling: Coupling = "monolithic"
     roughness_gap: RoughnessGap = 0.0
 
-    def layer(self) -> Layer:
-        """The insulator by its name, or by its thickness and permittivity."""
+    def layer(self) -> Layer | list[Layer]:
+        """The insulator by its name, or by thickness and permittivity of one layer or of several."""
         own = {name: getattr(self, name) for name in ("insulator_thickness", "insulator_eps_r")}
         mistakes = Mistakes()
         for name, value in own.items():
             if self.insulator is not None and value is not None:
-                given = f"{value:g} beside insulator = {self.insulator}"
+                told = value if isinstance(value, list) else f"{value:g}"
+                given = f"{told} beside insulator = {self.insulator}"
                 raise InputError(f"electrostatics.{name}", given, "one of the two")
             with mistakes.of_a_part():
                 if self.insulator is None and value is None:
@@ -295,7 +312,14 @@ class Electrostatics:
                     allowed = f"{allowed}; or insulator = {' | '.join(INSULATORS)}"
                     raise InputError(f"electrostatics.{name}", ABSENT, allowed)
         mistakes.report()
-        return Layer(*own.values()) if self.insulator is None else INSULATORS[self.insulator]
+        if self.insulator is not None:
+            return INSULATORS[self.insulator]
+        sizes = [np.size(value) for value in own.values()]
+        if len({type(value) for value in own.values()}) > 1 or sizes[0] != sizes[1]:
+            given = f"{sizes[1]} beside {sizes[0]} of insulator_thickness"
+            raise InputError("electrostatics.insulator_eps_r", given, "as many, from the top")
+        stacked = isinstance(self.insulator_thickness, list)
+        return [*map(Layer, *own.values())] if stacked else Layer(*own.values())
 
     def scene_keys(self, law: Any, ramped: bool) -> dict[str, Any]:
         """What it says of a scene beside its law; `ramped`: the voltage may begin without one."""

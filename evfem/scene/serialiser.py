@@ -17,7 +17,7 @@ import tomli_w
 from evfem.common.checks import keys_of
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Drive
-from evfem.electrostatics.laws import FORCE_LAWS
+from evfem.electrostatics.laws import FORCE_LAWS, LayerStack
 from evfem.electrostatics.signals import FOUND, FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import SIGNALS
 from evfem.errors import InputError
@@ -132,7 +132,9 @@ def _electrostatics(scene: Scene) -> dict[str, Any]:
     insulator = scene.ground.insulator
     if not isinstance(insulator.eps_r, float):
         raise InputError("surface.insulator", "a permittivity that is no number", "a number, for a file")
-    table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
+    for name in ("thickness", "eps_r"):
+        each = [getattr(one, name) for one in insulator.parts]
+        table[f"insulator_{name}"] = each if type(insulator) is LayerStack else each[0]
     if (electrodes := getattr(scene.surface, "electrodes", None)) is not None:
         table["electrodes"] = [list(map(float, row)) for row in electrodes]
     return table | _keys(scene, "electrostatics")

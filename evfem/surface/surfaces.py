@@ -24,10 +24,10 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 
-from evfem.common.checks import Checked, Within, instance, number, real, set_frozen
+from evfem.common.checks import Checked, Within, number, real, set_frozen
 from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.common.views import changed
-from evfem.electrostatics.laws import FILM, Layer
+from evfem.electrostatics.laws import FILM, Insulator, Layer
 from evfem.errors import InputError, quoted
 from evfem.protocols import Elastic
 from evfem.surface.elastic import ELASTIC, elastic_of
@@ -71,7 +71,6 @@ Shift = Annotated[
     number("a height in mm, within 1e3 mm", Within(-HIGHEST, HIGHEST), "mm"),
     "shift of the profile; without it the finger just touches at the start",
 ]
-Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None", Layer, type(None))]
 GivesWay = Annotated[Elastic | None, {"check": lambda key, value: elastic_of(value, key), "allowed": ELASTIC}]
 
 
