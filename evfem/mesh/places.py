@@ -24,7 +24,7 @@ FACING: Mapping[str, tuple[int, float]] = {
     "back": (2, -1.0), "front": (2, 1.0),
 }  # fmt: skip
 INSIDE, REST = "inside", "rest"
-BOX = "a box as {x = [0, 5], y = [-1, 0]} in mm"
+BOX = "a box as {box = [[0, -1], [5, 0]]}, two corners in mm"
 PLACES = f"{' | '.join(FACING)} | {INSIDE}, or {BOX}"
 #: sine of the angle by which a side must at least face a way, and what counts as the same place, over the
 #: extent of the body: coordinates in files are rounded
@@ -128,20 +128,17 @@ def _facing(mesh: Mesh, axis: int, sign: float) -> Any:
     return found
 
 
-def _within(points: Floats, key: str, box: Mapping[str, Any], body: Mesh) -> Any:
+def _within(points: Floats, key: str, place: Mapping[str, Any], body: Mesh) -> Any:
     """Which points (N, dim) are in a box, its faces included, (N,) bool."""
     near = SAME * np.ptp(body.points, axis=0).max()
-    found = np.ones(len(points), dtype=bool)
-    for axis, ends in box.items():
-        try:
-            place = "xyz"[: body.dim].index(axis)
-            low, high = (float(end) for end in ends)
-        except (TypeError, ValueError):
-            low, high = np.nan, np.nan
-        if not low <= high:
-            raise InputError(key, _told(box), f"{BOX}, the smaller number first")
-        found &= (points[:, place] >= low - near) & (points[:, place] <= high + near)
-    return found
+    try:
+        low, high = np.array(place["box"] if set(place) == {"box"} else (), dtype=float)
+    except (TypeError, ValueError):
+        low = high = np.array([])
+    if low.shape != (body.dim,) or not (low <= high).all():
+        axes = "three coordinates each" if body.dim == 3 else "two coordinates each"
+        raise InputError(key, _told(place), f"{BOX} with {axes}, the smaller numbers first")
+    return ((points >= low - near) & (points <= high + near)).all(axis=1)
 
 
 def _told(place: Any) -> str:

@@ -84,11 +84,11 @@ SCENE = """version = 1
 [finger]
 mesh = "block.mesh"
 [finger.regions]
-nail = {y = [4, 8], x = [4, 8]}
+nail = {box = [[4, 4], [8, 8]]}
 tissue = "rest"
 [finger.boundaries]
 pad = "lowest"
-bone = {y = [8, 8]}
+bone = {box = [[0, 8], [8, 8]]}
 [finger.materials.tissue]
 law = "neo_hookean"
 E = 0.1
@@ -126,12 +126,28 @@ def test_a_scene_names_places_of_a_mesh_of_medit(tmp_path):
         ),
         ('"lowest"', '"front"', "pad = front of a mesh in the plane"),
         ('"lowest"', '"inside"', "pad = inside, where no whole edge of the outline is; .* y from 0 to 8"),
-        ("{y = [8, 8]}", "{y = [8.1, 9]}", r"bone = {y = \[8.1, 9\]}, where no whole edge .* x from 0 to 8"),
-        ("{y = [8, 8]}", "{z = [8, 8]}", r"finger.boundaries: given {z = \[8, 8\]}; allowed: a box as {x"),
-        ("{y = [8, 8]}", "{y = [8]}", r"finger.boundaries: given {y = \[8\]}; allowed: a box"),
-        ("{y = [8, 8]}", "[8, 9]", r"finger.boundaries: given \[8, 9\]; allowed: a table name = number"),
-        ("x = [4, 8]", "x = [9, 9]", r"nail = {.*}, where no cell has its centre; .* x from 0 to 8"),
-        ("{y = [4, 8], x = [4, 8]}", "{}", "tissue = rest, of which no cell is left"),
+        (
+            "[[0, 8], [8, 8]]",
+            "[[0, 8.1], [8, 9]]",
+            r"bone = {box = .*}, where no whole edge .* x from 0 to 8",
+        ),
+        (
+            "[[0, 8], [8, 8]]",
+            "[[0, 8, 0], [8, 8, 0]]",
+            r"finger.boundaries: given {box .*; allowed: a box as {box",
+        ),
+        ("{box = [[0, 8], [8, 8]]}", "{y = [8, 8]}", r"finger.boundaries: given {y = .*; allowed: a box"),
+        (
+            "{box = [[0, 8], [8, 8]]}",
+            "[8, 9]",
+            r"finger.boundaries: given \[8, 9\]; allowed: a table name = number",
+        ),
+        (
+            "[[4, 4], [8, 8]]",
+            "[[9, 4], [9, 8]]",
+            r"nail = {.*}, where no cell has its centre; .* x from 0 to 8",
+        ),
+        ("[[4, 4], [8, 8]]", "[[0, 0], [8, 8]]", "tissue = rest, of which no cell is left"),
         ('"rest"', '"all"', r"finger.regions: given tissue = all; .*block.mesh: 0"),
     ):
         (tmp_path / "wrong.toml").write_text(SCENE.replace(old, new))
@@ -147,7 +163,10 @@ def test_a_set_of_the_file_goes_before_a_place_and_a_box_before_a_number(tmp_pat
         cell_data={"region": [mesh.region]},
     )
     raw.write(tmp_path / "a.vtu")
-    regions, boundaries = {"soft": 0, "hard": {"y": (1, 2)}}, {"pad": "lowest", "bone": {"y": (0, 0)}}
+    regions, boundaries = (
+        {"soft": 0, "hard": {"box": ((-1, 1), (1, 2))}},
+        {"pad": "lowest", "bone": {"box": ((-1, 0), (1, 0))}},
+    )
     found = ev.meshfile.read(tmp_path / "a.vtu", regions, boundaries)
     assert found.points[found.node_sets["pad"], 1].tolist() == [2.0, 2.0, 2.0]
     assert found.cells_of("hard").tolist() == [2, 3]
