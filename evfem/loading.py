@@ -146,6 +146,6 @@ READERS: Mapping[str, Callable[[Path], Found]] = {
     ".wav": _signal,
     ".hjif": _signal,
     ".toml": _tables,
-    **dict.fromkeys((".vtu", ".msh", ".inp", ".med", ".e", ".exo", ".gen", ".xdmf", ".vtk"), _mesh),
-    **dict.fromkeys((".mesh", ".bdf", ".su2"), _mesh),
+    **dict.fromkeys((".vtu", ".msh", ".inp", ".med", ".xdmf", ".vtk", ".mesh", ".bdf", ".su2"), _mesh),
+    **dict.fromkeys((".e", ".exo", ".ex2", ".g", ".gen"), _mesh),
 }

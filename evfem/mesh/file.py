@@ -56,7 +56,7 @@ PIXELS: Mapping[str, tuple[str, list[int]]] = {
 #: endings of the files that a module of `evfem.mesh.formats` reads
 FORMATS: Mapping[str, str] = {
     ".inp": "abaqus",
-    **dict.fromkeys((".e", ".exo", ".ex2", ".gen"), "exodus"),
+    **dict.fromkeys((".e", ".exo", ".ex2", ".g", ".gen"), "exodus"),
     ".med": "med",
     **dict.fromkeys((".mesh", ".meshb"), "medit"),
     ".msh": "gmsh",
@@ -67,6 +67,8 @@ FORMATS: Mapping[str, str] = {
 }
 #: the document type of FEniCSx, which declares nothing
 DOCTYPE = re.compile(rb'<!DOCTYPE\s+Xdmf\s+SYSTEM\s+"Xdmf\.dtd"\s*(\[\s*\]\s*)?>')
+#: how a file begins that Git LFS (version 1 of its pointers) has not fetched
+POINTER = b"version https://git-lfs"
 #: kinds that are refused for what they lack
 _TETRAHEDRA = "Gmsh makes hexahedra of tetrahedra and wedges: docs/howto/mesh.md, From tetrahedra"
 LACKING: Mapping[str, str] = {
@@ -174,7 +176,11 @@ def parts(path: Path) -> meshio.Mesh:
 
 
 def _guard(content: bytes) -> None:
-    """Refuse XML that declares a type of document or entities, wherever it does, in every coding."""
+    """Refuse XML that declares a type of document or entities, wherever it does, in every coding, and what
+    stands for a file in a repository.
+    """
+    if content.startswith(POINTER):
+        raise ValueError("a pointer of Git LFS, not the file: git lfs pull")
     declared = b"<!ENTITY" in content or b"<!DOCTYPE" in DOCTYPE.sub(b"", content, count=1)
     if declared or content.startswith((b"\xff\xfe", b"\xfe\xff", b"<\0", b"\0<")):
         raise ValueError("a document type, or no UTF-8 text")

@@ -84,16 +84,17 @@ def test_every_row_of_the_table_has_its_files(ending):
     assert writers == {one.strip().split("_")[0].replace("fenicsx", "dolfinx") for one in libraries}
 
 
-def test_numbers_of_exodus_blocks_are_those_of_the_file_and_not_places(tmp_path):
+@pytest.mark.parametrize("ending", ["g", "gen"])
+def test_numbers_of_exodus_blocks_are_those_of_the_file_and_not_places(ending, tmp_path):
     """Up to 0.3 the first block was 1, the second 2: with the numbers 2, 1 the materials changed places."""
     import netCDF4
 
-    (tmp_path / "swapped.gen").write_bytes((WRITTEN / "exodus_unnamed.exo").read_bytes())
-    with netCDF4.Dataset(tmp_path / "swapped.gen", "a") as file:
+    (tmp_path / f"swapped.{ending}").write_bytes((WRITTEN / "exodus_unnamed.exo").read_bytes())
+    with netCDF4.Dataset(tmp_path / f"swapped.{ending}", "a") as file:
         file["eb_prop1"][:] = [2, 1]
-    mesh = is_the_body(tmp_path / "swapped.gen", {"skin": 2, "tissue": 1}, {"pad": 7, "bone": 8})
+    mesh = is_the_body(tmp_path / f"swapped.{ending}", {"skin": 2, "tissue": 1}, {"pad": 7, "bone": 8})
     assert np.flatnonzero(mesh.points[:, 1] == 3.0).tolist() == mesh.node_sets["node set 7"].tolist()
-    refuses("groups that occur in swapped.gen: 2, 1", read, tmp_path / "swapped.gen", {"skin": 3})
+    refuses(f"groups that occur in swapped.{ending}: 2, 1", read, tmp_path / f"swapped.{ending}", {"skin": 3})
 
 
 @pytest.mark.parametrize("kind", [*FIRST, *SECOND])
@@ -299,3 +300,10 @@ def test_names_that_a_grid_of_pyvista_has_are_listed_where_the_expected_ones_are
     grid.save(tmp_path / "mesh.vtu")
     said = "no boundary pad .it has bone, sole, point data depth that are not 0 and 1"
     refuses(said, read, tmp_path / "mesh.vtu", {"skin": 1, "tissue": 2})
+
+
+def test_a_pointer_of_git_lfs_is_no_damaged_file(tmp_path):
+    """The specification of Git LFS, version 1: three lines of text in place of the file."""
+    path = tmp_path / "body.msh"
+    path.write_text(f"version https://git-lfs.github.com/spec/v1\noid sha256:{64 * '0'}\nsize 5479\n")
+    refuses("a pointer of Git LFS, not the file: git lfs pull", read, path)
