@@ -1,4 +1,4 @@
-"""Exodus II (`.e`, `.exo`, `.ex2`, `.g`, `.gen`): blocks, side sets and node sets, by their names and numbers.
+"""Exodus II (`.e`, `.exo`, `.ex2`, `.g`, `.gen`): blocks, side sets, node sets by names and numbers.
 
 A name may be empty; the numbers (`eb_prop1`, `ss_prop1`, `ns_prop1`) are the writer's own choice and need not
 be places in the file. Source: Schoof and Yarberry, Exodus II: a finite element data model, SAND92-2137
