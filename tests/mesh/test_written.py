@@ -32,7 +32,7 @@ READ = {
     **{f"gmsh_{kind}.{ending}": NUMBERS for kind in FIRST for ending in ("bdf", "mesh")},
     **{f"gmsh_{kind}.vtk": NUMBERS for kind in (*FIRST, *SECOND)},
     **{f"medcoupling_{name}.med": NAMES for name in ("quad9", "hexahedron27", "metres")},
-    **{f"exodus_{name}.exo": NAMES for name in ("quad9", "shell9", "hexahedron27")},
+    **{f"exodus_{name}.exo": NAMES for name in (*SECOND, "shell9", "trishell6")},
     "exodus_unnamed.exo": ({"skin": 20, "tissue": 10}, {"pad": 7, "bone": 8}),
     **{f"pyvista_{name}.vtu": ({"skin": 1, "tissue": 2}, None) for name in ("quad9", "hexahedron")},
     **{f"dolfinx_{name}.xdmf": NUMBERS for name in ("quad9", "hexahedron27")},
@@ -62,7 +62,8 @@ def is_the_body(path, regions=None, boundaries=None):
 @pytest.mark.parametrize("name", READ)
 def test_what_a_format_carries_is_read(name):
     kind = Path(name).stem.split("_")[1]
-    others = {"metres": "quad9", "shell9": "quad9", "unnamed": "hexahedron27", "functions": "quad"}
+    others = {"metres": "quad9", "shell9": "quad9", "trishell6": "triangle6"}
+    others |= {"unnamed": "hexahedron27", "functions": "quad"}
     assert is_the_body(WRITTEN / name, *READ[name]).kind == others.get(kind, kind)
 
 
@@ -95,6 +96,26 @@ def test_numbers_of_exodus_blocks_are_those_of_the_file_and_not_places(ending, t
     mesh = is_the_body(tmp_path / f"swapped.{ending}", {"skin": 2, "tissue": 1}, {"pad": 7, "bone": 8})
     assert np.flatnonzero(mesh.points[:, 1] == 3.0).tolist() == mesh.node_sets["node set 7"].tolist()
     refuses(f"groups that occur in swapped.{ending}: 2, 1", read, tmp_path / f"swapped.{ending}", {"skin": 3})
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_a_side_of_what_no_finger_is_made_of_does_not_hide_that(tmp_path):
+    import netCDF4
+
+    with netCDF4.Dataset(tmp_path / "tip.exo", "w") as file:
+        for name, size in (("num_dim", 3), ("num_nodes", 4), ("num_el_blk", 1), ("num_nod_per_el1", 4),
+                           ("num_el_in_blk1", 1), ("num_side_sets", 1), ("num_side_ss1", 1)):  # fmt: skip
+            file.createDimension(name, size)
+        file.createVariable("coord", "f8", ("num_dim", "num_nodes"))[:] = np.eye(3, 4)
+        block = file.createVariable("connect1", "i4", ("num_el_in_blk1", "num_nod_per_el1"))
+        block.elem_type, block[:] = "TETRA", [[1, 2, 3, 4]]
+        file.createVariable("elem_ss1", "i4", "num_side_ss1")[:] = 1
+        file.createVariable("side_ss1", "i4", "num_side_ss1")[:] = 4
+    assert parts(tmp_path / "tip.exo").point_sets[1].tolist() == [0, 1, 2, 3]
+    refuses("with tetra cells; .*From tetrahedra", read, tmp_path / "tip.exo")
+    with netCDF4.Dataset(tmp_path / "tip.exo", "a") as file:
+        file["elem_ss1"][:] = 2
+    refuses("side set 1 with side 4 of an element that has none of it", read, tmp_path / "tip.exo")
 
 
 @pytest.mark.parametrize("kind", [*FIRST, *SECOND])

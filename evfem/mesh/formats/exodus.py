@@ -84,17 +84,18 @@ def _labels(file: Any, what: str, dimension: str) -> Iterator[tuple[str, int]]:
 def _block(connect: Any, dim: int) -> tuple[str, Ints, list[Ints]]:
     """Kind, nodes (E, n) in VTK's order, and the places of the nodes of its sides 1, 2 ...
 
-    Shells, and triangles in space, have their two faces before their edges.
+    Shells, and triangles in space, have their two faces before their edges. Sides of elements of which no
+    finger is made are all of them.
     """
     name, nodes = str(connect.elem_type).strip("\0 ").upper(), np.array(connect[:], dtype=np.int64) - 1
     kind = KINDS.get(name[:3], {}).get(nodes.shape[1])
     if kind is None:
         raise ValueError(f"elements {name} of {nodes.shape[1]} nodes, which are not read")
-    table = sides_of(kind)
+    table, whole = sides_of(kind), np.arange(nodes.shape[1])
     if kind.startswith("hexahedron"):
         return kind, nodes[:, [place for place in ORDER if place < nodes.shape[1]]], list(table[SIDES])
-    faces = name.startswith("SHE") or (name.startswith("TRI") and dim == 3)
-    return kind, nodes, [*faces * [np.arange(nodes.shape[1])] * 2, *table]
+    faces = "SHELL" in name or (name.startswith("TRI") and dim == 3)
+    return kind, nodes, [*faces * [whole] * 2, *table] if len(table) else [whole] * 6
 
 
 def _sets(file: Any, sides: list[list[Ints]], sizes: list[int]) -> dict[Name, Ints]:

@@ -195,27 +195,32 @@ def write_exodus_helper():
     import exodus_helper
 
     for name, dim, kind, places, named, sides in (
+        ("triangle6", 2, "TRI6", QUAD9, True, (1, 2)),
+        ("trishell6", 2, "TRISHELL6", QUAD9, True, (3, 4)),
         ("quad9", 2, "QUAD9", QUAD9, True, (1, 3)),
         ("shell9", 2, "SHELL9", QUAD9, True, (3, 5)),
         ("hexahedron27", 3, "HEX27", HEX27, True, (1, 3)),
         ("unnamed", 3, "HEX27", HEX27, False, (1, 3)),
     ):
         connect, points = 1 + cells(places), bent(nodes(dim))
-        middle = 1 + np.flatnonzero(points[:, 1] == 3.0)
+        if kind.startswith("TRI"):
+            connect = connect[:, [[0, 1, 2, 4, 5, 8], [0, 2, 3, 8, 6, 7]]].reshape(8, 6)
+        half, middle = len(connect) // 2, 1 + np.flatnonzero(points[:, 1] == 3.0)
         file = exodus_helper.Exodus(
             f"{HERE}/exodus_{name}.exo", mode="w", numDims=dim, num_dims=dim, numNodes=len(points),
-            numElems=4, numBlocks=2, numNodeSets=1, numSideSets=2, time_step=1,
+            numElems=len(connect), numBlocks=2, numNodeSets=1, numSideSets=2, time_step=1,
         )  # fmt: skip
         file.put_coords(*points.T, *[np.zeros(len(points))] * (3 - dim))
         file.dataset.variables["eb_prop1"][:] = [20, 10]
-        for block, label, rows in ((20, "skin", connect[:2]), (10, "tissue", connect[2:])):
+        for block, label, rows in ((20, "skin", connect[:half]), (10, "tissue", connect[half:])):
             file.put_elem_blk_info(block, kind, *rows.shape, 0)
             file.put_elem_connectivity(block, rows.ravel())
             if named:
                 file.put_elem_blk_name(block, label)
         file.put_node_set_params(7, len(middle))
         file.put_node_set(7, middle)
-        for side_set, elements, side in ((7, [1, 2], sides[0]), (8, [3, 4], sides[1])):
+        low, top = 1 + np.arange(2) * half // 2, half + np.arange(1, 3) * half // 2
+        for side_set, elements, side in ((7, low, sides[0]), (8, top, sides[1])):
             file.put_side_set_params(side_set, 2)
             file.put_side_set(side_set, elements, [side, side])
         for status in ("eb_status", "ns_status", "ss_status"):
