@@ -85,6 +85,7 @@ def test_every_row_of_the_table_has_its_files(ending):
     assert writers == {one.strip().split("_")[0].replace("fenicsx", "dolfinx") for one in libraries}
 
 
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
 @pytest.mark.parametrize("ending", ["g", "gen"])
 def test_numbers_of_exodus_blocks_are_those_of_the_file_and_not_places(ending, tmp_path):
     """Up to 0.3 the first block was 1, the second 2: with the numbers 2, 1 the materials changed places."""
