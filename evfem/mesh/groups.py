@@ -104,9 +104,8 @@ def regions_in(
     start = dict(zip(sizes, np.cumsum([0, *sizes.values()]), strict=False))
     solid = [one for one in groups if one.block in start]
     if not solid:
-        allowed = (
-            "integer cell data `region`, groups of cells with names (.msh, .inp, .med, .exo), or a place "
-        )
+        groups_of = ".msh saved with Mesh.SaveAll = 0, .inp, .med, .exo"
+        allowed = f"integer cell data `region`, groups of cells with names ({groups_of}), or a place "
         allowed += 'in [finger.regions], as tissue = "rest" for the whole mesh'
         have = f" (its cell data: {', '.join(others)})" if others else ""
         raise InputError("finger.mesh", f"{path.name} without region numbers{have}", allowed)

@@ -159,7 +159,7 @@ def test_elements_twice_in_one_group_are_no_second_group(tmp_path):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("gmsh_all_2.2.msh", r"no element in a physical group: .* Mesh\.SaveAll = 0"),
+        ("gmsh_all_2.2.msh", r"without region numbers; .*\.msh saved with Mesh\.SaveAll = 0"),
         ("gmsh_all_4.1.msh", r"outside of physical groups: save with Mesh\.SaveAll = 0"),
         ("gmsh_quad.unv", r"no format \.unv is known"),
         *((f"gmsh_{kind}.mesh", r"cells of second order, .* save as \.msh") for kind in SECOND),
@@ -168,6 +168,18 @@ def test_elements_twice_in_one_group_are_no_second_group(tmp_path):
 )
 def test_what_a_format_does_not_carry_is_refused_with_the_reason(name, said):
     refuses(said, read, WRITTEN / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "regions"),
+    [
+        ("gmsh_all_2.2.msh", {"tissue": {"y": [3, 4]}, "skin": "rest"}),  # saved with all: it has no groups
+        ("gmsh_quad9.bdf", {"skin": 1, "tissue": 2}),
+        *((f"gmsh_{kind}.su2", {"tissue": {"y": [3, 4]}, "skin": "rest"}) for kind in (*FIRST, *SECOND)),
+    ],
+)
+def test_what_a_format_does_not_carry_is_given_by_place(name, regions):
+    is_the_body(WRITTEN / name, regions, {"pad": {"y": [0, 0]}, "bone": {"y": [4, 4]}})
 
 
 @pytest.mark.parametrize("kind", ["triangle6", "quad9"])

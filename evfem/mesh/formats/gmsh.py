@@ -19,12 +19,9 @@ from evfem.mesh.groups import PHYSICAL, Group, body_of, dimension_of, numbered
 if TYPE_CHECKING:
     import meshio
 
-#: what to do where elements have no group
-SAVE = "save with Mesh.SaveAll = 0"
-
 
 def read(path: Path) -> meshio.Mesh:
-    """Points, cells, and physical groups with positive numbers. Raises ValueError for a file without one."""
+    """Points, cells, and physical groups with positive numbers; of Mesh.SaveAll = 1 version 2.2 has none."""
     import meshio
 
     content = path.read_bytes()
@@ -36,8 +33,6 @@ def read(path: Path) -> meshio.Mesh:
         raw.groups = _groups_of_entities(raw, entities, names)
     else:
         raw = _once(raw, names)
-    if len(raw.cells) and not raw.groups:
-        raise ValueError(f"no element in a physical group: name surfaces (volumes) and curves, and {SAVE}")
     return raw
 
 
