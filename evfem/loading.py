@@ -95,7 +95,7 @@ def _archive(path: Path) -> Found:
             "path", f"{path}, the checkpoint of a run", "`evfem run --resume`, which goes on there"
         )
     if form != RESULT_FORMAT and path.suffix.lower() != ".npz":
-        other = "heights of other files: `evfem texture import`, haptic patterns: `ev.Sampled.from_ahap`"
+        other = "heights of other files: `evfem texture import`, haptic patterns: `ev.Sampled.from_haptic`"
         raise InputError("path", f"{path}, of another kind", f"{ALLOWED}; {other}")
     return load_result(path)
 

@@ -398,20 +398,22 @@ class Sampled:
         return cls(volts * wav.normalised_samples(samples), rate, start, repeat)
 
     @classmethod
-    def from_ahap(
+    def from_haptic(
         cls, path: str | Path, full_scale: float, *, rate: float = 1000.0, tap: float = 0.01
     ) -> Sampled:
-        """Read the intensity of a haptic pattern (AHAP) as a voltage: `full_scale` (V) times its root, for
-        the attraction grows with the square.
+        """Read the intensity of a haptic pattern (AHAP, Meta's `.haptic`, a waveform of Android) as a
+        voltage: `full_scale` (V) times its root, for the attraction grows with the square.
 
         A transient event lasts `tap` s. Of its sharpness nothing is left: the voltage is that of an envelope,
-        as `Carrier` takes it. Raises InputError for another file, one whose events have envelopes, or one of
-        more than 1,000,000 samples.
+        as `Carrier` takes it. Raises InputError as `evfem.electrostatics.wav.intensity`.
         """
         volts = above("full_scale", full_scale, 0.0, "a voltage in V above zero")
         above("rate", rate, 0.0, "a rate in Hz above zero")
         above("tap", tap, 0.0, "a time in s above zero")
         return cls(volts * np.sqrt(wav.intensity(Path(path), "path", rate, tap)), rate)
+
+    #: its name in 0.3
+    from_ahap = from_haptic
 
     def to_csv(self, path: str | Path) -> None:
         """Write the file that `from_csv` reads back."""

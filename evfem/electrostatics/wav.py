@@ -1,5 +1,5 @@
-"""WAV files with the scale of their samples in a comment; AHAP and MPEG haptics (.hjif) files of other
-programs are read.
+"""WAV files with the scale of their samples in a comment; haptic patterns (AHAP, `.haptic`, Android's) and
+MPEG haptics (.hjif) of other programs are read.
 
 evfem writes 16 bit, one channel, and in the chunk LIST/INFO/ICMT a JSON text with the full scale in volts,
 the speed, the first position and the carrier. scipy reads WAVs of any sample width but ignores comments,
@@ -32,6 +32,10 @@ MOST_PATTERN = 1_000_000
 #: events of an AHAP that are felt; parameters that shape them, and the value that does not
 HAPTIC = ("HapticTransient", "HapticContinuous")
 ENVELOPE = {"AttackTime": 0.0, "DecayTime": 0.0, "ReleaseTime": 0.0, "Sustained": 1.0}
+PATTERN = "a haptic pattern: AHAP, .haptic of Meta, a waveform of Android (.xml, .json)"
+#: start (s), end (s) and intensity; time (s) and intensity
+Event = tuple[float, float, float]
+Point = tuple[float, float]
 #: comment and headers of a file on top of its samples
 MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
 #: exponent of a .hjif's unit of length (m) where it has none; straight pieces of a cubic
@@ -97,41 +101,107 @@ def normalised_samples(samples: Any) -> Floats:
 
 @contextmanager
 def _parsed(path: Path, key: str, allowed: str) -> Iterator[Any]:
-    """What a JSON file holds; InputError where it cannot be read, or lacks what is looked for inside."""
+    """What a JSON or an Android's XML holds; InputError where it cannot be read, or lacks what is looked for
+    inside.
+    """
     try:
         with path.open("rb") as file:
-            whole = json.loads(file.read(MOST_BYTES))
-        yield whole
+            data = file.read(MOST_BYTES)
+        yield _entries(data, path, key) if path.suffix.lower() == ".xml" else json.loads(data)
     except InputError:
         raise
     except OSError as error:
         raise InputError(key, f"{path.name} ({error.strerror or error})", allowed) from None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError, SyntaxError):
         raise InputError(key, f"{path.name}, of another kind or damaged", allowed) from None
 
 
 def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
-    """Intensity (n,), 0 to 1, of a haptic pattern (AHAP, JSON) at `rate` (Hz) from time 0 on: at every moment
-    that of its strongest event, times the value that its HapticIntensityControl then has.
+    """Intensity (n,), 0 to 1, of a haptic pattern at `rate` (Hz) from time 0 on: at every moment that of its
+    strongest event. Sharpness, frequency and audio are left out; a transient event, which has no
+    duration, lasts `tap` s.
 
-    A transient event, which has no duration, lasts `tap` s. Sharpness and audio are left out. Raises
-    InputError for a file that is missing, damaged, without events, with envelopes or longer than 1,000,000
-    samples.
+    - AHAP (JSON): times the value that its HapticIntensityControl then has.
+    - Meta's `.haptic`, version 1 (JSON; `core/datamodel` of Lofelt's NiceVibrations, which Meta published):
+      the amplitude between its breakpoints, from 0 at time 0; the emphasis of one is a transient event.
+    - Waveforms of Android, `VibrationEffect.createWaveform`: XML, or JSON with its arguments.
+
+    Raises InputError for a file that is missing, damaged, without events, with envelopes of events, parts
+    that the device makes or that repeat, or longer than 1,000,000 samples.
     """
-    with _parsed(path, key, "an AHAP file: JSON with a Pattern of haptic events") as whole:
-        pattern = whole["Pattern"]
-        _check_envelopes(pattern, path, key)
-        events = [_event(one["Event"], tap) for one in pattern if "Event" in one]
-        events = [one for one in events if one[2] > 0.0]
-        size = int(np.ceil(max(end for _, end, _ in events) * rate)) + 1
-        if not 1 < size <= MOST_PATTERN:
-            raise InputError(key, f"{path.name} with {size} samples", f"2 to {MOST_PATTERN} samples")
-        time, found = np.arange(size) / rate, np.zeros(size)
-        for start, end, strength in events:
-            inside = (time >= start) & (time < end)
-            found[inside] = np.maximum(found[inside], strength)
-        found *= _control(pattern, time)
-    return found
+    with _parsed(path, key, PATTERN) as whole:
+        events, points, controls = _pattern(whole, path, key, tap)
+        ends = [*(end for _, end, _ in events), *(time for time, _ in points)]
+        size = int(np.ceil(max(ends) * rate)) + 1
+    if not 1 < size <= MOST_PATTERN:
+        raise InputError(key, f"{path.name} with {size} samples", f"2 to {MOST_PATTERN} samples")
+    time = np.arange(size) / rate
+    found = np.interp(time, *np.array(points).T) * (time < points[-1][0]) if points else np.zeros(size)
+    for start, end, strength in events:
+        inside = (time >= start) & (time < end)
+        found[inside] = np.maximum(found[inside], strength)
+    return np.asarray(found * _control(controls, time))
+
+
+def _pattern(whole: Any, path: Path, key: str, tap: float) -> tuple[list[Event], list[Point], list[Any]]:
+    """Events, points of an amplitude that is straight in between, and an AHAP's controls."""
+    if "timings" in whole:
+        return _waveform(whole, path, key), [], []
+    if "signals" in whole:
+        if (version := whole["version"]["major"]) != 1:
+            raise InputError(key, f"{path.name}, of version {version}", "a .haptic of version 1")
+        return *_amplitude(whole["signals"]["continuous"]["envelopes"]["amplitude"], tap), []
+    _check_envelopes(whole["Pattern"], path, key)
+    events = [_event(one["Event"], tap) for one in whole["Pattern"] if "Event" in one]
+    return [one for one in events if one[2] > 0.0], [], whole["Pattern"]
+
+
+def _amplitude(rows: list[dict[str, Any]], tap: float) -> tuple[list[Event], list[Point]]:
+    """Emphases and breakpoints of a `.haptic`; ValueError for falling times, amplitudes beyond 0 to 1."""
+    points = [(float(row["time"]), float(row["amplitude"])) for row in rows]
+    strong = [
+        (row["emphasis"], time) for row, (time, _) in zip(rows, points, strict=True) if row.get("emphasis")
+    ]
+    events = [(time, time + tap, float(one["amplitude"])) for one, time in strong]
+    times = np.array([0.0, *(time for time, _ in points)])
+    values = np.array([*(value for _, value in points), *(value for *_, value in events)])
+    if not points or (np.diff(times) < 0.0).any() or not ((values >= 0.0) & (values <= 1.0)).all():
+        raise ValueError("breakpoints")
+    return events, points if points[0][0] == 0.0 else [(0.0, 0.0), *points]
+
+
+def _waveform(told: dict[str, Any], path: Path, key: str) -> list[Event]:
+    """Steps of a waveform of Android: durations (ms) and amplitudes, 0 to 255; without these off and on."""
+    if told.get("repeat", -1) != -1:
+        raise InputError(key, f"{path.name}, which repeats", "a waveform that ends")
+    ends = np.cumsum([float(one) for one in told["timings"]]) / 1e3
+    levels = told.get("amplitudes", [255 * (i % 2) for i in range(len(ends))])
+    if any(level in (-1, "default") for level in levels):
+        raise InputError(key, f"{path.name}, with the device's default amplitude", "amplitudes from 0 to 255")
+    strength = np.array([float(level) for level in levels]) / 255.0
+    if (np.diff(ends, prepend=0.0) < 0.0).any() or not ((strength >= 0.0) & (strength <= 1.0)).all():
+        raise ValueError("timings and amplitudes")
+    return list(zip([0.0, *ends[:-1].tolist()], ends.tolist(), strength.tolist(), strict=True))
+
+
+def _entries(data: bytes, path: Path, key: str) -> dict[str, Any]:
+    """The timings and amplitudes in an XML of Android."""
+    from xml.etree import ElementTree
+
+    if any(sign in data for sign in (b"<!DOCTYPE", b"<!ENTITY", b"\0")):
+        raise ValueError("a document type")
+    root = ElementTree.fromstring(data)  # its errors are SyntaxErrors
+    others = [one.tag for one in root if one.tag != "waveform-effect"]
+    if root.tag not in ("vibration-effect", "vibration"):
+        raise ValueError(root.tag)
+    if others:
+        problem = f"{path.name}, with {others[0][:40]}, whose course the device makes"
+        raise InputError(key, problem, "a waveform-effect alone")
+    (wave,) = root
+    entries = wave.findall("waveform-entry")
+    told: dict[str, Any] = {} if wave.find("repeating") is None else {"repeat": len(entries)}
+    names = {"timings": "durationMs", "amplitudes": "amplitude"}
+    return told | {to: [one.attrib[name] for one in entries] for to, name in names.items()}
 
 
 def _event(event: dict[str, Any], tap: float) -> tuple[float, float, float]:

@@ -367,7 +367,9 @@ def test_what_is_no_pattern_gets_a_sentence(tmp_path):
     path = tmp_path / "a.ahap"
     for text in ("", "[]", '{"Pattern": [{"Event": {"Time": 0}}]}', '{"Pattern": []}', '{"Pattern": 3}'):
         path.write_text(text)
-        with pytest.raises(InputError, match=r"a\.ahap, of another kind or damaged; allowed: an AHAP file"):
+        with pytest.raises(
+            InputError, match=r"a\.ahap, of another kind or damaged; allowed: a haptic pattern: AHAP"
+        ):
             ev.Sampled.from_ahap(path, 100.0)
     pattern(path, {"Event": CONTINUOUS | {"EventDuration": 1e9}})
     refuses("allowed: 2 to 1000000 samples", ev.Sampled.from_ahap, path, 100.0)
