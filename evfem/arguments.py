@@ -188,6 +188,10 @@ def _signal_options(voltage: argparse.ArgumentParser) -> None:
     voltage.add_argument("--rate", type=int, default=48_000, metavar="HZ", help=said)
     said = "carrier frequency that the .wav modulates"
     voltage.add_argument("--carrier", type=float, metavar="HZ", help=said)
+    said = "bits of a sample of the .wav: 16, 24 or 32; default: 16"
+    voltage.add_argument("--bits", type=int, default=16, metavar="N", help=said)
+    said = "second channel of the .wav: negative or trigger; default: none"
+    voltage.add_argument("--second", metavar="WHAT", help=said)
     said = "width of a pixel of the .png; default: 0.1"
     voltage.add_argument("--pixel", type=float, default=0.1, metavar="MM", help=said)
 

@@ -412,7 +412,14 @@ def _signal(options: argparse.Namespace) -> None:
     playback = None
     if options.full_scale is not None:
         playback = Playback(
-            options.full_scale, options.speed, options.friction, options.rate, options.carrier, options.pixel
+            options.full_scale,
+            options.speed,
+            options.friction,
+            options.rate,
+            options.carrier,
+            options.pixel,
+            options.bits,
+            options.second,
         )
     profile = read_signal(options.file)
     write_signal(options.out, profile, playback)

@@ -26,7 +26,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Within, check_fields, count, number, real, set_frozen
+from evfem.common.checks import Within, among, check_fields, count, number, real, set_frozen
 from evfem.common.storage import replacing, write_text
 from evfem.common.tables import MOST_ROWS, names_of
 from evfem.electrostatics import wav
@@ -48,6 +48,12 @@ def _coefficients(key: str, entry: Any) -> tuple[float, float]:
     return natural, real(key, entry[1], allowed, lambda mu: mu > natural)
 
 
+def _bits(key: str, value: Any) -> int:
+    if value not in wav.LARGEST or isinstance(value, (bool, float)):
+        raise InputError(key, quoted(value), " | ".join(map(str, wav.LARGEST)))
+    return int(value)
+
+
 def _above(what: str) -> dict[str, Any]:
     """Rule of a number above zero."""
     return number(f"{what} above zero", Within(0.0, above=True))
@@ -65,7 +71,9 @@ class Playback:
     `full_scale` (V) is the largest voltage the file can hold; `speed` (mm/s) is needed for .wav and .hjif;
     `friction`, the coefficients at 0 V and at `full_scale`, for .hjif. `rate` (Hz) is the WAV's, `carrier`
     (Hz) modulates it: a sine of amplitude `carrier_amplitude(U)`, which attracts like the effective U; a
-    .hjif names it. `pixel` (mm) is the width of a column of the friction map.
+    .hjif names it. `pixel` (mm) is the width of a column of the friction map. A WAV has `bits` (16, 24 or 32)
+    and perhaps a `second` channel: the "negative" of the first, for two amplifiers in opposition, or a
+    "trigger", full scale for the first millisecond.
 
     >>> Playback(full_scale=2000.0, speed=-1.0)
     Traceback (most recent call last):
@@ -78,6 +86,8 @@ class Playback:
     rate: Annotated[int, {"check": count}] = 48_000
     carrier: float | None = None
     pixel: Annotated[float, _above("a width in mm")] = 0.1
+    bits: Annotated[int, {"check": _bits}] = 16
+    second: Annotated[str | None, among(wav.SECOND)] = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -92,8 +102,8 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     """Write `profile` to `path` in one step; its ending says as what.
 
     - `.csv`: position,voltage, to the last bit; needs no `playback`.
-    - `.wav`: 16 bit, one channel; sample k is the voltage at the first position + k speed / rate, rounded to
-      full_scale / 32767. Full scale, speed and first position stand in the comment (LIST/INFO/ICMT, JSON).
+    - `.wav`: PCM; sample k is the voltage at the first position + k speed / rate, rounded to full_scale /
+      32767 (of 16 bit). Full scale, speed and first position stand in the comment (LIST/INFO/ICMT, JSON).
     - `.png`: friction map, 8-bit grey, columns along the slide: 0 natural friction, 255 that at full scale.
       It is 255 (U / full_scale)^2, as attraction grows with U^2, in the middle of each column. The scale
       stands in the text chunk Comment (JSON), the size of a pixel in pHYs.
@@ -218,20 +228,23 @@ def _wav(profile: VoltageProfile, playback: Playback) -> bytes:
         if np.max(np.abs(volts)) > playback.full_scale:
             raise _too_much(f"{np.max(np.abs(volts)):g} V at the carrier's peaks", playback)
         volts = volts * np.sin(2.0 * np.pi * playback.carrier / playback.rate * np.arange(number))
-    samples = np.rint(volts / playback.full_scale * wav.LARGEST_SAMPLE)
-    scale = {
+    scale: dict[str, Any] = {
         "full_scale_V": playback.full_scale,
         "speed_mm_per_s": playback.speed,
         "start_mm": start,
         "carrier_Hz": playback.carrier,
     }
-    return wav.encoded(samples, playback.rate, scale)
+    if playback.bits != 16:
+        scale["bits"] = playback.bits
+    if playback.second is not None:
+        scale["second"] = playback.second
+    return wav.encoded(volts / playback.full_scale, playback.rate, scale)
 
 
 def _from_wav(path: Path) -> VoltageProfile:
-    allowed = f"a 16-bit mono WAV with evfem's comment ({wav.FORM}) in it"
+    allowed = f"a WAV with evfem's comment ({wav.FORM}) in it"
     rate, samples, scale = wav.read(path, "path", allowed)
-    if not scale or samples.dtype != np.int16:
+    if not scale or samples.dtype.kind != "i":
         raise InputError("path", f"{path}, of another kind or without the comment", allowed)
     if scale["carrier_Hz"] is not None:
         problem = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
@@ -247,7 +260,7 @@ def _from_wav(path: Path) -> VoltageProfile:
         problem = f"{path}, whose {error.key} is {readable(error.given)}"
         raise InputError("path", problem, error.allowed) from None
     position = _positions(samples.size, start, speed / rate)
-    return VoltageProfile(position, samples / wav.LARGEST_SAMPLE * full_scale)
+    return VoltageProfile(position, wav.normalised_samples(samples, scale.get("bits", 0)) * full_scale)
 
 
 def _from_hjif(path: Path) -> VoltageProfile:

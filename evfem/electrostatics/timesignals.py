@@ -395,7 +395,7 @@ class Sampled:
             raise InputError("full_scale", ABSENT, needed)
         scale_V = scale["full_scale_V"] if full_scale is None else full_scale
         volts = above("full_scale", scale_V, 0.0, "a voltage in V above zero")
-        return cls(volts * wav.normalised_samples(samples), rate, start, repeat)
+        return cls(volts * wav.normalised_samples(samples, scale.get("bits", 0)), rate, start, repeat)
 
     @classmethod
     def from_haptic(

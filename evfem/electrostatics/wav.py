@@ -1,9 +1,9 @@
 """WAV files with the scale of their samples in a comment; haptic patterns (AHAP, `.haptic`, Android's) and
 MPEG haptics (.hjif) of other programs are read.
 
-evfem writes 16 bit, one channel, and in the chunk LIST/INFO/ICMT a JSON text with the full scale in volts,
-the speed, the first position and the carrier. scipy reads WAVs of any sample width but ignores comments,
-which are therefore written and read here.
+evfem writes PCM, and in the chunk LIST/INFO/ICMT a JSON text with the full scale in volts, the speed, the
+first position and the carrier. scipy reads WAVs of any sample width (24 bits as 32, of which the lowest 8 are
+0) but ignores comments, which are therefore written and read here.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import json
 import re
 import struct
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,8 @@ from evfem.errors import InputError
 
 FORM = "evfem-voltage-1"
 KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
-LARGEST_SAMPLE = 32_767
+#: bits of a sample -> the largest one
+LARGEST = {16: 2**15 - 1, 24: 2**23 - 1, 32: 2**31 - 1}
 MOST_SAMPLES = 50_000_000
 MOST_PATTERN = 1_000_000
 #: events of an AHAP that are felt; parameters that shape them, and the value that does not
@@ -44,12 +45,32 @@ MILLIMETRE, PIECES = -3, 64
 FROM = re.compile(r"from (\S+) mm")
 
 
-def encoded(samples: Any, rate: int, scale: dict[str, Any]) -> bytes:
-    """A WAV of 16-bit samples with the comment `scale`, which has the keys `KEYS`."""
+def encoded(fractions: Floats, rate: int, scale: dict[str, Any]) -> bytes:
+    """A WAV of samples (n,) from -1 to 1 with the comment `scale`, which has the keys `KEYS`, and where they
+    are not 16 and none the `bits` of a sample and what the `second` channel has (`SECOND`).
+    """
     comment = json.dumps({"format": FORM, **scale}).encode("ascii") + b"\0"
-    header = struct.pack("<HHIIHH", 1, 1, rate, 2 * rate, 2, 16)
+    channels, bits = [fractions], scale.get("bits", 16)
+    if "second" in scale:
+        channels.append(SECOND[scale["second"]](fractions, rate))
+    whole = np.rint(np.column_stack(channels) * LARGEST[bits]).astype("<i4")
+    data = whole.view(np.uint8).reshape(-1, 4)[:, : bits // 8].tobytes()
+    block = len(channels) * bits // 8
+    header = struct.pack("<HHIIHH", 1, len(channels), rate, block * rate, block, bits)
     body = _riff_chunk(b"fmt ", header) + _riff_chunk(b"LIST", b"INFO" + _riff_chunk(b"ICMT", comment))
-    return _riff_chunk(b"RIFF", b"WAVE" + body + _riff_chunk(b"data", samples.astype("<i2").tobytes()))
+    return _riff_chunk(b"RIFF", b"WAVE" + body + _riff_chunk(b"data", data))
+
+
+def _trigger(fractions: Floats, rate: int) -> Floats:
+    """The largest sample for a millisecond from the start, then 0."""
+    return (np.arange(fractions.size) < max(round(1e-3 * rate), 1)).astype(float)
+
+
+#: what a second channel has
+SECOND: dict[str, Callable[[Floats, int], Floats]] = {
+    "negative": lambda fractions, rate: -fractions,
+    "trigger": _trigger,
+}
 
 
 def _riff_chunk(name: bytes, content: bytes) -> bytes:
@@ -75,9 +96,12 @@ def read(
             rate, samples = wavfile.read(io.BytesIO(data))
     except Exception:  # whatever scipy raises for a damaged file
         raise InputError(key, f"{path.name}, cut off or of another kind", allowed) from None
+    scale = _comment(data)
+    if samples.ndim == 2 and "second" in scale:
+        samples = samples[:, 0]
     if samples.ndim > 1 + several or samples.size == 0 or rate <= 0:
         raise InputError(key, f"{path.name}, with several channels or no samples", allowed)
-    return int(rate), samples, _comment(data)
+    return int(rate), samples, scale
 
 
 def _comment(data: bytes) -> dict[str, Any]:
@@ -90,8 +114,10 @@ def _comment(data: bytes) -> dict[str, Any]:
     return {}
 
 
-def normalised_samples(samples: Any) -> Floats:
-    """Samples of any width as fractions of the largest one, -1 to 1."""
+def normalised_samples(samples: Any, bits: int = 0) -> Floats:
+    """Samples of any width as fractions of the largest one, -1 to 1; 24 `bits` are those above 8 zeros."""
+    if bits == 24:
+        return np.asarray(samples / (256.0 * LARGEST[24]))
     if samples.dtype.kind == "f":
         return np.asarray(samples, dtype=float)
     if samples.dtype.kind == "u":  # 8 bit, around 128

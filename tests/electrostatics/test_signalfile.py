@@ -5,6 +5,7 @@ import json
 import re
 import struct
 import wave
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,6 +52,55 @@ def test_other_readers_find_the_samples_of_the_wav(tmp_path):
         "start_mm": 1.0,
         "carrier_Hz": None,
     }
+
+
+@pytest.mark.parametrize("bits", [16, 24, 32])
+@pytest.mark.parametrize("second", [None, "negative", "trigger"])
+def test_wide_samples_and_a_second_channel_are_read_by_others_and_come_back(tmp_path, bits, second):
+    """The standard library's `wave` and scipy 1.17, which puts 24 bits above 8 zeros."""
+    path, largest = tmp_path / "tone.wav", 2 ** (bits - 1) - 1
+    ev.write_signal(path, JUMP, replace(DEVICE, bits=bits, second=second))
+    channels = 1 if second is None else 2
+    with wave.open(str(path)) as reader:
+        assert (reader.getnchannels(), reader.getsampwidth()) == (channels, bits // 8)
+        data = reader.readframes(reader.getnframes())
+    frames = np.frombuffer(data, np.uint8).reshape(-1, channels, bits // 8)
+    numbers = [
+        [int.from_bytes(one.tobytes(), "little", signed=True) for one in frames[i]]
+        for i in (0, 1, 1000, 4000)
+    ]
+    expected = [0, round(JUMP(1.0025) / 2000.0 * largest), largest, -round(0.75 * largest)]
+    assert [frame[0] for frame in numbers] == expected
+    if second == "negative":
+        assert [frame[1] for frame in numbers] == [-one for one in expected]
+    if second == "trigger":  # 1 ms at 8 kHz
+        assert [int.from_bytes(one.tobytes(), "little", signed=True) for one in frames[:9, 1]] == [
+            largest
+        ] * 8 + [0]
+    _, samples = wavfile.read(path)
+    assert samples.reshape(4001, channels)[1000, 0] == (largest << 8 if bits == 24 else largest)
+    step = 0.5 * 2000.0 / largest * (1 + 1e-6)
+    back = ev.read_signal(path)
+    assert np.max(np.abs(back.voltage - JUMP(back.position))) <= step
+    sampled = ev.Sampled.from_wav(path, 2000.0)
+    assert np.max(np.abs(sampled.voltage - back.voltage)) < 1e-9 * 2000.0
+    if (bits, second) == (16, None):
+        assert not {"bits", "second"} & comment_of(path).keys()  # as 0.3 wrote it
+
+
+@pytest.mark.others
+@pytest.mark.parametrize("bits", [16, 24, 32])
+def test_soundfile_reads_what_is_written(tmp_path, bits):
+    """soundfile 0.14 with libsndfile: the kind of samples by its name, and the samples as fractions."""
+    import soundfile
+
+    ev.write_signal(tmp_path / "tone.wav", JUMP, replace(DEVICE, bits=bits, second="negative"))
+    told = soundfile.info(tmp_path / "tone.wav")
+    assert (told.subtype, told.channels, told.samplerate, told.frames) == (f"PCM_{bits}", 2, 8000, 4001)
+    samples, _ = soundfile.read(tmp_path / "tone.wav")  # of 2 ** (bits - 1)
+    at = 1.0 + 20.0 / 8000 * np.arange(4001)
+    np.testing.assert_allclose(samples[:, 0] * 2000.0, JUMP(at), atol=2000.0 * 1.6 / 2 ** (bits - 1))
+    np.testing.assert_array_equal(samples[:, 0], -samples[:, 1])
 
 
 def test_a_wav_comes_back_as_a_voltage_for_a_scene(tmp_path):
@@ -131,6 +181,9 @@ def test_a_column_has_the_voltage_in_its_middle(tmp_path):
         ({"full_scale": 100.0, "pixel": 0.0}, "pixel: given 0.0"),
         ({"full_scale": 100.0, "friction": (0.6, 0.5)}, "the second one larger"),
         ({"full_scale": 100.0, "friction": 0.6}, "two friction coefficients"),
+        ({"full_scale": 100.0, "bits": 8}, "bits: given 8; allowed: 16 | 24 | 32"),
+        ({"full_scale": 100.0, "bits": 24.0}, "bits: given 24.0"),
+        ({"full_scale": 100.0, "second": "left"}, 'second: given "left"; allowed: negative | trigger'),
     ],
 )
 def test_a_playback_that_cannot_be_is_refused(settings_, says):
@@ -287,6 +340,11 @@ def test_the_command_writes_what_it_is_asked_for(tmp_path, capsys):
     direct = tmp_path / "direct.wav"
     ev.write_signal(direct, JUMP, DEVICE)
     assert out.read_bytes() == direct.read_bytes()
+    wide = ["--rate", "8000", "--bits", "24", "--second", "trigger"]
+    assert cli.main(["signal", str(source), "--out", str(out), *scale, *wide]) == 0
+    ev.write_signal(direct, JUMP, replace(DEVICE, bits=24, second="trigger"))
+    assert out.read_bytes() == direct.read_bytes()
+    assert "at most 2000 V" in capsys.readouterr().out
     assert cli.main(["signal", str(out), "--out", str(tmp_path / "back.csv")]) == 0
     back = ev.read_signal(tmp_path / "back.csv")
     assert back.voltage.tolist() == ev.read_signal(out).voltage.tolist()
