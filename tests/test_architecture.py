@@ -62,7 +62,7 @@ ROOMS = {
     ),
     "surface": (
         {"numpy", "scipy"},
-        "ways friction adhesion patches elastic surfaces relief textures usersurface pad skin",
+        "ways friction adhesion patches elastic surfaces relief textures usersurface pad skin spread",
     ),
     "contact": ({"numpy", "scipy"}, "below byforce signorini solve follower condensed stability"),
     "terms": (

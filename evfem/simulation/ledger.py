@@ -95,7 +95,7 @@ class EnergyAccount:
             **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
             "min_gap": float(surface_state(model.surface, places).gap.min()),
-            "peak_contact_pressure": float((pressing / current_lengths(model, position)).max()),
+            "peak_contact_pressure": float(tractions(model, position, pressing, pressing).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
             "stored_energy": end.stored + end.springs,
@@ -170,6 +170,14 @@ def current_lengths(model: Model, position: Floats) -> Floats:
     return _positive(model.pad.tributary(position))
 
 
+def tractions(model: Model, position: Floats, pressing: Floats, force: Floats) -> Floats:
+    """Tractions (P,) in MPa of contact forces (P,) of pad nodes under pressing ones (P,), in N/mm or N: over
+    what nodes stand for, above an elastic surface even along the facets of an outline.
+    """
+    length = current_lengths(model, position)
+    return model.equilibrium.interface.foundation.evened(pressing / length, force / length)
+
+
 def _positive(length: Floats) -> Floats:
     return np.where(length > 0, length, np.inf)
 
@@ -178,8 +186,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
     size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
     surface, withheld = surface_state(model.surface, interface.places(state)), interface.withheld(state)
-    length = current_lengths(model, interface.positions(state.u))
-
+    position, pressing = interface.positions(state.u), state.contact_force[:, 0] + withheld
     pulled = _positive(model.attraction.weights(interface.pad_state(state, state.touching)))
 
     def on_pad(values: Any, off: float) -> Any:
@@ -195,8 +202,8 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         position=row["position"],
         displacement=model.body.whole(state.u).copy(),
         gap=on_pad(surface.gap, np.nan),
-        contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / length, 0.0),
-        shear_traction=on_pad(_shear(state) / length, 0.0),
+        contact_pressure=on_pad(tractions(model, position, pressing, pressing), 0.0),
+        shear_traction=on_pad(tractions(model, position, pressing, _shear(state)), 0.0),
         electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
         surface_sink=on_pad(interface.foundation.sink(state), 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from itertools import product
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from evfem.contact.below import RIGID_BELOW, RigidBelow
 from evfem.contact.condensed import COMPONENTS
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
+from evfem.surface.spread import Facets, by_nodes, strips_below
 
 #: height of the loaded zone in node distances: nodes above it have no foundation; in space with an attraction
 #: too
@@ -164,6 +165,10 @@ class Rigid(Room):
         """The same attraction as above the undeformed surface, whose work is that of the field."""
         return force
 
+    def evened(self, pressure: Floats, traction: Floats) -> Floats:
+        """A traction (P,) of nodes under a pressure (P,), without what its facets make alternate."""
+        return traction
+
     def missed(self, position: Floats, state: Any, force: Floats) -> float:
         """Relative residual of the surface displacement under the forces on the nodes (P, dim)."""
         return 0.0
@@ -293,6 +298,14 @@ class ElasticFoundation(Rigid):
         found[:, ::2] = along - state.memory[GRADIENT][:, :, 1] * force[:, 1:2]
         return found
 
+    @cached_property
+    def _facets(self) -> Facets:
+        return Facets(self.pad, self.rest)
+
+    def evened(self, pressure: Floats, traction: Floats) -> Floats:
+        flat = not self.surface.relief(self.rest[:, ::2])[2].any()
+        return self._facets.evened(pressure, traction) if flat else traction
+
     def under(self, position: Floats, state: Any) -> Yielding:
         """The surface below nodes at `position` (P, dim) in a state."""
         return self.below(self.places(position, state), surface_state(self.surface, position).gap)
@@ -336,10 +349,10 @@ class ElasticFoundation(Rigid):
     def _made(self, position: Floats, near: Any) -> Yielding:
         length = self.pad.tributary(position)
         over = np.flatnonzero((length > 0.0) & near)
-        flat, length, dim = position[over, ::2], np.maximum(length[over], self.least), position.shape[1]
-        x = flat[:, 0] if dim == 2 else flat
-        compliances, changed = self.elastic.compliance(x, length), slopes(self.elastic, x, length)
-        compliance, *slope = (_by_nodes(np.asarray(each), dim) for each in (compliances, *changed))
+        below = strips_below(self.pad, position, over, np.maximum(length[over], self.least))
+        x, size, dim = below.places, below.sizes, position.shape[1]
+        found = np.asarray(self.elastic.compliance(x, size)), *slopes(self.elastic, x, size)
+        compliance, *slope = (by_nodes(below.below_nodes(each), dim) for each in found)
         return Yielding(over, compliance, np.stack(slope), self._left)
 
 
@@ -359,18 +372,6 @@ def foundation_of(interface: Any) -> Rigid:
 def _kept(state: Any) -> Floats:
     """Surface stretch along x[, z], deformed over undeformed lengths, (P, d, d)."""
     return np.asarray(np.eye(state.memory[GRADIENT].shape[1]) - state.memory[GRADIENT][:, :, ::2])
-
-
-def _by_nodes(found: Floats, dim: int) -> Floats:
-    """A matrix (dim k, dim k) of a surface, for forces on the finger along x, y[, z] node by node: those on
-    the surface, component by component, are into it and along +x[, +z], F_y, -F_x[, -F_z].
-    """
-    size, order, sign = len(found) // dim, np.array([1, 0, 2])[:dim], np.array([-1.0, 1.0, -1.0])[:dim]
-    blocks = found.reshape(dim, size, dim, size)
-    made = np.empty((size, dim, size, dim))
-    for p, q in product(range(dim), repeat=2):
-        np.multiply(blocks[order[p], :, order[q]], sign[p] * sign[q], out=made[:, p, :, q])
-    return made.reshape(dim * size, dim * size)
 
 
 def slopes(elastic: Any, x: Floats, length: Floats) -> Floats:
