@@ -7,7 +7,10 @@ VTK in turn reads no integers of meshio's `.vtk`, so that meshio is asked first.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -17,6 +20,8 @@ if TYPE_CHECKING:
     import meshio
 
 LZ4, TEXT, RAW, COLOURS = b"vtkLZ4DataCompressor", b'type="String"', b'encoding="raw"', b"COLOR_SCALARS"
+#: seconds after which VTK is not waited for
+LONGEST = 300.0
 #: what to do without VTK
 SAVE = {
     ".vtk": "a kind of .vtk that is read with VTK alone: pip install 'evfem[vtk]', or save as .vtu",
@@ -56,47 +61,40 @@ def _without_texts(content: bytes, clean: Path) -> None:
 
 
 def _by_vtk(path: Path, clean: Path) -> None:
-    """Write a `.vtu` of numbers from what VTK reads, which says nothing on the terminal."""
-    try:
-        from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
-        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-    except ModuleNotFoundError:
-        raise ValueError(SAVE[path.suffix.lower()]) from None
-    shown, verbosity = vtkObject.GetGlobalWarningDisplay(), vtkLogger.GetCurrentVerbosityCutoff()
-    vtkObject.SetGlobalWarningDisplay(0)
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        grid = _grid(path)
-        for data in (grid.GetPointData(), grid.GetCellData(), grid.GetFieldData()):
-            for name in [data.GetAbstractArray(k).GetName() for k in range(data.GetNumberOfArrays())]:
-                if data.GetArray(name) is None:  # a text
-                    data.RemoveArray(name)
-        writer = vtkXMLUnstructuredGridWriter()
-        writer.SetInputData(grid)
-        writer.SetFileName(str(clean))
-        writer.Write()
-    finally:
-        vtkObject.SetGlobalWarningDisplay(shown)
-        vtkLogger.SetStderrVerbosity(verbosity)
+    """Write a `.vtu` of numbers from what VTK reads, in a process of its own: damaged files end it."""
+    if find_spec("vtkmodules") is None:
+        raise ValueError(SAVE[path.suffix.lower()])
+    command = [sys.executable, "-P", __file__, str(path.resolve()), str(clean)]
+    run = subprocess.run(command, capture_output=True, timeout=LONGEST, check=False)
+    if run.returncode or not clean.is_file():
+        raise ValueError("damaged, or without cells")
 
 
-def _grid(path: Path) -> Any:
-    """VTK's unstructured grid of a file."""
+def convert(path: str, clean: str) -> None:
+    """Write a `.vtu` without texts; VTK writes none where nothing was read."""
     from vtkmodules.vtkFiltersCore import vtkAppendFilter
     from vtkmodules.vtkIOLegacy import vtkDataSetReader
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader, vtkXMLUnstructuredGridWriter
 
-    legacy = path.suffix.lower() == ".vtk"
+    legacy = path.lower().endswith(".vtk")
     reader: Any = vtkDataSetReader() if legacy else vtkXMLUnstructuredGridReader()
     if legacy:
         reader.ReadAllScalarsOn()
         reader.ReadAllFieldsOn()
-    reader.SetFileName(str(path))
-    reader.Update()
-    found = reader.GetOutputDataObject(0)
-    if found is None or not found.GetNumberOfCells():
-        raise ValueError("damaged, or without cells")
+    reader.SetFileName(path)
     append = vtkAppendFilter()  # makes other kinds of grids unstructured
-    append.AddInputData(found)
+    append.AddInputConnection(reader.GetOutputPort())
     append.Update()
-    return append.GetOutput()
+    grid = append.GetOutput()
+    for data in (grid.GetPointData(), grid.GetCellData(), grid.GetFieldData()):
+        for name in [data.GetAbstractArray(k).GetName() for k in range(data.GetNumberOfArrays())]:
+            if data.GetArray(name) is None:  # a text
+                data.RemoveArray(name)
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetFileName(clean)
+    writer.Write()
+
+
+if __name__ == "__main__":
+    convert(*sys.argv[1:])
