@@ -204,10 +204,10 @@ def _reason(error: BaseException, said: str, path: Path) -> str:
     if isinstance(error, ModuleNotFoundError):
         reason = f"a format that needs {error.name}: pip install 'evfem[meshes]'"
     elif isinstance(error, KeyError):
-        reason = f"{error.args[0]}, which meshio does not know or misses"
+        reason = f"{error.args[0]}, which is missing or not known"
     if PHYSICAL in reason:
         reason = "version 4.1 with elements outside of physical groups: save with Mesh.SaveAll = 0"
-    return " ".join(reason.split())[:200] or "damaged, or of a kind that meshio does not know"
+    return " ".join(reason.split())[:200] or "damaged, or of a kind that is not known"
 
 
 def _one_kind(path: Path, kinds: list[str]) -> str:

@@ -5,6 +5,8 @@ its regions are those of the straight one, and the Jacobian determinant is the s
 which it is not where a reader has the nodes in another order.
 """
 
+import subprocess
+import sys
 from pathlib import Path
 
 import meshio
@@ -64,6 +66,16 @@ def test_what_a_format_carries_is_read(name):
     others = {"metres": "quad9", "shell9": "quad9", "trishell6": "triangle6"}
     others |= {"unnamed": "hexahedron27", "functions": "quad"}
     assert is_the_body(WRITTEN / name, *READ[name]).kind == others.get(kind, kind)
+
+
+@pytest.mark.others
+@pytest.mark.parametrize("library", ["gmsh", "pyvista"])
+def test_what_the_libraries_write_today_is_read(library, tmp_path):
+    subprocess.run([sys.executable, WRITTEN / "make.py", library, tmp_path], check=True)
+    names = [name for name in READ if name.startswith(library)]
+    assert names
+    for name in names:
+        is_the_body(tmp_path / name, *READ[name])
 
 
 def rows_of_the_table():

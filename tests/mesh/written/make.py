@@ -6,6 +6,7 @@
     python make.py pyvista        # pyvista 0.49.1, vtk 9.7.2
     python make.py dolfinx        # fenics-dolfinx 0.5.2
 
+A folder after that is where the files go instead.
 Every file has the body of `tests/mesh/test_written.py`: 8 x 4 mm, in space 3 mm deep, the lower 3 mm `skin`,
 the rest `tissue`, `pad` at y = 0 and `bone` at y = 4, with x moved by y^2 / 10 and z by y^2 / 20, which
 changes no area and no volume and is in the span of elements of second order. Cells are 2 x 2 (x 1).
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-HERE = Path(__file__).parent
+HERE = Path(sys.argv[2]) if len(sys.argv) > 2 else Path(__file__).parent
 X, Y, Z = (0.0, 2.0, 4.0, 6.0, 8.0), (0.0, 1.5, 3.0, 3.5, 4.0), (0.0, 1.5, 3.0)
 
 
