@@ -182,16 +182,22 @@ def test_what_a_format_does_not_carry_is_refused_with_the_reason(name, said):
     refuses(said, read, WRITTEN / name)
 
 
+def level(low, high, dim):
+    """A box of all that is between two heights."""
+    return {"box": [[-99.0, low, -99.0][:dim], [99.0, high, 99.0][:dim]]}
+
+
 @pytest.mark.parametrize(
-    ("name", "regions"),
+    ("name", "dim"),
     [
-        ("gmsh_all_2.2.msh", {"tissue": {"y": [3, 4]}, "skin": "rest"}),  # saved with all: it has no groups
-        ("gmsh_quad9.bdf", {"skin": 1, "tissue": 2}),
-        *((f"gmsh_{kind}.su2", {"tissue": {"y": [3, 4]}, "skin": "rest"}) for kind in (*FIRST, *SECOND)),
+        ("gmsh_all_2.2.msh", 2),  # saved with all elements: it has no groups
+        ("gmsh_quad9.bdf", 2),
+        *((f"gmsh_{kind}.su2", 3 if "hex" in kind else 2) for kind in (*FIRST, *SECOND)),
     ],
 )
-def test_what_a_format_does_not_carry_is_given_by_place(name, regions):
-    is_the_body(WRITTEN / name, regions, {"pad": {"y": [0, 0]}, "bone": {"y": [4, 4]}})
+def test_what_a_format_does_not_carry_is_given_by_place(name, dim):
+    regions = {"tissue": level(3, 4, dim), "skin": "rest"}
+    is_the_body(WRITTEN / name, regions, {"pad": level(0, 0, dim), "bone": level(4, 4, dim)})
 
 
 @pytest.mark.parametrize("kind", ["triangle6", "quad9"])
