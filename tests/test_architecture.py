@@ -99,7 +99,7 @@ ROOMS = {
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
-        "texture generate library importing importers",
+        "texture generate library importing scans importers",
     ),
     "estimate": (
         {"numpy", "scipy"},

@@ -26,6 +26,7 @@ from evfem.electrostatics import wav
 from evfem.errors import InputError, quoted
 from evfem.textures.generate import phases
 from evfem.textures.importing import IMPORTERS, POSITIVE, Heights, Importer, line_of
+from evfem.textures.scans import line_in
 from evfem.textures.texture import QUANTITIES, Texture
 
 #: units of length -> mm
@@ -172,16 +173,18 @@ def _scale(name: str, own: str | None, unit: str | None) -> float:
 @dataclass(frozen=True, kw_only=True)
 class Scan(Heights, kind="scan"):
     """A line along x through a scanned surface, or a scanned profile, in one of the forty formats of
-    SurfaceTopography (extra `scans`); heights of .x3p files are in metres (ISO 25178-72).
+    SurfaceTopography (extra `scans`), or what it leaves of .x3p and .tmd (`evfem.textures.scans`).
     """
 
     row: Row = 0.5
     unit: Unit = None
 
-    endings = (".x3p", ".sur", ".al3d", ".nc", ".opd", ".plux", ".di")
+    endings = (".x3p", ".tmd", ".sur", ".al3d", ".nc", ".opd", ".plux", ".di")
 
     def __call__(self, path: str | Path) -> Texture:
         path = Path(path)
+        if own := line_in(path, self.row) if path.is_file() else ():
+            return self.heights(path, "scan", own[0], own[1], [own[2]])
         if find_spec("SurfaceTopography") is None:
             raise InputError("file", path.name, 'the extra scans: pip install "evfem[scans]"')
         topography = _topography(path)
