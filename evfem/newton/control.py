@@ -21,7 +21,7 @@ enters linearly. `docs/howto/extend.md` shows a user-defined control.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,9 +31,8 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
-from evfem.contact.signorini import STICK
-from evfem.newton.search import Trials, Wish, strength
-from evfem.newton.state import State, StepFailed
+from evfem.newton.search import Trials, Wish, sticks, strength
+from evfem.newton.state import OutOfReach, State, StepFailed
 from evfem.terms.hand import RIGID, Drive
 from evfem.terms.traction import PadState, Reading, smallest_gap
 
@@ -45,7 +44,7 @@ JUMP = 0.25
 TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown found from the friction force
 AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
-#: a wished force is met if less is missed than so many tolerances of the largest force on the bone
+#: a wish is met if less is missed than so many tolerances of the largest force on the bone, or of the gap
 MET = 100.0
 
 
@@ -175,9 +174,9 @@ class VoltageControl:
         """The equilibrium of a step. Raises `StepFailed`."""
         return trials.solve(self)
 
-    def missed(self, state: State, tolerance: float) -> float:
-        """Wished less reached force (N/mm) of an accepted state, 0 where the wish is met."""
-        return 0.0
+    def misses(self, row: Mapping[str, Any], state: State, tolerance: float) -> dict[str, float]:
+        """Wished less reached, by its column, of an accepted state and its row; 0 where the wish is met."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -274,8 +273,19 @@ class GivenGap(ConstrainedVoltage):
     def solve(self, step: LinearContactStep, problem: VoltageProblem) -> VoltageStep:
         found = super().solve(step, problem)
         if problem.squared == 0.0 and found.change < 0.0:
-            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(problem.pad).value), [])
+            raise OutOfReach(TOO_WIDE.format(self.gap, smallest_gap(problem.pad).value), [])
         return found
+
+    def find(self, trials: Trials) -> State:
+        """With the voltage as an unknown, or without one where the gap is never so wide."""
+        try:
+            return trials.solve(self)
+        except OutOfReach:
+            return trials.solve(GivenVoltage(0.0))
+
+    def misses(self, row: Mapping[str, Any], state: State, tolerance: float) -> dict[str, float]:
+        found = self.gap - row["min_gap"]
+        return {"missed_gap": found if abs(found) > MET * tolerance * self.gap else 0.0}
 
 
 @dataclass
@@ -347,13 +357,12 @@ class FollowFriction(VoltageControl):
         return Wish(forward * self.force, forward * direction, self.voltage)
 
     def missed(self, state: State, tolerance: float) -> float:
+        """Wished less reached force (N/mm)."""
         found = self._force_residual(state.reaction)
         return found if abs(found) > MET * tolerance * strength(state) else 0.0
 
-
-def sticks(state: State) -> bool:
-    """Whether any node sticks."""
-    return bool((state.status == STICK).any())
+    def misses(self, row: Mapping[str, Any], state: State, tolerance: float) -> dict[str, float]:
+        return {"missed_force": self.missed(state, tolerance)}
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from evfem.newton.control import Force, Indentation, Target, Unsupported, Voltag
 from evfem.newton.factorised import FactorisedBody
 from evfem.newton.interface import Interface
 from evfem.newton.search import Trials, strength
-from evfem.newton.state import Balance, Folded, Limits, State, StepFailed
+from evfem.newton.state import Balance, Folded, Limits, OutOfReach, State, StepFailed
 from evfem.newton.strategy import stuck
 from evfem.terms.traction import TOUCHING, PadState, PadTraction
 
@@ -160,7 +160,7 @@ class Equilibrium:
         except (ContactNotSolved, StepFailed) as error:
             self.body.discard()
             reason = error.reason if isinstance(error, StepFailed) else f"contact: {error}"
-            kind = Folded if isinstance(error, Folded) else StepFailed
+            kind = type(error) if isinstance(error, (Folded, OutOfReach)) else StepFailed
             failed = kind(reason, self.record.residuals)
             failed.unstable = isinstance(error, Unstable)
             failed.findings = "" if self._iterate is None else self.body.findings(*self._iterate)

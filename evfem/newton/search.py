@@ -29,6 +29,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT, SMALLEST_FORCE
+from evfem.contact.signorini import STICK
 from evfem.newton.state import State, StepFailed
 
 #: most equilibria at raised voltages, those of them that may fail, and most between two voltages
@@ -178,3 +179,8 @@ class Trials:
 def strength(state: State) -> float:
     """Largest force on the bone (N/mm), to which tolerances are relative."""
     return max(float(np.abs(state.reaction).max()), SMALLEST_FORCE)
+
+
+def sticks(state: State) -> bool:
+    """Whether any node sticks."""
+    return bool((state.status == STICK).any())

@@ -40,6 +40,10 @@ class Folded(StepFailed):
     """
 
 
+class OutOfReach(StepFailed):
+    """No voltage makes what is wished of it, and none at all is the nearest."""
+
+
 class LiftedOff(StepFailed):
     """The finger came off the surface during pseudo-transient continuation: the pull is larger than the
     attraction.

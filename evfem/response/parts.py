@@ -24,7 +24,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, sizes
-from evfem.newton.control import MET, ConstrainedVoltage, FollowFriction, Target, Unsupported
+from evfem.newton.control import MET, ConstrainedVoltage, FollowFriction, KeptCharge, Target, Unsupported
 from evfem.newton.interface import Interface
 from evfem.newton.search import strength
 from evfem.newton.state import State
@@ -118,10 +118,12 @@ class Equations:
     def voltage_by(self, state: State) -> str:
         """What determines the voltage of the accepted `state`: one of the words at the head of this file."""
         control, tolerance = self.target.voltage, self.model.equilibrium.tolerance
-        if not isinstance(control, FollowFriction):
+        if not control.sought or isinstance(control, KeptCharge):
             return WISH if control.sought else GIVEN
         if state.voltage == 0.0:
             return ZERO
+        if not isinstance(control, FollowFriction):
+            return WISH
         if control.missed(state, tolerance) == 0.0:
             return WISH
         if state.voltage in (control.voltage, self.old.voltage):

@@ -47,6 +47,8 @@ STRAINED_POINTS = 32
 WORKS = {2: "N mm/mm", 3: "N mm"}
 #: penetration that is worth a warning, relative to the size of the finger
 SUNK = 1e-6
+#: beyond so many rows that miss a wish one sentence tells them all
+MANY = 3
 
 
 def free_nodes(model: Model) -> Ints:
@@ -242,15 +244,37 @@ def _climbed(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _missed(rows: Sequence[Row]) -> Iterator[str]:
-    """Rows whose friction force is not the wished one."""
-    unit = "N" if "contact_area" in rows[0] else "N/mm"
-    for row in rows:
-        if (missed := row.get("missed_force", 0.0)) != 0.0:
-            reached = row["applied_tangential_force"]
+    """Rows whose friction force or gap is not the wished one: each, or all at once if they are many."""
+    for name, reached, unit in (
+        ("missed_force", "applied_tangential_force", FORCES[_dim(rows)]),
+        ("missed_gap", "min_gap", "mm"),
+    ):
+        missed = [row for row in rows if row.get(name, 0.0) != 0.0]
+        for group in [missed] if len(missed) > MANY else [[row] for row in missed]:
+            found, volts = _column(group, reached), _column(group, "voltage")
             yield (
-                f"step {row['step']}: wished {reached + missed:.3g}, reached {reached:.3g} {unit} at "
-                f"{row['voltage']:.4g} V"
+                f"{_steps([row['step'] for row in group])}: wished {_span(found + _column(group, name), 3)}, "
+                f"reached {_span(found, 3)} {unit} at {_span(volts, 4)} V"
             )
+
+
+def _steps(numbers: list[int]) -> str:
+    """Step numbers in growing order as ranges.
+
+    >>> _steps([3, 4, 5, 8]), _steps([7])
+    ('steps 3 to 5, 8', 'step 7')
+    """
+    there = set(numbers)
+    starts = [one for one in numbers if one - 1 not in there]
+    ends = [one for one in numbers if one + 1 not in there]
+    runs = [f"{a}" if a == b else f"{a} to {b}" for a, b in zip(starts, ends, strict=True)]
+    return f"step{'s' if len(numbers) > 1 else ''} {', '.join(runs)}"
+
+
+def _span(values: Floats, digits: int) -> str:
+    """The smallest and the largest of some values, or the one that they are to so many digits."""
+    ends = dict.fromkeys(f"{one:.{digits}g}" for one in (values.min(), values.max()))
+    return " to ".join(ends)
 
 
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:

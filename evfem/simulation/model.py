@@ -35,7 +35,7 @@ from evfem.terms.charging import NO_CHARGES, ChargeBooks, Charging, NoCharges
 from evfem.terms.foundation import Penalties, foundation_of
 from evfem.terms.friction import LawFriction
 from evfem.terms.hand import Drive, drive_of
-from evfem.terms.sources import source_of
+from evfem.terms.sources import GAP_COLUMNS, source_of
 from evfem.terms.traction import PadTraction
 from evfem.terms.tractions import sum_of
 from evfem.tissue.body import Body
@@ -92,8 +92,13 @@ class Model:
         """Columns of the scene's rooms in the history."""
         parts = (one for one in self.attraction.parts if one.name != ELECTROSTATIC)
         forces = (column for one in parts for column in one.named(self.mesh.dim))
-        own = source_of(self.scene.electrics.voltage).columns
-        return (*forces, *(column for room in self.shown for column in room.columns), *own)
+        return (*forces, *(column for room in self.shown for column in room.columns), *self.missed)
+
+    @cached_property
+    def missed(self) -> tuple[Column, ...]:
+        """Columns of what wishes of a voltage miss."""
+        gaps = any(motion.course.gap is not None for motion in self.scene.motion)
+        return (*source_of(self.scene.electrics.voltage).columns, *(GAP_COLUMNS if gaps else ()))
 
     @cached_property
     def shear_modulus(self) -> Floats:

@@ -378,7 +378,8 @@ class Run:
         """The row of a state at the end of a request, without its costs."""
         at = request.step, request.motion_index, request.kind, self.time + request.duration
         voltage, tolerance = request.path(0.0, 1.0).voltage, self.model.equilibrium.tolerance
-        return ledger.row(state, *at) | self.source.values(voltage, state, tolerance)
+        row = ledger.row(state, *at) | {one.name: 0.0 for one in self.model.missed}
+        return row | voltage.misses(row, state, tolerance)
 
     def keep_last_frame(self) -> None:
         """The fields of the last step, wanted or not."""

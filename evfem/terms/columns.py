@@ -9,7 +9,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.terms.charging import ChargeBooks
 from evfem.terms.foundation import ElasticFoundation
-from evfem.terms.sources import ForceSource
+from evfem.terms.sources import GAP_COLUMNS, ForceSource
 from evfem.terms.traction import force_columns
 
 #: by name: a run has those of its scene's rooms
@@ -20,6 +20,7 @@ COLUMNS = {
         *ElasticFoundation.columns,
         *ChargeBooks.columns,
         *ForceSource.columns,
+        *GAP_COLUMNS,
     )
 }
 
@@ -46,3 +47,4 @@ class OfRooms:
     stretch_work = _of_room("stretch_work")
     field_energy = _of_room("field_energy")
     missed_force = _of_room("missed_force")
+    missed_gap = _of_room("missed_gap")

@@ -88,7 +88,7 @@ class Source:
     """A constant voltage, or that of ramps; `signal` is the scene's."""
 
     signal: Any = 0.0
-    #: columns of the history
+    #: columns of the history, of what it misses
     columns: ClassVar[tuple[Column, ...]] = ()
 
     def at(self, moment: Moment) -> float:
@@ -111,10 +111,6 @@ class Source:
     def turns(self, begin: Moment, end: Moment) -> Floats:
         """Fractions (k,) of a step from `begin` to `end` at which what is prescribed turns."""
         return np.zeros(0)
-
-    def values(self, control: Any, state: Any, tolerance: float) -> dict[str, float]:
-        """Values of the `columns` of an accepted state at the end of a step with this control."""
-        return {}
 
     def pulls(self, moment: Moment) -> bool:
         """Whether anything may attract an unloaded finger at a moment."""
@@ -200,9 +196,6 @@ class ForceSource(Source):
     def turns(self, begin: Moment, end: Moment) -> Floats:
         return over_places(self.signal, begin.along, end.along, 1) if end.slides else np.zeros(0)
 
-    def values(self, control: Any, state: Any, tolerance: float) -> dict[str, float]:
-        return {"missed_force": control.missed(state, tolerance)}
-
     def pulls(self, moment: Moment) -> bool:
         return True
 
@@ -215,6 +208,8 @@ class ForceSource(Source):
             raise InputError("electrostatics.law", scene.law, allowed)
 
 
+#: columns of scenes in which a voltage makes gaps
+GAP_COLUMNS = (Column("missed_gap", "mm", "wished less reached smallest gap"),)
 #: kinds of a scene's voltage, the particular ones first
 KINDS = (
     (FollowForce, ForceSource),

@@ -225,9 +225,34 @@ def test_a_gap_that_its_voltage_does_not_hold_is_told_when_it_is_let_go(dim):
         ev.simulate(scene(dim, 0.0, [replace(ramp, gap=0.05, steps=5), ev.Slide(0.01, steps=1)]))
 
 
-def test_a_wider_gap_than_without_a_voltage_is_refused_with_a_sentence():
-    with pytest.raises(ev.NotConverged, match=r"no voltage makes .* without one it is 0[.]1 mm"):
-        ev.simulate(scene(2, 0.0, [ev.VoltageRamp(gap=0.2, steps=1)]))
+@pytest.mark.parametrize("dim", [2, 3])
+def test_of_a_wider_gap_than_without_a_voltage_the_nearest_is_taken_and_told(dim):
+    """That of 0 V, also from a gap that only a voltage holds; the next ramp goes on from there."""
+    motion = [
+        ev.VoltageRamp(gap=0.06, steps=2),
+        ev.VoltageRamp(gap=0.2, steps=1),
+        ev.VoltageRamp(gap=0.08, steps=1),
+    ]
+    found = ev.simulate(scene(dim, 0.0, motion))
+    np.testing.assert_allclose(found.min_gap, [0.1, 0.08, 0.06, 0.1, 0.08], rtol=1e-8)
+    np.testing.assert_allclose(found.missed_gap, [0.0, 0.0, 0.0, 0.1, 0.0], rtol=1e-8)
+    assert (found.voltage == 0.0).tolist() == [True, False, False, True, False]
+    assert found.voltage[4] == pytest.approx(found.voltage[1], rel=1e-6)
+    assert [one for one in found.warnings if "wished" in one] == ["step 4: wished 0.2, reached 0.1 mm at 0 V"]
+
+
+def test_many_rows_that_miss_their_gap_are_told_in_one_sentence():
+    found = ev.simulate(scene(2, 0.0, [ev.VoltageRamp(gap=0.2, steps=5), ev.VoltageRamp(gap=0.09, steps=1)]))
+    (said,) = (one for one in found.warnings if "wished" in one)
+    assert said == "steps 2 to 6: wished 0.12 to 0.2, reached 0.1 mm at 0 V"
+
+
+def test_a_gap_that_is_missed_has_the_derivative_of_none():
+    """Its voltage stays 0, and wished less reached falls as the finger hovers higher."""
+    hover = scene(2, 0.0, [ev.VoltageRamp(gap=0.2, steps=1)])
+    found = ev.sensitivities(hover, ["motion.0.gap"], ["voltage", "min_gap"])
+    assert found["voltage", "motion.0.gap"][-1] == 0.0
+    assert found["min_gap", "motion.0.gap"][-1] == pytest.approx(1.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("seconds", [0.0, 1e-3])

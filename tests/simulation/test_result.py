@@ -30,7 +30,7 @@ CONTRACT = (
 #: those that follow where the scene has adhesion, an elastic surface, a voltage resolved in time or found
 OF_ROOMS = (
     "adhesive_force, adhesive_force_x, adhesive_force_z, adhesive_work, surface_sink, source_work, "
-    "leakage_dissipation, stretch_work, field_energy, missed_force"
+    "leakage_dissipation, stretch_work, field_energy, missed_force, missed_gap"
 )
 PLANE_ROOMS = tuple(name for name in ROOM_COLUMNS if not name.endswith("_z"))
 
