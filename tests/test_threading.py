@@ -19,7 +19,7 @@ FILES = {
     "elastic surface": 4,
     "adhesion": 2,
     "charges, drive, leakage": 3,
-    "viscosity, inertia, branches": 7,
+    "viscosity, inertia, branches": 3,
     "roughness": 0,
 }
 #: lines of heart and `response` that ask whether one of `ASKED` is None

@@ -150,7 +150,7 @@ def _profile(scene: Scene, mesh: Mesh) -> Iterator[str]:
 
 def _at_rest(scene: Scene) -> Iterator[str]:
     """Maxwell branches and viscosity in a scene with time, but without viscous or inertial dynamics."""
-    if scene.solver.timed or not any(motion.timed for motion in scene.motion):
+    if scene.solver.timed or not any(motion.takes_time for motion in scene.motion):
         return
     givers = (scene.finger, *scene.finger.materials.values())
     for name, does in {"relaxation": "its branches do", "viscosity": "its viscosity does"}.items():

@@ -115,7 +115,7 @@ class Motion(Named):
         raise NotImplementedError
 
     @property
-    def timed(self) -> bool:
+    def takes_time(self) -> bool:
         """Whether any time passes."""
         return self.course.takes_time
 

@@ -381,7 +381,7 @@ def _check_motion(scene: Scene) -> None:
 
 def _check_time(scene: Scene) -> None:
     timed = isinstance(scene.electrics.voltage, TimeSignal) or scene.electrics.resolved
-    if timed and scene.motion and not any(motion.timed for motion in scene.motion):
+    if timed and scene.motion and not any(motion.takes_time for motion in scene.motion):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
 

@@ -81,7 +81,7 @@ def account_arrays(ledger: EnergyAccount, state: State) -> dict[str, Any]:
         "given_forces": end.user_forces,
         "lift": ledger.pull_off.lift,
         "came_off": ledger.pull_off.came_off,
-        "energies": np.array([end.stored, end.springs, end.kinetic]),
+        "energies": np.array(end.energies),
     }
 
 

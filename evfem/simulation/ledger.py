@@ -98,8 +98,7 @@ class EnergyAccount:
             "peak_contact_pressure": float(tractions(model, position, pressing, pressing).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
-            "stored_energy": end.stored + end.springs,
-            "kinetic_energy": end.kinetic,
+            **end.columns,
             **reduce(or_, (_values(room, model, state) for room in model.shown), {}),
         }
 

@@ -71,7 +71,7 @@ class InteractiveMotion(Motion):
         return self.did
 
     @property
-    def timed(self) -> bool:
+    def takes_time(self) -> bool:
         return True  # as far as one knows beforehand
 
     def part(self, step: int) -> tuple[float, float, float]:

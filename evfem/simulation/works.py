@@ -113,9 +113,19 @@ class EnergyState:
     kinetic: float
 
     @property
+    def energies(self) -> tuple[float, float, float]:
+        """Energies of tissue, springs, motion."""
+        return self.stored, self.springs, self.kinetic
+
+    @property
     def energy(self) -> float:
         """Total energy."""
-        return self.stored + self.springs + self.kinetic
+        return sum(self.energies)
+
+    @property
+    def columns(self) -> dict[str, float]:
+        """The energies of the history."""
+        return {"stored_energy": self.stored + self.springs, "kinetic_energy": self.kinetic}
 
     @classmethod
     def nothing(cls, shape: tuple[int, ...]) -> EnergyState:
