@@ -265,3 +265,32 @@ def test_the_model_of_gmsh_is_taken_with_all_its_groups():
         assert len(sets["pad"]) == len(sets["also"]) > 5
     finally:
         gmsh.finalize()
+
+
+@pytest.mark.others
+@pytest.mark.parametrize("ending", ["msh", "mesh", "su2", "vtk", "inp"])
+def test_the_same_ellipse_in_formats_of_gmsh_without_names(tmp_path, ending):
+    """Gmsh 4.15 writes no names for what is in no group; the curves are where they are drawn."""
+    import gmsh
+
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.SaveAll", 1)
+        outer, hole = gmsh.model.occ.addDisk(0, 0, 0, 8, 6), gmsh.model.occ.addDisk(0, 1, 0, 3, 2)
+        gmsh.model.occ.cut([(2, outer)], [(2, hole)])
+        gmsh.model.occ.synchronize()
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(tmp_path / f"ellipse.{ending}"))
+    finally:
+        gmsh.finalize()
+    places = {"pad": "lowest", "bone": "inside"}
+    path, rest = tmp_path / f"ellipse.{ending}", {"tissue": "rest"}
+    mesh = ev.MeshedFinger(path, {"tissue": LAW}, regions=rest, boundaries=places).mesh(1)
+    on = {}
+    for name, (a, b, middle) in {"pad": (8, 6, 0), "bone": (3, 2, 1)}.items():
+        x, y = (mesh.points - [0.0, middle]).T
+        on[name] = np.flatnonzero(np.isclose((x / a) ** 2 + (y / b) ** 2, 1.0, rtol=1e-5))
+    assert mesh.node_sets["bone"].tolist() == on["bone"].tolist()
+    low = mesh.points[on["pad"], 1] < -0.5  # the widest place is somewhere between two nodes
+    assert set(on["pad"][low]) <= set(mesh.node_sets["pad"]) <= set(on["pad"])
