@@ -30,7 +30,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, above, at_least, finite, plain
 from evfem.electrostatics.dielectrics import constants, dielectric
-from evfem.electrostatics.laws import Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.laws import Layer, Layers, StrongTroxel, eps_0, stacked
 from evfem.electrostatics.relaxation import Relaxing, Sandwich
 from evfem.errors import InputError, quoted
 
@@ -43,7 +43,7 @@ def complex_length(
     """z in mm at `frequency` (Hz): what skin, insulator and a conducting gap add to the gap.
 
     `skin` is a name (`evfem.electrostatics.dielectrics.SKINS`), a file, a `Dielectric` or a number;
-    `insulator` a `Layer`. Raises InputError for anything that is none of these.
+    `insulator` a `Layer`, or a list of them. Raises InputError for anything that is none of these.
 
     >>> from evfem import TOUCHSCREEN
     >>> skin = {"skin": "gabriel_dry", "skin_thickness": 0.3}
@@ -80,9 +80,10 @@ def _layers(frequency: Values, skin: Layer, insulator: Layer, gap_conductivity: 
 
 
 def _layer(insulator: Any) -> Layer:
-    if not isinstance(insulator, Layer):
-        raise InputError("insulator", quoted(insulator), "a Layer(thickness, eps_r)")
-    return insulator
+    found: Layer = stacked(insulator)
+    if not isinstance(found, Layer):
+        raise InputError("insulator", quoted(insulator), "a Layer(thickness, eps_r), or a list of them")
+    return found
 
 
 def step_pressure(

@@ -112,12 +112,16 @@ class LayerStack(Layer):
         return self.layers
 
 
+def stacked(value: Any) -> Any:
+    """Several layers as one; anything else as it is."""
+    return LayerStack(tuple(value)) if isinstance(value, (list, tuple)) and value else value
+
+
 def _insulator(key: str, value: Any) -> Layer | None:
-    if isinstance(value, (list, tuple)) and value:
-        return LayerStack(tuple(value))
-    if not isinstance(value, Layer | None):
+    found: Layer | None = stacked(value)
+    if not isinstance(found, Layer | None):
         raise InputError(key, quoted(value), LAYER)
-    return value
+    return found
 
 
 LAYER = "Layer(thickness, eps_r), a list of them from the top, or None"

@@ -38,6 +38,18 @@ def test_a_leaking_gap_sees_them_too():
     assert complex(layers.reduced, layers.loss) == pytest.approx(sums, rel=1e-12)
 
 
+def test_closed_forms_take_a_coat_too():
+    plate = {"skin": "gabriel_dry", "skin_thickness": 0.3, "gap_conductivity": 1e-8}
+    one = ev.Layer(0.11, 0.11 / (0.02 / 2.5 + 0.09 / 3.35))
+    both = [
+        ev.electrostatics.alternating_pressure(0.001, 100.0, 250.0, insulator=insulator, **plate)
+        for insulator in ([COAT, FILM], one)
+    ]
+    assert both[0] == pytest.approx(both[1], rel=1e-12)
+    refuses("insulator: given 3.0; allowed: a Layer.*list of them",
+            ev.electrostatics.alternating_pressure, 0.001, 100.0, 250.0, insulator=3.0, **plate)  # fmt: skip
+
+
 def test_a_run_goes_by_the_sums_whatever_the_order():
     forces = [
         ev.simulate(scene(insulator)).electrostatic_force[-1]
