@@ -21,7 +21,7 @@ enters linearly. `docs/howto/extend.md` shows a user-defined control.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -30,11 +30,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
-from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
-from evfem.newton.search import Trials, Wish, sticks, strength
+from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep
+from evfem.newton.search import Trials, VoltageProblem, VoltageStep, Wish, sticks, strength
 from evfem.newton.state import OutOfReach, State, StepFailed
 from evfem.terms.hand import RIGID, Drive
-from evfem.terms.traction import PadState, Reading, smallest_gap
+from evfem.terms.traction import PadPath, PadState, Reading, smallest_gap
 
 #: a voltage (V) that is none
 TINY = 1e-300
@@ -96,32 +96,6 @@ class Unsupported(Indentation):
     """
 
 
-@dataclass(frozen=True)
-class VoltageProblem:
-    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state for the
-    backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim), `pushed`;
-    of a number with a gradient (P, dim), `measured`, the condensed row and its gains; the state of the `pad`
-    and the `attraction`.
-    """
-
-    squared: float
-    solve: Callable[[LinearContactStep], StepSolution]
-    unit: Callable[[], tuple[Floats, Floats]]
-    pushed: Any = None
-    measured: Any = None
-    pad: Any = None
-    attraction: Any = None
-
-
-@dataclass(frozen=True)
-class VoltageStep:
-    """A solved step, the change of the voltage's unknown (kV^2 or kV), the state for the backward solve."""
-
-    solution: StepSolution
-    change: float = 0.0
-    unit: Floats | float = 0.0
-
-
 class VoltageControl:
     """Control of the voltage: `voltage` (V), prescribed or the largest; `free`: it is an unknown."""
 
@@ -169,6 +143,14 @@ class VoltageControl:
     def accepts(self, travel: Floats, reaction: Floats, slack: float) -> bool:
         """Whether the equation, or its bound, holds for a bone that moves along the display by (d,)."""
         return True
+
+    def along(self, attraction: Any, way: list[PadState]) -> Floats:
+        """Voltages (W,) in the states of a `way` whose last one is accepted, under its loads."""
+        return np.array([pad.voltage for pad in way])
+
+    def apart(self, traction: Any, path: PadPath) -> float:
+        """Work (N mm) of a traction in the books of a substep that is not on its path."""
+        return 0.0
 
     def find(self, trials: Trials) -> State:
         """The equilibrium of a step. Raises `StepFailed`."""
@@ -250,6 +232,12 @@ class KeptCharge(ConstrainedVoltage):
 
     def after(self, voltage: float, change: float) -> float:
         return voltage + KILOVOLT * change
+
+    def along(self, attraction: Any, way: list[PadState]) -> Floats:
+        return np.asarray(attraction.parts[0].of_one_charge(way))
+
+    def apart(self, traction: Any, path: PadPath) -> float:
+        return float(traction.work_apart(path))
 
 
 @dataclass(frozen=True)

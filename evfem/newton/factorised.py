@@ -26,10 +26,11 @@ from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, StabilityRatio, stability_ratio
 from evfem.newton.anderson import Anderson
-from evfem.newton.control import Target, VoltageProblem
+from evfem.newton.control import Target
 from evfem.newton.interface import Interface
 from evfem.newton.linearisation import Linearisation
 from evfem.newton.pressure import Unbalanced, make_pressure
+from evfem.newton.search import VoltageProblem
 from evfem.newton.state import (
     Balance,
     Limits,

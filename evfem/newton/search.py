@@ -29,6 +29,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT, SMALLEST_FORCE
+from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
 from evfem.newton.state import State, StepFailed
 
@@ -174,6 +175,32 @@ class Trials:
             return wish.lacking(state.reaction), self.unused(state, wish.ahead), strength(state)
 
         return Search(at, measured, self.old.voltage, wish.most, self.tolerance).nearest()
+
+
+@dataclass(frozen=True)
+class VoltageProblem:
+    """Data for a voltage control: the present squared voltage (kV^2), a solved contact problem, state for the
+    backward solve and condensed forces per kV^2 more; the same of forces on the pad nodes (P, dim), `pushed`;
+    of a number with a gradient (P, dim), `measured`, the condensed row and its gains; the state of the `pad`
+    and the `attraction`.
+    """
+
+    squared: float
+    solve: Callable[[LinearContactStep], StepSolution]
+    unit: Callable[[], tuple[Floats, Floats]]
+    pushed: Any = None
+    measured: Any = None
+    pad: Any = None
+    attraction: Any = None
+
+
+@dataclass(frozen=True)
+class VoltageStep:
+    """A solved step, the change of the voltage's unknown (kV^2 or kV), the state for the backward solve."""
+
+    solution: StepSolution
+    change: float = 0.0
+    unit: Floats | float = 0.0
 
 
 def strength(state: State) -> float:

@@ -15,7 +15,8 @@ equilibria may be reached without a barrier.
 A bone with prescribed position is at its end position already: nodes that do not touch at both ends begin
 translated with it. Nodes that touch at both ends follow the surface, not the chord; to first order that
 adds :math:`-\lambda_1 g` on the chord. A spring of the hand adds its stiffness. Charges are those of the
-end. For an attraction without a potential (the vertical one on changing tributary lengths, that of touching
+end, and where that of the electrode is prescribed, the voltage varies on the path (`VoltageControl.along`).
+For an attraction without a potential (the vertical one on changing tributary lengths, that of touching
 nodes alone, the full field beside its columns) the work along the straight path is taken; where another path
 has another work, a barrier of that difference may be missed.
 
@@ -29,7 +30,7 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.newton.control import Target
+from evfem.newton.control import Target, VoltageControl
 from evfem.simulation.works import SubstepWork
 from evfem.surface.pad import surface_state
 
@@ -53,7 +54,8 @@ def rise(substep: SubstepWork, target: Target) -> float:
     load_work = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
     load_work = load_work - float(np.sum(body.given_forces(new.u) * increment))
     potential = stored - stored[0] + (_friction_work(substep) - load_work) * SAMPLES
-    potential += _contact_work(substep) + _drag_potential(substep) - _attraction_work(substep, carried)
+    potential += _contact_work(substep) + _drag_potential(substep)
+    potential -= _attraction_work(substep, carried, target.voltage)
     potential = potential + sum(term.potential(old, new, SAMPLES) for term in substep.model.terms)
     climbed = potential - np.minimum.accumulate(potential)
     return float(climbed.max()) / max(*ends, SMALLEST_ENERGY)
@@ -67,9 +69,9 @@ def _moved_with_bone(substep: SubstepWork, target: Target) -> Floats:
     return np.where((substep.old.touching & (substep.new.touching | sticks))[:, None], 0.0, travel)
 
 
-def _attraction_work(substep: SubstepWork, carried: Floats) -> Floats:
-    """Work of the attraction up to the `SAMPLES` under the end's voltage or charges, after the translation
-    `carried`.
+def _attraction_work(substep: SubstepWork, carried: Floats, control: VoltageControl) -> Floats:
+    """Work of the attraction up to the `SAMPLES` under the end's voltage or charges, as the `control` of the
+    voltage has them, after the translation `carried`.
     """
     attraction, old, new = substep.model.attraction, substep.old, substep.new
     if not attraction.acts(new.voltage):
@@ -79,7 +81,7 @@ def _attraction_work(substep: SubstepWork, carried: Floats) -> Floats:
     begin[:, 1] -= np.minimum(surface_state(substep.model.surface, begin).gap, 0.0)
     ends = equilibrium.pulls(new)
     paths = [(one, substep.path(ends[one.name], ends[one.name])) for one in attraction.parts]
-    work = sum(one.released_work(path, along, begin, FINE_SAMPLES) for one, path in paths)
+    work = sum(one.released_work(path, along, begin, FINE_SAMPLES, control) for one, path in paths)
     return np.asarray(np.interp(SAMPLES, FINE_SAMPLES, work))
 
 

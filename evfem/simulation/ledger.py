@@ -12,6 +12,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.errors import InputError
+from evfem.newton.control import VoltageControl
 from evfem.newton.state import State
 from evfem.simulation.history import ADDED, SUMS, WIDTHS
 from evfem.simulation.model import Model
@@ -31,13 +32,14 @@ def unloaded(state: State) -> State:
 @dataclass
 class EnergyAccount:
     """Energy account of a run: sums of works and dissipations by the history's columns, the energies at the
-    end of its last substep, and the pull-off force.
+    end of its last substep, the pull-off force, and the `control` of the voltage in the present step.
     """
 
     model: Model
     sums: dict[str, float] = field(default_factory=dict)
     end: EnergyState | None = None
     pull_off: PullOff = field(default_factory=NoPullOff)
+    control: VoltageControl = field(default_factory=VoltageControl)
 
     def __post_init__(self) -> None:
         names = (one.name for one in self.model.columns if one.name.endswith(ADDED))
@@ -45,11 +47,12 @@ class EnergyAccount:
 
     def add_substep(self, old: State, new: State) -> bool:
         """Add the works of one converged substep; returns whether stability was lost in it."""
-        substep = SubstepWork(self.model, old if self.end else unloaded(old), new, first=self.end is None)
+        begin = old if self.end else unloaded(old)
+        substep = SubstepWork(self.model, begin, new, first=self.end is None, control=self.control)
         self._watch(new)
-        begin = self.end or EnergyState.nothing(old.u.shape)
+        account = self.end or EnergyState.nothing(old.u.shape)
         self.end = substep.end()
-        works = substep.works(begin, self.end)
+        works = substep.works(account, self.end)
         for name, work in works.items():
             self.sums[name] += work
         return works["snap_dissipation"] > 0.0

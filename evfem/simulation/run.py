@@ -346,7 +346,9 @@ class Run:
         """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         released, snapped = self.stepper.relaxations, self.stepper.snaps
-        self.state = self.model.equilibrium.restart(self.state, request.path(0.0, 1.0))
+        target = request.path(0.0, 1.0)
+        self.state = self.model.equilibrium.restart(self.state, target)
+        self.ledger.control = target.voltage
         try:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger, request.turns)
         except StepFailed as error:

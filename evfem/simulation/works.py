@@ -49,8 +49,9 @@ at their final values, moves along forces that grow faster than the tissue's, se
 
 and from the surface, with u_0 and Delta u on the right (sticking nodes move relative to a pressing bone
 only), or L exceeds the fraction `SNAP` of half the larger of :math:`|\Delta f\cdot w|` and of the change of
-the nodes' shear times their slip. Both are right in the limit of small substeps, and only decide which of two
-columns has L.
+the nodes' shear times their slip. Under a prescribed charge f_e(u) is that of the voltage which keeps it, and
+L is without :math:`W_e - \bar f_e\cdot\Delta u`, as W_e is that of the voltage at the begin. Both are right
+in the limit of small substeps, and only decide which of two columns has L.
 
 Where no equilibrium is near, pseudo-transient continuation leads to another one
 (`evfem.solver.relaxation`). The energy set free there is the dissipation by drag,
@@ -79,7 +80,7 @@ The first substep begins without any load: voltage, adhesion and user's forms co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -88,6 +89,7 @@ import numpy as np
 from evfem.common.arrays import PART, SLIDE, Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.signorini import STICK, sizes
+from evfem.newton.control import VoltageControl
 from evfem.newton.interface import slipped
 from evfem.newton.state import State
 from evfem.simulation.model import Model
@@ -136,12 +138,15 @@ class EnergyState:
 
 @dataclass(frozen=True, eq=False)
 class SubstepWork:
-    """One accepted substep of a run of `model`, from `old` to `new`; the `first` begins without any load."""
+    """One accepted substep of a run of `model`, from `old` to `new`; the `first` begins without any load; of
+    its target the `control` of the voltage.
+    """
 
     model: Model
     old: State
     new: State
     first: bool = False
+    control: VoltageControl = field(default_factory=VoltageControl)
 
     def end(self) -> EnergyState:
         """Forces and energies at the end of the substep."""
@@ -168,7 +173,8 @@ class SubstepWork:
         lost += _mean_work(begin.forces, end.forces, moved) - (end.energy - begin.energy) - viscous
         lost -= _mean_work(*self._on_surface, moved[self.model.pad.nodes])
         lost -= (drag := body.drag_dissipation(new.u))
-        snap = drag + lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost))
+        free = lost - sum(self.control.apart(*each) for each in self._paths())
+        snap = drag + lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, free))
         snapped = (0.0, drag + lost) if snap else (drag + lost, 0.0)
         own = {"electrostatic_work": 0.0, "external_work": external_work, "friction_dissipation": friction}
         own |= {"viscous_dissipation": viscous, "integrator_dissipation": snapped[0]}
@@ -188,9 +194,13 @@ class SubstepWork:
 
     def pulled(self) -> dict[str, float]:
         """Works of the tractions by name, N mm per mm of depth."""
+        return {one.name: one.work_along(path) for one, path in self._paths()}
+
+    def _paths(self) -> list[tuple[Any, PadPath]]:
+        """The tractions with their paths."""
         before, after = (self.model.equilibrium.pulls(state) for state in (self.old, self.new))
         tractions = self.model.attraction.parts
-        return {one.name: one.work_along(self.path(before[one.name], after[one.name])) for one in tractions}
+        return [(one, self.path(before[one.name], after[one.name])) for one in tractions]
 
     @cached_property
     def pads(self) -> tuple[PadState, PadState]:
@@ -285,7 +295,9 @@ class SubstepWork:
         """Work of the growth of attraction and friction from `begin` to the end, under the end loads."""
         model, old, new = self.model, self.old, self.new
         along = (new.u - begin.u)[model.pad.nodes]
-        at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (begin, new)]
+        pads = [replace(model.equilibrium.pad_state(state), voltage=new.voltage) for state in (begin, new)]
+        volts = self.control.along(model.attraction, pads)
+        at = [model.equilibrium.attraction_at(old, *each) for each in zip((begin, new), volts, strict=True)]
         work = float(np.sum((at[1] - at[0]) * along))
         less = self._friction_coefficient(model.equilibrium.interface.on_display(begin))
         less = less - self._friction_coefficient(self.positions[1])

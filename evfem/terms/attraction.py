@@ -125,6 +125,20 @@ class Attraction(PadTraction):
             self.charging.electrode_charge(at), by_voltage, by_position + more.reshape(by_position.shape)
         )
 
+    def work_apart(self, path: PadPath) -> float:
+        """Charges follow at the end, where they follow a prescribed charge they do so on the way."""
+        return self.work_along(path) - path.trapezoidal if self.flows else 0.0
+
+    def of_one_charge(self, way: list[PadState]) -> Floats:
+        """In which that charge is linear."""
+        volts = super().of_one_charge(way)
+        if not self.flows:
+            return volts
+        readings = [self.electrode_charge(pad) for pad in way]
+        return volts + KILOVOLT * np.array(
+            [(readings[-1].value - one.value) / one.by_voltage for one in readings]
+        )
+
     def unit(self, pad: PadState) -> Floats:
         """Attraction (P, dim) of a kV."""
         return self.forces(replace(pad, voltage=KILOVOLT))
@@ -291,11 +305,13 @@ class Attraction(PadTraction):
         volts = np.full(fractions.shape, path.old.voltage)  # its sign counts where there are charges
         return np.asarray(np.sum(self.forces_along(path.at(fractions, volts, begin)) * along, axis=(1, 2)))
 
-    def released_work(self, path: PadPath, along: Floats, begin: Floats, fractions: Floats) -> Floats:
+    def released_work(
+        self, path: PadPath, along: Floats, begin: Floats, fractions: Floats, control: Any
+    ) -> Floats:
         if self.always and path.new.surface.is_flat:
             return self._by_potential(path, begin, fractions)
         with self.charging.ending(lambda: self.charged(path.new)):
-            return super().released_work(path, along, begin, fractions)
+            return super().released_work(path, along, begin, fractions, control)
 
     def _by_potential(self, path: PadPath, begin: Floats, fractions: Floats) -> Floats:
         """Work of a pull whose reach may be short, above a flat surface, by its potential."""

@@ -226,9 +226,11 @@ class FieldAttraction(Attraction):
         """Of the columns, as `powers` are."""
         return float(np.mean(self.powers(path, along, ENDS)))
 
-    def released_work(self, path: PadPath, along: Floats, begin: Floats, fractions: Floats) -> Floats:
+    def released_work(
+        self, path: PadPath, along: Floats, begin: Floats, fractions: Floats, control: Any
+    ) -> Floats:
         """The columns', and the fringes' evenly."""
-        work = super().released_work(path, along, begin, fractions)
+        work = super().released_work(path, along, begin, fractions, control)
         held = replace(path, old=replace(path.old, voltage=path.new.voltage))
         last = float(self.powers(held, along, fractions[-1:], begin)[0])
         return work + (float(np.sum(path.ends[1] * along)) - last) * fractions

@@ -307,6 +307,14 @@ class PadTraction(Room):
             return path.trapezoidal
         return path.trapezoidal + self.power(path, path.turned) - self.power_of_ends(path, path.turned)
 
+    def work_apart(self, path: PadPath) -> float:
+        """Work (N mm) that the order in which charge and pad move adds to that of the end forces."""
+        return 0.0
+
+    def of_one_charge(self, way: list[PadState]) -> Floats:
+        """Voltages (W,) in the states of a way at which the electrode has the charge of the last one."""
+        return np.array([pad.voltage for pad in way])
+
     def power_of_ends(self, path: PadPath, along: Floats) -> float:
         """Work along `along` (P, dim) by the mean of the end forces (N mm)."""
         return float(0.5 * np.sum((path.ends[0] + path.ends[1]) * along))
@@ -327,12 +335,16 @@ class PadTraction(Room):
         forces = self.column_law.forces_along(path.at(fractions, volts, begin))
         return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
-    def released_work(self, path: PadPath, along: Floats, begin: Floats, fractions: Floats) -> Floats:
+    def released_work(
+        self, path: PadPath, along: Floats, begin: Floats, fractions: Floats, control: Any
+    ) -> Floats:
         """Work (w,) in N mm under the loads of the end up to fractions (w,) of the straight path from `begin`
-        (P, dim), along `along` (P, dim).
+        (P, dim), along `along` (P, dim), with the voltages that a `control` has there.
         """
-        held = replace(path, old=replace(path.old, voltage=path.new.voltage, load=path.new.load))
-        power = self.powers(held, along, fractions, begin)
+        held = replace(path, old=replace(path.old, load=path.new.load))
+        way = held.at(fractions, np.full(fractions.shape, path.new.voltage), begin)
+        forces = self.column_law.forces_along(replace(way, voltage=control.along(self, way.states())))
+        power = np.sum(forces * along, axis=(1, 2))
         return np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(fractions)))
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
-from evfem.newton.control import FollowFriction, VoltageProblem
+from evfem.newton.control import FollowFriction
+from evfem.newton.search import VoltageProblem
 
 
 class Friction:

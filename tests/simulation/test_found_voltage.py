@@ -106,6 +106,46 @@ def test_a_charge_holds_a_plate_beyond_a_third_of_its_gap(dim):
     np.testing.assert_allclose(2.0 * found.field_energy[1:], (charge * found.voltage)[1:], rtol=1e-7)
 
 
+@pytest.mark.parametrize(("farthest", "steps"), [(0.5, 8), (0.9, 2), (0.9, 8)])
+def test_a_plate_under_a_charge_passes_no_barrier(farthest, steps):
+    """Its energy k x^2 / 2 + Q^2 (g + s - x) / (2 eps_0 A) is convex; under a voltage it would snap."""
+    asked, travel, _ = charging(2, farthest)
+    asked = replace(asked, motion=[ev.Hover(GAP), ev.Wait(1.0, steps=steps)])
+    found = ev.simulate(asked)
+    np.testing.assert_allclose(GAP - found.min_gap, travel[:: 8 // steps], rtol=2e-3, atol=1e-9)
+    assert found.jumps.sum() == 0
+    assert found.snap_dissipation[-1] == 0.0
+    assert not [one for one in found.warnings if "snaps" in one or "pass a barrier" in one]
+
+
+def test_the_barrier_under_a_charge_is_that_of_its_potential():
+    """k x^2 / 2 + Q^2 / (2 (C + C_p)) with twice the plate's capacity beside it, between the stable height
+    and the top, at 0.9 of the charge from which on it snaps; back from contact likewise.
+    """
+    k, area = spring(2)
+    wide = GAP + SOLIDS
+    parallel = 2.0 * eps_0 * area / wide
+    x = np.linspace(0.0, GAP, 100_001)
+    capacity = eps_0 * area / (wide - x)
+    most = ((capacity + parallel) * (wide - x) * np.sqrt(2.0 * k * x / (eps_0 * area))).max()
+    runs = []
+    for charges in ([0.9], [1.2, 0.9]):
+        times, charge = np.arange(1.0, 1.0 + len(charges)), 1e6 * most * np.array(charges)
+        signal = ev.ChargeControl(Along(times, charge), parallel_capacitance=1e6 * parallel)
+        asked = scene(2, signal, [ev.Wait(float(len(charges)), steps=10 * len(charges))], RESOLVED)
+        run, target = through(asked)
+        runs.append(run)
+    hovering, closed = runs
+    assert closed.state.touching.any() > hovering.state.touching.any()
+    potential = 0.5 * k * x**2 + (0.9 * most) ** 2 / (2.0 * (capacity + parallel))
+    stable, top = np.argmin(potential[:40_000]), np.argmax(potential[:90_000] * (x[:90_000] > 0.03))
+    stored = closed.model.body.energy(closed.state.u)
+    there = rise(SubstepWork(hovering.model, hovering.state, closed.state), target) * stored
+    back = rise(SubstepWork(hovering.model, closed.state, hovering.state), target) * stored
+    assert there == pytest.approx(potential[top] - potential[stable], rel=0.05)
+    assert back == pytest.approx(potential[top] - potential[-1], rel=0.05)
+
+
 def beside(share, farthest):
     """A plate whose capacity is so many times that beside it, with the charge of a travel (mm) in equal
     parts: with w = gap + solids, C = eps_0 A / (w - x), the force k x takes the charge
@@ -318,7 +358,11 @@ def test_a_stiff_plate_on_a_soft_column_stays_below_its_pull_in(dim, ratio, shar
 
 def ended(motion):
     """A run of the plate on its spring that is done, and its last target."""
-    run, target = Run(scene(2, 0.0, motion), None), None
+    return through(scene(2, 0.0, motion))
+
+
+def through(asked):
+    run, target = Run(asked, None), None
     for request in run.requests():
         target = request.path(0.0, 1.0)
         run.advance(request)
