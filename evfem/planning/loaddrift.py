@@ -25,7 +25,7 @@ import numpy as np
 
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import Mesh
-from evfem.planning.resolution import path_line
+from evfem.planning.resolution import path_lines
 from evfem.scene.scene import Scene
 
 #: relative drift of the load that is worth a warning
@@ -59,7 +59,7 @@ def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[
     """A warning for the first slide at constant indentation, after a press to a force, whose load drifts."""
     if not isinstance(scene.finger, FingerPad) or not scene.ground.is_flat:
         return
-    friction = float(np.max(scene.ground.friction_at(path_line(scene, mesh, STEP))))
+    friction = float(np.max(scene.ground.friction_at(path_lines(scene, mesh, STEP))))
     load = None
     for i, course in enumerate(scene.courses):
         if course.depth is not None:

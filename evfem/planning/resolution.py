@@ -31,6 +31,8 @@ ROUGH = 0.25
 PER_WAVE = 5.0
 #: samples of the profile per node spacing, and their largest number
 PER_SPACING, MOST = 8, 200_000
+#: lines beside one another on which a surface is seen
+LINES = 64
 #: value of `steps` for adaptive step sizes
 AUTO = "auto"
 #: steps in a period of the voltage, at least: 10 in one of its square, which the attraction follows
@@ -191,6 +193,17 @@ def path_line(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:
     return path_points
 
 
+def path_lines(scene: Scene, mesh: Mesh, step: float, axis: int = 0) -> Floats:
+    """Places (m, n, d) on such lines beside one another, on all that the pad may come to."""
+    line = path_line(scene, mesh, step, axis)
+    if mesh.dim == 2:
+        return line[None]
+    beside = path_line(scene, mesh, np.inf, 1 - axis)[:, 1 - axis]  # its ends
+    found = np.tile(line, (LINES, 1, 1))
+    found[:, :, 1 - axis] = np.linspace(beside[0], beside[-1], LINES)[:, None]
+    return found
+
+
 def slip_scale(scene: Scene, mesh: Mesh) -> float:
     """Length (mm) of slip in which height or friction of the surface can change by all of their range: that
     range over the steepest slope, and no less than two spacings of the pad's nodes; inf where both are even.
@@ -200,10 +213,11 @@ def slip_scale(scene: Scene, mesh: Mesh) -> float:
     spacing = float(np.median(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1))) / mesh.order
     found = [np.inf]
     for axis in range(mesh.dim - 1):
-        line = path_line(scene, mesh, spacing / PER_SPACING, axis)
-        step = float(line[1, axis] - line[0, axis])
-        for values in (surface.relief(line)[0], surface.friction_coefficient(line[:, 0])):
-            steepest = float(np.abs(np.diff(values)).max()) / step
+        lines = path_lines(scene, mesh, spacing / PER_SPACING, axis)
+        step = float(lines[0, 1, axis] - lines[0, 0, axis])
+        heights = surface.relief(lines.reshape(-1, mesh.dim - 1))[0].reshape(lines.shape[:2])
+        for values in (heights, surface.friction_at(lines)):
+            steepest = float(np.abs(np.diff(values, axis=1)).max()) / step
             if steepest > 0.0:
                 found.append(max(2.0 * spacing, float(np.ptp(values)) / steepest))
     return min(found)
@@ -212,8 +226,8 @@ def slip_scale(scene: Scene, mesh: Mesh) -> float:
 def path_depth(scene: Scene, mesh: Mesh, step: float) -> float:
     """Depth (mm) of the surface where the pad may come to, seen every `step` (mm)."""
     surface: Any = scene.ground
-    lines = (path_line(scene, mesh, step, axis) for axis in range(mesh.dim - 1))
-    return float(np.ptp(np.concatenate([surface.relief(path_points)[0] for path_points in lines])))
+    places = path_lines(scene, mesh, step).reshape(-1, mesh.dim - 1)
+    return float(np.ptp(surface.relief(places)[0]))
 
 
 def path_dependence(scene: Scene) -> tuple[str, ...]:
