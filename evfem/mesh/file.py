@@ -132,6 +132,13 @@ def _read(path: Path) -> meshio.Mesh:
     return without_pixels(raw)
 
 
+def teach_pixels(meshio: Any) -> None:
+    """Tell the module of voxels, which it does not know, and of pixels, which it knows by name alone."""
+    meshio._vtk_common.vtk_to_meshio_type[11] = "voxel"
+    meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)
+    meshio._mesh.topological_dimension.update(pixel=2, voxel=3)
+
+
 def without_pixels(raw: meshio.Mesh) -> meshio.Mesh:
     """The same mesh, the cells of an image as quads and hexahedra."""
     for block in raw.cells:
@@ -156,9 +163,7 @@ def parts(path: Path) -> meshio.Mesh:
     if ending not in meshio.extension_to_filetypes and ending not in FORMATS:
         raise ValueError(f"no format {path.suffix or 'without an ending'} is known")
     said = io.StringIO()
-    meshio._vtk_common.vtk_to_meshio_type[11] = "voxel"  # which it does not know, and pixels by name alone
-    meshio._common.num_nodes_per_cell.update(pixel=4, voxel=8)
-    meshio._mesh.topological_dimension.update(pixel=2, voxel=3)
+    teach_pixels(meshio)
     # its messages are not searched for words to colour, which takes long in long ones
     console = meshio._common.Console
     meshio._common.Console = functools.partial(getattr(console, "func", console), highlighter=None)

@@ -67,6 +67,7 @@ def _of_pyvista(grid: Any) -> meshio.Mesh:
     """What meshio would read of the file of a grid of PyVista, or of another data set of it."""
     import meshio
 
+    file.teach_pixels(meshio)
     grid = grid.cast_to_unstructured_grid()
     data = {name: np.asarray(grid.cell_data[name]) for name in grid.cell_data}
     starts = grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset  # before PyVista 0.49

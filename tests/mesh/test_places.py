@@ -5,6 +5,7 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+from tools.commands import printed
 from tools.meshes import between, square_mesh
 from tools.refusals import refuses
 from tools.solids import block
@@ -227,10 +228,20 @@ def test_a_grid_of_pyvista_is_taken_as_it_is():
     assert found.points.tolist() == mesh.points.tolist()
     assert found.region.tolist() == mesh.region.tolist()
     assert found.node_sets["bone"].tolist() == mesh.node_sets["bone"].tolist()
-    image = pyvista.ImageData(dimensions=(3, 3, 1), spacing=(4, 4, 4))
-    by_place = {"boundaries": {"pad": "lowest", "bone": "highest"}, "regions": {"tissue": "rest"}}
-    pixels = ev.MeshedFinger(image, {"tissue": LAW}, **by_place).mesh(1)
-    assert pixels.points[pixels.node_sets["bone"]].tolist() == [[0, 8], [4, 8], [8, 8]]
+
+
+@pytest.mark.others
+@pytest.mark.parametrize(("layers", "kind", "nodes"), [(1, "quad", 3), (2, "hexahedron", 6)])
+def test_an_image_of_pyvista_is_taken_in_a_process_that_has_read_no_file(layers, kind, nodes):
+    """Its cells are pixels and voxels (8 and 11 of VTK), of which meshio 5.3 must be told first."""
+    code = (
+        "import pyvista\nimport evfem as ev\n"
+        f"image = pyvista.ImageData(dimensions=(3, 3, {layers}), spacing=(4, 4, 4))\n"
+        "names = {'regions': {'tissue': 'rest'}, 'boundaries': {'pad': 'lowest', 'bone': 'highest'}}\n"
+        "mesh = ev.MeshedFinger(image, {'tissue': ev.NeoHookean(E=0.1, nu=0.4)}, **names).mesh(1)\n"
+        "print(mesh.kind, len(mesh.node_sets['bone']), mesh.points[mesh.node_sets['bone'], 1].min())"
+    )
+    assert printed(code) == f"{kind} {nodes} 8.0"
 
 
 @pytest.mark.others
