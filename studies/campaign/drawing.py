@@ -12,7 +12,7 @@ from copy import deepcopy
 from .attractions import add_drive, add_field, add_roughness, add_voltage, electrostatics
 from .bodies import LAYERS, TABLE_2_WIDTH, finger, width
 from .grounds import add_both_ways, add_friction_law, surface
-from .parts import PARTS, add_parts
+from .parts import PARTS, WISHES, add_parts, add_wish
 from .tables import Draw, Tables, six_digits
 
 #: share of the scenes whose finger has three dimensions, and the random numbers that these are drawn with
@@ -43,6 +43,7 @@ def draw(seed: int, number: int) -> Tables:
     add_field(random, tables)
     _add_path(other, tables)
     add_parts(Draw(seed, number, PARTS), tables)
+    add_wish(Draw(seed, number, WISHES), tables)
     return deepcopy(tables)
 
 

@@ -1,12 +1,14 @@
-"""Tissue that relaxes, probes, surfaces that give way and adhesion, added to scenes that are drawn.
+"""Tissue that relaxes, probes, surfaces that give way, adhesion, friction that a voltage shall make and what
+is beside a charge, added to scenes that are drawn.
 
 They have random numbers of their own: the rest of a scene is what it is without them.
 """
 
-from .tables import Draw, Tables
+from .attractions import largest_voltage
+from .tables import Draw, Tables, six_digits
 
-#: the random numbers of these parts
-PARTS = 4
+#: the random numbers of these parts, and of wishes
+PARTS, WISHES = 4, 5
 
 
 def add_parts(random: Draw, tables: Tables) -> None:
@@ -26,6 +28,24 @@ def add_parts(random: Draw, tables: Tables) -> None:
         tables["surface"]["elastic"] = layer | {"thickness": random.spread(0.2, 5.0)}
     if random.chance(0.06):
         tables["adhesion"] = _adhesion(random)
+
+
+def add_wish(random: Draw, tables: Tables) -> None:
+    """Perhaps friction that a voltage shall make, from too little to too much; capacity beside a charge."""
+    table, kinds = tables.get("electrostatics", {}), {one["kind"] for one in tables["motion"]}
+    if table.get("signal", {}).get("kind") in ("charge", "open_circuit") and random.chance(0.5):
+        table["signal"]["parallel_capacitance"] = random.spread(1e-5, 1e-2)
+    unlike = {"drive", "frequency", "waveform", "gap_conductivity", "field"} & set(table)
+    apart = "voltage" in kinds or "hand" in tables or "elastic" in tables["surface"]
+    if "voltage" not in table or "slide" not in kinds or unlike or apart or not random.chance(0.3):
+        return
+    loads = [one["force"] for one in tables["motion"] if "force" in one]
+    rubbed = tables["surface"]["friction"] if isinstance(tables["surface"]["friction"], float) else 0.3
+    wished = max(rubbed, 0.05) * (loads[0] if loads else 0.05)
+    places = random.places(random.whole(1, 4), -3.0, 3.0)
+    forces = [six_digits(random.spread(0.5, 4.0) * wished) for _ in places]
+    table["voltage"] = {"kind": "follow_force", "position": places, "tangential_force": forces}
+    table["voltage"]["largest_voltage"] = six_digits(largest_voltage(table))
 
 
 def _sought(tables: Tables) -> bool:

@@ -84,11 +84,6 @@ NEVER = {
     "solver.core": "off gives answers that depend on the way, a length changes what is asked for",
     "solver.strategy.hold": "another first rate leads to the same end, or `evfem check` says so",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
-    "electrostatics.signal.parallel_capacitance": "not drawn yet: a closed form tests it",
-    **{
-        f"electrostatics.voltage.{name}": "not drawn yet: a wish needs the friction that there is"
-        for name in ("kind", "position", "tangential_force", "largest_voltage")
-    },
 } | dict.fromkeys(("finger.ridge_pixel", "finger.ridge_dark", "finger.ridge_scan"), "of a print alone")
 #: keys that the generator leaves to other tests
 LATER = ("friction_law", "depth", "relaxation", "bulk_relaxation", "spacing", "probes", "boundaries")
