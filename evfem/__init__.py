@@ -152,7 +152,7 @@ def __getattr__(name: str) -> Any:
     elif name in _GONE:
         raise AttributeError(f"{name}: {_GONE[name]}")
     else:
-        close = _import_module(f"{__name__}.errors").near(name, __all__)
+        close = _import_module(f"{__name__}.errors").closest_name(name, __all__)
         meant = f"; did you mean {close[0]}?" if close else ""
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
     globals()[name] = value

@@ -24,7 +24,7 @@ from evfem.arguments import FILES as FILES  # which a shell's completion asks fo
 from evfem.arguments import FOLDERS as FOLDERS
 from evfem.arguments import parser, studies
 from evfem.common import notices
-from evfem.errors import InputError, NotConverged, StorageError, quoted
+from evfem.errors import InputError, NotConverged, StorageError, describe_value
 
 if TYPE_CHECKING:
     from evfem.protocols import Observer
@@ -334,7 +334,7 @@ def _study(options: argparse.Namespace) -> None:
         names += [n for n in known.NAMES if n not in known.APART] if name == "all" else [name]
     for name in names:
         if name not in known.NAMES:
-            raise InputError("study", quoted(name), f"{', '.join(known.NAMES)}, all")
+            raise InputError("study", describe_value(name), f"{', '.join(known.NAMES)}, all")
     sample = _sample(options)
     for name in dict.fromkeys(names):
         print(f"study {name}: {known.expected(name, options.quick)}", file=sys.stderr, flush=True)

@@ -48,10 +48,10 @@ def readable(value: object) -> str:
         return f"{type(value).__name__} too large to show"
 
 
-def quoted(value: object) -> object:
+def describe_value(value: object) -> object:
     """A value of a user's for `InputError`, to which a text is words of ours unless it has quotes.
 
-    >>> raise InputError("finger.width", quoted("500"), "12 to 24 mm")
+    >>> raise InputError("finger.width", describe_value("500"), "12 to 24 mm")
     Traceback (most recent call last):
     evfem.errors.InputError: finger.width: given "500"; allowed: 12 to 24 mm
     """
@@ -85,7 +85,7 @@ class InputError(EvfemError, ValueError):
     def __init__(self, key: str, given: object, allowed: str) -> None:
         if isinstance(given, str) and given[:1] == given[-1:] == '"' and "? (" not in allowed:
             names = [name for name in re.split(r" \| |, ", allowed) if " " not in name]
-            close = near(given[1:-1], names)
+            close = closest_name(given[1:-1], names)
             if close and close[0] != given[1:-1] and len(close[0]) > 2:
                 allowed = f"{close[0]}? ({allowed})"
         self.key, self.given, self.allowed = key, given, allowed
@@ -135,11 +135,11 @@ def unknown(key: str, name: str, known: Sequence[str], what: str = "an unknown k
     Traceback (most recent call last):
     evfem.errors.InputError: surface.frictoin: given an unknown key; allowed: friction? (kind, friction)
     """
-    close = near(name, known)
+    close = closest_name(name, known)
     return InputError(key, what, f"{close[0]}? ({', '.join(known)})" if close else ", ".join(known))
 
 
-def near(name: str, known: Sequence[str]) -> list[str]:
+def closest_name(name: str, known: Sequence[str]) -> list[str]:
     """The name that may have been meant, if there is one."""
     from difflib import get_close_matches
 
@@ -147,7 +147,7 @@ def near(name: str, known: Sequence[str]) -> list[str]:
     return [small[one] for one in get_close_matches(name[:40].lower(), small, n=1)]
 
 
-def together(mistakes: Sequence[InputError]) -> InputError:
+def combine(mistakes: Sequence[InputError]) -> InputError:
     """One error for one mistake or several."""
     return InputErrors(mistakes) if len(mistakes) > 1 else mistakes[0]
 
@@ -159,7 +159,7 @@ class Mistakes:
     >>> for name, value in {"width": -3.0, "height": 12.0, "bone": "no"}.items():
     ...     with mistakes.of_a_part():
     ...         if value != 12.0:
-    ...             raise InputError(name, quoted(value), "12 mm")
+    ...             raise InputError(name, describe_value(value), "12 mm")
     >>> mistakes.report()
     Traceback (most recent call last):
     evfem.errors.InputErrors: 2 mistakes: (1) width: given -3.0; allowed: 12 mm \
@@ -180,7 +180,7 @@ class Mistakes:
     def report(self) -> None:
         """Raise what was found, if anything was."""
         if self.found:
-            raise together(self.found)
+            raise combine(self.found)
 
 
 class NotConverged(EvfemError, RuntimeError):

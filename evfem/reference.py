@@ -15,7 +15,7 @@ import numpy as np
 
 from evfem.common.checks import real
 from evfem.electrostatics.laws import Layers, eps_0
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.tensor import Array
 
 
@@ -333,7 +333,7 @@ def sliding_force_ratio(slope: Array, friction_coefficient: Array, direction: in
     (0.3, 3.0)
     """
     if direction not in (1, -1):
-        raise InputError("direction", quoted(direction), "1 (towards +x) or -1 (towards -x)")
+        raise InputError("direction", describe_value(direction), "1 (towards +x) or -1 (towards -x)")
     uphill = direction * np.asarray(slope)
     lift = 1.0 - np.asarray(friction_coefficient) * uphill
     jams = lift <= 0.0

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 import evfem
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 
 #: template -> the file that its scene needs beside it, and the ready-made mesh that this is
 TEMPLATES: dict[str, dict[str, str]] = {
@@ -25,7 +25,7 @@ def text(template: str) -> str:
     'version = 1'
     """
     if template not in TEMPLATES:
-        raise InputError("--template", quoted(template), " | ".join(TEMPLATES))
+        raise InputError("--template", describe_value(template), " | ".join(TEMPLATES))
     path = Path(evfem.__file__).parent / "data" / f"template-{template}.toml"
     return path.read_text(encoding="utf-8")
 

@@ -9,7 +9,7 @@ interface and from there to the outer contour.
 import numpy as np
 
 from evfem.common.arrays import Ints
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.mesh.mesh import Mesh, raised
 
 #: Semi-axes (A, B) in mm of the bone, the interface and the outer contour.
@@ -31,7 +31,7 @@ def benchmark_mesh(level: int, order: int = 1, *, same_nodes: bool = False) -> M
 
     """
     if level not in LEVELS:
-        raise InputError("level", quoted(level), "0, 1, 2 or 3")
+        raise InputError("level", describe_value(level), "0, 1, 2 or 3")
     return divided_mesh(LEVELS[level], order, same_nodes=same_nodes)
 
 

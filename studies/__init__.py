@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 
 #: every study, in the order in which "all" runs them; it leaves out `APART`
 NAMED = """
@@ -43,7 +43,7 @@ class Sample:
         for key, least in (("scenes", 1), ("seed", 0), ("workers", 1), ("limit", 1)):
             value = getattr(self, key)
             if value is not None and value < least:
-                raise InputError(key, quoted(value), f"a whole number, at least {least}")
+                raise InputError(key, describe_value(value), f"a whole number, at least {least}")
 
 
 def run(
@@ -55,7 +55,7 @@ def run(
     assumptions and provenance.
     """
     if name not in NAMES:
-        raise InputError("study", quoted(name), ", ".join(NAMES))
+        raise InputError("study", describe_value(name), ", ".join(NAMES))
     if sample is not None and name != "campaign":
         raise InputError(
             "study", f"scenes, seed, workers or limit for {name}", "these options with campaign alone"

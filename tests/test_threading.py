@@ -16,7 +16,7 @@ CONDITIONALS = 84
 #: files of the heart that know one, beside its own ones and `simulation/model`
 FILES = {
     "hand": 3,
-    "elastic surface": 4,
+    "elastic surface": 3,
     "adhesion": 2,
     "charges, drive, leakage": 3,
     "viscosity, inertia, branches": 3,

@@ -34,7 +34,7 @@ from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.pools import open_pool
 from evfem.common.storage import alone_in
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.response.parameters import parameter_of
 from evfem.scene.file import loads, read_text, tables_of
 from evfem.scene.keys import VERSION
@@ -144,7 +144,9 @@ class _Problem:
         asked = []
         for one in self.data:
             if not isinstance(one, (MeasuredCurve, MeasuredValues)):
-                raise InputError("data", quoted(one), "MeasuredCurve, MeasuredValues, or a list of them")
+                raise InputError(
+                    "data", describe_value(one), "MeasuredCurve, MeasuredValues, or a list of them"
+                )
             one.check(len(self.tables.get("motion", ())))
             for keys, question in one.runs():
                 key = digest(dict(keys))

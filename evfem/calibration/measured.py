@@ -22,7 +22,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import choice, real, set_frozen
 from evfem.common.tables import numbers, read_headed, read_table
 from evfem.common.units import factor, named_unit
-from evfem.errors import InputError, quoted, readable, unknown
+from evfem.errors import InputError, describe_value, readable, unknown
 from evfem.scene.keys import shown
 from evfem.scene.options import Solver
 from evfem.scene.scene import DEPTH
@@ -129,7 +129,9 @@ class MeasuredCurve:
             allowed = "growing or falling values: loading and unloading are a curve each, with its `motion`"
             raise InputError("data.at", problem, f"{allowed}; values that scatter, sorted")
         if self.motion is not None and (type(self.motion) is not int or self.motion < 0):
-            raise InputError("data.motion", quoted(self.motion), "the number of a motion, from 0, or None")
+            raise InputError(
+                "data.motion", describe_value(self.motion), "the number of a motion, from 0, or None"
+            )
         set_frozen(self, where={key: _setting(key, value) for key, value in self.where.items()})
 
     @classmethod
@@ -202,7 +204,7 @@ class MeasuredCurve:
     def check(self, motions: int) -> None:
         """InputError for a motion that a scene with so many does not have."""
         if self.motion is not None and self.motion >= motions:
-            raise InputError("data.motion", quoted(self.motion), f"motions from 0 to {motions - 1}")
+            raise InputError("data.motion", describe_value(self.motion), f"motions from 0 to {motions - 1}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +318,7 @@ def _without_units(table: Mapping[str, Any]) -> dict[str, Any]:
             size = factor(f"data.{name}", name, unit, bases)
         if size != 1.0 and isinstance(values, list):
             raise InputError(
-                f"data.{name}", f"{quoted(values)} in {unit or 'a unit'}", "a number in each row"
+                f"data.{name}", f"{describe_value(values)} in {unit or 'a unit'}", "a number in each row"
             )
         found[name] = values if size == 1.0 else values * size
     return found
@@ -327,7 +329,7 @@ def _factors(factors: Mapping[str, float] | None, wanted: Collection[str]) -> di
     found = {}
     for name, size in (factors or {}).items():
         if name not in wanted:
-            raise unknown("data.factors", name, list(wanted), f"{quoted(name)}, which is not read")
+            raise unknown("data.factors", name, list(wanted), f"{describe_value(name)}, which is not read")
         found[name] = real(f"data.factors.{name}", size, "a number that is not 0", lambda x: x != 0.0)
     return found
 
@@ -353,5 +355,5 @@ def _setting(key: Any, value: Any) -> Any:
     if any(
         isinstance(one, float) and not math.isfinite(one) for one in np.ravel(np.array(found, dtype=object))
     ):
-        raise InputError(f"data.where.{key}", quoted(value), "finite numbers")
+        raise InputError(f"data.where.{key}", describe_value(value), "finite numbers")
     return found

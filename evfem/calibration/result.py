@@ -17,7 +17,7 @@ from evfem.common.checks import real
 from evfem.common.storage import check_ending, write_text
 from evfem.common.tables import frame
 from evfem.common.views import table
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.scene.file import loads
 from evfem.scene.scene import Scene
 
@@ -55,7 +55,7 @@ class FitResult:
     def __getitem__(self, key: str) -> float:
         """The value of a parameter."""
         if key not in self.values:
-            raise InputError("parameter", quoted(key), ", ".join(self.values))
+            raise InputError("parameter", describe_value(key), ", ".join(self.values))
         return self.values[key]
 
     @property

@@ -200,13 +200,13 @@ def _along(ends: tuple[float, ...]) -> tuple[Floats, Floats]:
 
 #: nodes and weights of the work of the attraction along a straight path of displacements, and finer ones if
 #: these do not resolve it: thin insulators are thinner than displacements by orders of magnitude
-WAY, SHARE = _along((0.0, 1.0))
-FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, *np.linspace(1 / 8, 7 / 8, 7), 15 / 16, 63 / 64, 1.0))
+NODES, WEIGHTS = _along((0.0, 1.0))
+FINE_NODES, FINE_WEIGHTS = _along((0.0, 1 / 64, 1 / 16, *np.linspace(1 / 8, 7 / 8, 7), 15 / 16, 63 / 64, 1.0))
 #: an integrand is resolved if its highest Legendre coefficients are below this fraction of the largest
-SEEN = 1e-3
+RESOLVED = 1e-3
 #: the two ends of the path
 ENDS = np.array([0.0, 1.0])
-#: matrix from values at the nodes `WAY` to Legendre coefficients (8,)
-LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * WAY - 1.0, WAY.size - 1))
+#: matrix from values at the nodes `NODES` to Legendre coefficients (8,)
+LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * NODES - 1.0, NODES.size - 1))
 #: nodes and weights of the friction work
 SLIDE, PART = gauss(4)

@@ -17,11 +17,11 @@ from typing import Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from evfem.errors import InputError, Mistakes, quoted
+from evfem.errors import InputError, Mistakes, describe_value
 
 MOST_STEPS = 1_000_000
 #: removed keys, or values of keys, and what replaces them, for one release
-GONE = {
+RENAMED_KEYS = {
     "solver.symmetry": "nothing: gone since 0.3, the whole finger is computed",
     "electrostatics.coupling": "nothing: the staggered coupling was removed in 0.4.0 (the equilibria of "
     "staggered are those of monolithic); leave the key out",
@@ -37,13 +37,13 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         bare = isinstance(value, str) and allowed.lstrip("-")[:1].isdigit()  # a range that says not of what
-        raise InputError(key, quoted(value), f"a number, {allowed}" if bare else allowed)
+        raise InputError(key, describe_value(value), f"a number, {allowed}" if bare else allowed)
     try:
         number = float(value)
     except OverflowError:  # an integer beyond all floats
         number = math.inf
     if not (math.isfinite(number) and test(number)):
-        raise InputError(key, quoted(value), allowed)
+        raise InputError(key, describe_value(value), allowed)
     return number
 
 
@@ -55,18 +55,18 @@ def count(key: str, value: object, most: int = MOST_STEPS, least: int = 1, allow
     evfem.errors.InputError: steps: given 2.5; allowed: a whole number from 1 to 1000000
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
-        raise InputError(key, quoted(value), allowed or f"a whole number from {least} to {most}")
+        raise InputError(key, describe_value(value), allowed or f"a whole number from {least} to {most}")
     return int(value)
 
 
 def choice(key: str, value: object, names: Collection[str]) -> str:
     """`value` if it is one of `names`."""
     if not isinstance(value, str) or value not in names:
-        raise InputError(key, quoted(value), " | ".join(names))
+        raise InputError(key, describe_value(value), " | ".join(names))
     return value
 
 
-def plain(value: Values) -> Values:
+def to_python(value: Values) -> Values:
     """A Python number for a single value, the array itself otherwise."""
     return value.item() if isinstance(value, (np.ndarray, np.generic)) and value.ndim == 0 else value
 
@@ -97,10 +97,10 @@ def finite(key: str, entered: Values, allowed: str) -> Values:
     try:
         value = np.asarray(entered)
     except ValueError as error:  # rows of different length
-        raise InputError(key, quoted(entered), allowed) from error
+        raise InputError(key, describe_value(entered), allowed) from error
     if value.dtype.kind not in "iufc" or not np.all(np.isfinite(value)):
-        raise InputError(key, quoted(entered), allowed)
-    return plain(value * 1.0)
+        raise InputError(key, describe_value(entered), allowed)
+    return to_python(value * 1.0)
 
 
 def set_frozen(target: object, **values: object) -> None:
@@ -172,7 +172,7 @@ def yes_or_no() -> dict[str, Any]:
 def truth(key: str, value: object) -> bool:
     """`value` if it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(key, quoted(value), "true | false")
+        raise InputError(key, describe_value(value), "true | false")
     return bool(value)
 
 
@@ -181,7 +181,7 @@ def instance(allowed: str, *classes: Any, unit: str = "") -> dict[str, Any]:
 
     def check(key: str, value: Any) -> Any:
         if not isinstance(value, classes) or (isinstance(value, bool) and bool not in classes):
-            raise InputError(key, quoted(value), allowed)
+            raise InputError(key, describe_value(value), allowed)
         return value
 
     return {"allowed": allowed, "check": check, "unit": unit}
@@ -213,7 +213,7 @@ class Key:
         return self.rule.get("allowed") or " | ".join(self.rule["names"])
 
     @property
-    def told(self) -> str:
+    def documented(self) -> str:
         """What it means and may be, in words."""
         unit = f" ({self.rule['unit']})" if self.rule.get("unit") else ""
         return f"{self.meaning}{unit}. Allowed: {self.allowed}"

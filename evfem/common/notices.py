@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any, TextIO
 
-from evfem.errors import InputError, StopRun, quoted
+from evfem.errors import InputError, StopRun, describe_value
 
 LOG = logging.getLogger("evfem")
 
@@ -130,10 +130,10 @@ def check_observers(observers: Sequence[object]) -> None:
         "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint), finished(result)"
     )
     if not isinstance(observers, Iterable):
-        raise InputError("observers", quoted(observers), f"a list of observers, each {allowed}")
+        raise InputError("observers", describe_value(observers), f"a list of observers, each {allowed}")
     for i, observer in enumerate(observers):
         if not any(hasattr(observer, event) for event in ("started", "step", "finished")):
-            raise InputError(f"observers[{i}]", quoted(observer), allowed)
+            raise InputError(f"observers[{i}]", describe_value(observer), allowed)
 
 
 def tell_observers(observers: Sequence[object], event: str, *arguments: Any) -> list[str]:

@@ -21,7 +21,7 @@ from typing import Any
 
 from evfem.common.arrays import blas_limits, linalg
 from evfem.common.checks import count
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 
 Pool = Callable[[Callable[[Any], Any], Mapping[Any, Any]], Iterator[tuple[Any, Any]]]
 
@@ -177,12 +177,12 @@ class _Processes:
 def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
     if workers is not None and scheduler != "local":
         allowed = "no workers beside the address of a scheduler, which has its own"
-        raise InputError("workers", quoted(workers), allowed)
+        raise InputError("workers", describe_value(workers), allowed)
     try:
         from distributed import Client, LocalCluster, as_completed
     except ModuleNotFoundError as error:
         allowed = 'no scheduler without Dask: pip install "evfem[dask]"'
-        raise InputError("scheduler", quoted(scheduler), allowed) from error
+        raise InputError("scheduler", describe_value(scheduler), allowed) from error
     with ExitStack() as stack:
         address: Any = scheduler
         if scheduler == "local":
@@ -193,7 +193,7 @@ def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
             client = stack.enter_context(Client(address))
         except (OSError, ValueError) as error:
             allowed = "the address of a running Dask scheduler, like tcp://HOST:8786, or local"
-            raise InputError("scheduler", quoted(scheduler), allowed) from error
+            raise InputError("scheduler", describe_value(scheduler), allowed) from error
         window = 2 * max(sum(client.nthreads().values()), 32)  # tasks in hand, so that nobody waits
 
         def pool(function: Callable[[Any], Any], tasks: Mapping[Any, Any]) -> Iterator[tuple[Any, Any]]:

@@ -18,7 +18,7 @@ import numpy as np
 from evfem.common import units
 from evfem.common.arrays import Floats
 from evfem.common.foreign import BOOKS, cells_of
-from evfem.errors import InputError, quoted, unknown
+from evfem.errors import InputError, describe_value, unknown
 
 #: endings of tables
 TABLES = (".csv", *BOOKS)
@@ -71,9 +71,9 @@ def numbers(key: str, entry: Any, allowed: str, axes: int = 1) -> Floats:
     try:
         array = np.array(entry)
     except ValueError:  # rows of unequal length
-        raise InputError(key, quoted(entry), allowed) from None
+        raise InputError(key, describe_value(entry), allowed) from None
     if array.dtype.kind not in "iuf" or array.ndim != axes:
-        raise InputError(key, quoted(entry), allowed)
+        raise InputError(key, describe_value(entry), allowed)
     if not np.isfinite(array).all():
         index = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(key, f"a value that is not finite, number {index}", allowed)
@@ -190,11 +190,13 @@ class Headed:
             return int(name) - 1
         found = [i for i, called in enumerate(zip(self.names, self.cells, strict=True)) if name in called]
         if not found:
-            raise unknown(key, str(entry), [*self.names, *numbers], f"{quoted(entry)}, which is no column")
+            raise unknown(
+                key, str(entry), [*self.names, *numbers], f"{describe_value(entry)}, which is no column"
+            )
         if len(found) > 1:
             which = " | ".join(str(i + 1) for i in found)
             raise InputError(
-                key, f"{quoted(entry)}, the name of {len(found)} columns", f"one by number: {which}"
+                key, f"{describe_value(entry)}, the name of {len(found)} columns", f"one by number: {which}"
             )
         return found[0]
 

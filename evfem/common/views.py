@@ -92,7 +92,9 @@ def describe(cls: Any) -> None:
         return
     lines = []
     for key in keys:
-        words = key.meaning if key.annotation is bool or key.allowed.startswith("a table [") else key.told
+        words = (
+            key.meaning if key.annotation is bool or key.allowed.startswith("a table [") else key.documented
+        )
         lines += [key.field, fill(words, COLUMNS, initial_indent="    ", subsequent_indent="    ")]
     cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "", "Parameters", "----------", *lines])
     plain = {key.field: key.annotation for key in fields_of(cls) if key.rule}

@@ -12,7 +12,7 @@ from importlib import resources
 from typing import Any
 
 from evfem.common.tables import words_or_numbers
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 
 #: what `load` accepts
 NAMES = ("area_laws", "meyer", "table1", "table2", "thresholds")
@@ -30,7 +30,7 @@ class Table:
 
     def __getitem__(self, column: str) -> Any:
         if column not in self.columns:
-            raise InputError(f"column of {self.name}", quoted(column), ", ".join(self.columns))
+            raise InputError(f"column of {self.name}", describe_value(column), ", ".join(self.columns))
         return self.columns[column]
 
     def value(self, key: str, column: str = "value") -> float:
@@ -41,7 +41,7 @@ class Table:
         """
         keys = next(iter(self.columns.values()))
         if key not in keys:
-            raise InputError(f"row of {self.name}", quoted(key), ", ".join(map(str, keys)))
+            raise InputError(f"row of {self.name}", describe_value(key), ", ".join(map(str, keys)))
         return float(self[column][keys.index(key)])
 
 
@@ -53,7 +53,7 @@ def load(name: str) -> Table:
     ('i', 4.0, 'mN')
     """
     if name not in NAMES:
-        raise InputError("data", quoted(name), ", ".join(NAMES))
+        raise InputError("data", describe_value(name), ", ".join(NAMES))
     lines = (resources.files(__package__) / f"{name}.csv").read_text(encoding="utf-8").splitlines()
     notes = [line[1:].strip() for line in lines if line.startswith("#")]
     rows = list(csv.reader(line for line in lines if not line.startswith("#")))

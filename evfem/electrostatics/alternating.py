@@ -28,11 +28,11 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Values, above, at_least, finite, plain
+from evfem.common.checks import Values, above, at_least, finite, to_python
 from evfem.electrostatics.dielectrics import constants, dielectric
 from evfem.electrostatics.laws import Layer, Layers, StrongTroxel, eps_0, stacked
 from evfem.electrostatics.relaxation import Relaxing, Sandwich
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 
 _GAP, _SIGMA = "an air gap in mm, not negative", "a conductivity in S/m, not negative"
 
@@ -52,7 +52,7 @@ def complex_length(
     '0.2940+0.0255j um'
     """
     layers = _layers(frequency, Layer(skin_thickness, dielectric(skin)), insulator, gap_conductivity)
-    return plain(np.asarray(layers.reduced) + 1j * np.asarray(layers.loss))
+    return to_python(np.asarray(layers.reduced) + 1j * np.asarray(layers.loss))
 
 
 def alternating_pressure(
@@ -82,7 +82,9 @@ def _layers(frequency: Values, skin: Layer, insulator: Layer, gap_conductivity: 
 def _layer(insulator: Any) -> Layer:
     found: Layer = stacked(insulator)
     if not isinstance(found, Layer):
-        raise InputError("insulator", quoted(insulator), "a Layer(thickness, eps_r), or a list of them")
+        raise InputError(
+            "insulator", describe_value(insulator), "a Layer(thickness, eps_r), or a list of them"
+        )
     return found
 
 
@@ -131,7 +133,7 @@ def step_rates(
     a = (s1 * (k2 + k3) + s2 * (k1 + k3) + s3 * (k1 + k2)) / total
     b = (s1 * k2 * k3 + s2 * k1 * k3 + s3 * k1 * k2) / total
     fast = 0.5 * (a + np.sqrt(np.maximum(a**2 - 4.0 * b, 0.0)))
-    return plain(np.asarray(fast)), plain(np.asarray(b / np.where(fast > 0.0, fast, 1.0)))
+    return to_python(np.asarray(fast)), to_python(np.asarray(b / np.where(fast > 0.0, fast, 1.0)))
 
 
 def _sandwich(
@@ -169,7 +171,7 @@ def square_wave_pressure(
     charged = (2.0 / (1.0 + np.exp(-a))) ** 2
     safe = np.where(a > 0.0, a, 1.0)
     held = np.where(a > 0.0, -np.expm1(-2.0 * safe) / (2.0 * safe), 1.0)
-    return plain(StrongTroxel().traction(gap, voltage, film) * charged * held)
+    return to_python(StrongTroxel().traction(gap, voltage, film) * charged * held)
 
 
 def corner_frequencies(
@@ -189,7 +191,7 @@ def corner_frequencies(
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
     (skin, leak, _), (solid, air, film) = stack.rates, stack.reduced(gap)
     of_gap, of_skin = leak / (1.0 + air / film), skin / (1.0 + solid / (air + film))
-    return plain(np.asarray(of_gap / (2.0 * np.pi))), plain(np.asarray(of_skin / (2.0 * np.pi)))
+    return to_python(np.asarray(of_gap / (2.0 * np.pi))), to_python(np.asarray(of_skin / (2.0 * np.pi)))
 
 
 #: odd harmonics of a square wave that count one by one, groups of those above, and the highest one

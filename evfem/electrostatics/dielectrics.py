@@ -27,10 +27,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Values, Within, above, at_least, plain, real, set_frozen
+from evfem.common.checks import Values, Within, above, at_least, real, set_frozen, to_python
 from evfem.common.tables import TABLES, numbers, read_columns
 from evfem.electrostatics.laws import Layer, eps_0
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 
 HEADER = {"frequency": "Hz", "eps_r": "1", "conductivity": "S/m"}
 _POLE = "(d_eps, tau in s, alpha), or with a fourth number for the lower exponent"
@@ -67,7 +67,7 @@ class _Fitted:
         2.001
         """
         loss = np.imag(np.asarray(self.permittivity(frequency)))
-        return plain(-2.0 * np.pi * np.asarray(frequency) * eps_0 * loss)
+        return to_python(-2.0 * np.pi * np.asarray(frequency) * eps_0 * loss)
 
     def debye(self, f_low: float, f_high: float, tolerance: float = 2e-3) -> Dielectric:
         """A sum of Debye poles that is this permittivity from `f_low` to `f_high` (Hz), within a
@@ -147,18 +147,18 @@ class Dielectric(_Fitted):
         for d_eps, tau, alpha, *lower in self.poles:
             low = (iw * tau) ** lower[0] if lower else 1.0
             value = value + d_eps / (low + (iw * tau) ** (1.0 - alpha))
-        return plain(value)
+        return to_python(value)
 
 
 def _pole(key: str, row: Any) -> tuple[float, ...]:
     """A pole as floats, if it is one."""
     values = numbers(key, row, _POLE).tolist()
     if len(values) not in (3, 4):
-        raise InputError(key, quoted(row), _POLE)
+        raise InputError(key, describe_value(row), _POLE)
     d_eps, tau, alpha, *lower = values
     if d_eps < 0.0 or not tau > 0.0 or not 0.0 <= alpha < 1.0 or not all(0.0 <= b < 1.0 for b in lower):
         allowed = "d_eps of at least 0, tau above 0, alpha (and the lower exponent) from 0 to below 1"
-        raise InputError(key, quoted(row), allowed)
+        raise InputError(key, describe_value(row), allowed)
     return tuple(values)
 
 
@@ -197,7 +197,7 @@ class DielectricTable(_Fitted):
             np.exp(np.interp(at, place, np.log(np.maximum(column, LEAST))))
             for column in (self.eps_r, self.conductivity)
         )
-        return plain(eps_r + sigma / (2j * np.pi * f * eps_0))
+        return to_python(eps_r + sigma / (2j * np.pi * f * eps_0))
 
     @classmethod
     def from_csv(cls, path: str | Path) -> DielectricTable:
@@ -235,7 +235,7 @@ def dielectric(skin: Any) -> Any:
         return DielectricTable.from_csv(skin)
     if isinstance(skin, str):
         allowed = " | ".join([*SKINS, "a file .csv with the header " + ",".join(HEADER)])
-        raise InputError("skin", quoted(skin), allowed)
+        raise InputError("skin", describe_value(skin), allowed)
     return skin
 
 
@@ -249,7 +249,7 @@ def constants(layer: Layer, frequency: Values | None) -> tuple[Values, Values]:
     if getattr(of, "poles", None) == ():
         return of.eps_inf, of.conductivity
     raise InputError(
-        "eps_r", quoted(of), "a dielectric without poles, or a frequency in Hz at which to take it"
+        "eps_r", describe_value(of), "a dielectric without poles, or a frequency in Hz at which to take it"
     )
 
 
@@ -285,7 +285,7 @@ def debye_layer(layer: Layer, frequency: float | None) -> Layer:
         return layer
     if not callable(getattr(of, "debye", None)):
         allowed = "a Dielectric or a DielectricTable where the voltage is resolved in time"
-        raise InputError("eps_r", quoted(of), allowed)
+        raise InputError("eps_r", describe_value(of), allowed)
     low, high = BAND
     if frequency is not None:
         low, high = min(low, frequency / WIDER), max(high, frequency * WIDER)

@@ -31,9 +31,9 @@ from evfem.common.checks import (
     among,
     check_fields,
     number,
-    plain,
     real,
     set_frozen,
+    to_python,
     yes_or_no,
 )
 from evfem.electrostatics.dielectrics import SKINS, Permittivity, dielectric, seen_at
@@ -89,7 +89,7 @@ class Drive:
 
     def peak(self, effective: Values) -> Values:
         """Peak (V) of the waveform with this effective voltage (V)."""
-        return plain(WAVEFORMS[self.waveform].crest * np.asarray(effective))
+        return to_python(WAVEFORMS[self.waveform].crest * np.asarray(effective))
 
     def signal(self, voltage: float) -> TimeSignal | float:
         """Voltage of the moment with this effective value (V), where resolved: a signal, or constant."""
@@ -123,7 +123,7 @@ class CycleMean:
         return self._sum(of.potential(gap, voltage, layers))
 
     def _sum(self, values: Any) -> Values:
-        return plain(np.tensordot(self.weights, np.asarray(values), 1))
+        return to_python(np.tensordot(self.weights, np.asarray(values), 1))
 
 
 def powers(signal: Any) -> tuple[float, Floats, Floats] | None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Values, above, at_least, finite, plain
+from evfem.common.checks import Values, above, at_least, finite, to_python
 from evfem.electrostatics.drive import Drive, mean_law
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.electrostatics.timesignals import WAVEFORMS
@@ -42,7 +42,7 @@ class AreaLaw:
     def __call__(self, normal_force: Values) -> Values:
         """Area in mm^2 at `normal_force` in N, 0 or more."""
         force = at_least("normal_force", normal_force, 0.0, "a normal force in N, not negative")
-        return plain(self.k * np.asarray(force) ** self.m)
+        return to_python(self.k * np.asarray(force) ** self.m)
 
     def linearised(self, highest: float) -> AreaLaw:
         """The line through the origin closest to this law in least squares over 0 <= F_n <= `highest`.
@@ -66,7 +66,7 @@ def required_attraction(friction: Values, display_friction: Values, normal_force
     display = above("display_friction", display_friction, 0.0, "a friction coefficient above zero")
     force = at_least("normal_force", normal_force, 0.0, "a normal force, not negative")
     excess = np.asarray(surface) / display - 1.0
-    return plain(np.where(excess.real > 0.0, excess, 0.0) * force)
+    return to_python(np.where(excess.real > 0.0, excess, 0.0) * force)
 
 
 def share_not_renderable(position: Values, friction: Values, display_friction: float) -> float:
@@ -156,22 +156,22 @@ class Encoding:
 
     def attraction(self, normal_force: Values, voltage: Values) -> Values:
         """F_e in N of touching skin, equations (14) and (15)."""
-        return plain(self.area(normal_force) * np.asarray(self.pressure(voltage)))
+        return to_python(self.area(normal_force) * np.asarray(self.pressure(voltage)))
 
     def tangential_force(self, normal_force: Values, voltage: Values) -> Values:
         """F_t = mu_hd (F_n + F_e) in N in full slip, equations (1), (13), (16a), (16b)."""
-        return plain(self.friction * np.asarray(normal_force + self.attraction(normal_force, voltage)))
+        return to_python(self.friction * np.asarray(normal_force + self.attraction(normal_force, voltage)))
 
     def peak(self, voltage: Values) -> Values:
         """Peak (V) of the alternating voltage whose effective value is `voltage` (V)."""
-        return plain(self.crest * np.asarray(voltage))
+        return to_python(self.crest * np.asarray(voltage))
 
     def voltage_for_attraction(self, attraction: Values, normal_force: Values) -> Values:
         """U in V that attracts with `attraction` N at `normal_force` N, equation (17)."""
         wanted = at_least("attraction", attraction, 0.0, "a force in N, not negative")
         force = above("normal_force", normal_force, 0.0, POSITIVE_FORCE)
         per_square_volt = self.pressure(1.0) * self.area(force)
-        return plain(np.sqrt(np.asarray(wanted) / per_square_volt))
+        return to_python(np.sqrt(np.asarray(wanted) / per_square_volt))
 
     def voltage_for_friction(self, friction: Values, normal_force: Values = 1.0) -> Values:
         """U in V that makes the display feel like `friction`, equations (19), (20a), (20b).

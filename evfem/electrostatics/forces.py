@@ -12,9 +12,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from evfem.common.checks import Values, above, at_least, plain
+from evfem.common.checks import Values, above, at_least, to_python
 from evfem.electrostatics.laws import Layer, Layers
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.protocols import ForceLaw
 
 Outline = Literal["rectangle", "ellipse"]
@@ -24,7 +24,7 @@ def plate_force(law: ForceLaw, area: Values, gap: Values, voltage: Values, layer
     """Force in N on a flat pad of `area` in mm^2: equations (3) and (5) at gap 0, (6) and (7) above it."""
     area = at_least("area", area, 0.0, "an area in mm^2, not negative")
     gap = at_least("gap", gap, 0.0, "an air gap in mm, not negative")
-    return plain(np.asarray(area * law.traction(gap, voltage, layers)))
+    return to_python(np.asarray(area * law.traction(gap, voltage, layers)))
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class EllipsoidalPad:
         b = self.height / 2.0
         rise_x = 1.0 - np.sqrt(1.0 - (2.0 * np.asarray(x) / self.width) ** 2)
         rise_y = 1.0 - np.sqrt(1.0 - (2.0 * np.asarray(y) / self.length) ** 2)
-        return plain(lowest + b * (rise_x + rise_y))
+        return to_python(lowest + b * (rise_x + rise_y))
 
 
 _POINTS = 28  # per direction; error below 3e-12 for every pad and law with gap + layers above 1e-6 mm
@@ -95,7 +95,7 @@ def pad_force(
     2.947
     """
     if over not in ("rectangle", "ellipse"):
-        raise InputError("over", quoted(over), "'rectangle' or 'ellipse'")
+        raise InputError("over", describe_value(over), "'rectangle' or 'ellipse'")
     gap = at_least("gap", gap, 0.0, "an air gap in mm, not negative")
     given = (gap, voltage, layers.reduced, layers.thickness, pad.width, pad.height, pad.length)
     columns = np.broadcast_arrays(*given)
@@ -104,7 +104,7 @@ def pad_force(
         _pad_force_batch(law, [column[i : i + _BATCH] for column in flat], over)
         for i in range(0, flat[0].size, _BATCH)
     ]
-    return plain(np.concatenate(pieces).reshape(shape)) if pieces else np.zeros(shape)
+    return to_python(np.concatenate(pieces).reshape(shape)) if pieces else np.zeros(shape)
 
 
 def _pad_force_batch(law: ForceLaw, columns: list[npt.NDArray[Any]], over: Outline) -> npt.NDArray[Any]:
@@ -141,7 +141,7 @@ def pad_force_per_depth(
     near = _pole_distance(columns[0], columns[5], Layers(columns[2], columns[3]))
     t, weight = _near_pole(near, np.full_like(near, np.pi / 2.0))
     traction = law.traction(gap + height * np.sin(0.5 * t) ** 2, voltage, Layers(reduced, thickness))
-    return plain(np.sum(width * weight * np.cos(t) * traction, axis=-1))
+    return to_python(np.sum(width * weight * np.cos(t) * traction, axis=-1))
 
 
 def _threshold_weights(
@@ -172,7 +172,7 @@ def effective_thickness_from_thresholds(
     a, b = (film.thickness / film.eps_r for film in insulators)
     with np.errstate(divide="ignore", invalid="ignore"):
         result = np.asarray((first * b - second * a) / (second - first))
-    return plain(_positive_thickness(result, voltages))
+    return to_python(_positive_thickness(result, voltages))
 
 
 def stratum_corneum_from_thresholds(
@@ -194,7 +194,7 @@ def stratum_corneum_from_thresholds(
         root = np.sqrt(linear**2 - 4.0 * square * constant)
         result = -2.0 * constant / (linear - root)
         other = -2.0 * constant / (linear + root)
-    return plain(_positive_thickness(np.where(np.real(other) > 0, other, result), voltages))
+    return to_python(_positive_thickness(np.where(np.real(other) > 0, other, result), voltages))
 
 
 def _positive_thickness(result: npt.NDArray[Any], voltages: tuple[Values, Values]) -> npt.NDArray[Any]:

@@ -33,8 +33,8 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from evfem.common.checks import Checked, Values, Within, above, at_least, finite, number, plain
-from evfem.errors import ABSENT, InputError, quoted
+from evfem.common.checks import Checked, Values, Within, above, at_least, finite, number, to_python
+from evfem.errors import ABSENT, InputError, describe_value
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
 
@@ -120,7 +120,7 @@ def stacked(value: Any) -> Any:
 def _insulator(key: str, value: Any) -> Layer | None:
     found: Layer | None = stacked(value)
     if not isinstance(found, Layer | None):
-        raise InputError(key, quoted(value), LAYER)
+        raise InputError(key, describe_value(value), LAYER)
     return found
 
 
@@ -182,7 +182,7 @@ class Layers:
         sigma = at_least("gap_conductivity", gap_conductivity, 0.0, "a conductivity in S/m, not negative")
         leak = 1.0 - 1j * np.asarray(sigma) / (2.0 * np.pi * np.asarray(f) * eps_0 * np.asarray(gap_eps_r))
         sums = leak * sum(layer.thickness / np.asarray(layer.permittivity(f)) for layer in layers)
-        return cls(plain(sums.real), thickness, plain(sums.imag))
+        return cls(to_python(sums.real), thickness, to_python(sums.imag))
 
 
 def _lengths(gap: Values, layers: Layers, gap_eps_r: float) -> tuple[Values, Values]:
@@ -245,21 +245,21 @@ class StrongTroxel(NamedLaw, name="strong_troxel"):
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         if np.any(layers.loss):
             near = np.sqrt(near**2 + (self.gap_eps_r * layers.loss) ** 2)
-        return plain(0.5 * self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2)
+        return to_python(0.5 * self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2)
 
     def traction_derivative(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """dp/dg in MPa/mm (negative)."""
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         if np.any(layers.loss):
             square = near**2 + (self.gap_eps_r * layers.loss) ** 2
-            return plain(-self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 * near / square**2)
-        return plain(-self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2 / near)
+            return to_python(-self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 * near / square**2)
+        return to_python(-self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2 / near)
 
     def potential(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """Pi in N/mm (= N mm per mm^2), zero at infinite gap."""
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         angle = _atan_ratio(self.gap_eps_r * layers.loss / near) if np.any(layers.loss) else 1.0
-        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * angle)
+        return to_python(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * angle)
 
 
 def _log1p_ratio(ratio: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -306,7 +306,7 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
         near, far = _lengths(gap, layers, self.gap_eps_r)
         if np.any(layers.loss):
             near = near + (self.gap_eps_r * layers.loss) ** 2 / near
-        return plain(0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far))
+        return to_python(0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far))
 
     def traction_derivative(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """dp/dg in MPa/mm (negative)."""
@@ -314,9 +314,9 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
         if np.any(layers.loss):
             square = (self.gap_eps_r * layers.loss) ** 2
             steepness = (near**2 - square) / (near * (near**2 + square)) + 1.0 / far
-            return plain(-np.asarray(self.traction(gap, voltage, layers)) * steepness)
+            return to_python(-np.asarray(self.traction(gap, voltage, layers)) * steepness)
         traction = 0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far)
-        return plain(-traction * (1.0 / near + 1.0 / far))
+        return to_python(-traction * (1.0 / near + 1.0 / far))
 
     def potential(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """Pi in N/mm (= N mm per mm^2), zero at infinite gap; exact to rounding also where D = e s."""
@@ -327,7 +327,7 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
             q, r = ratio**2, np.asarray(self.gap_eps_r * layers.loss / near) ** 2
             lossy = q * factor - 0.5 * ratio * r * _log1p_ratio(r) + r * _atan_ratio(np.sqrt(r))
             factor = np.where(q + r == 0.0, 1.0, lossy / np.where(q + r == 0.0, 1.0, q + r))
-        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * factor)
+        return to_python(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * factor)
 
 
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:
@@ -338,4 +338,4 @@ def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Lay
     own = getattr(law, "traction_derivative", None)
     if own is not None:
         return own(gap, voltage, layers)
-    return plain(derivative(lambda g: law.traction(g, voltage, layers), np.asarray(gap), GAP_STEP))
+    return to_python(derivative(lambda g: law.traction(g, voltage, layers), np.asarray(gap), GAP_STEP))

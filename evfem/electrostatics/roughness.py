@@ -45,7 +45,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Checked, Values, Within, check_fields, number, plain, real
+from evfem.common.checks import Checked, Values, Within, check_fields, number, real, to_python
 from evfem.electrostatics.laws import traction_derivative
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw, RoughnessLaw
@@ -74,7 +74,7 @@ class ConstantRoughness(Checked):
 
     def separation(self, pressure: Values) -> Values:
         """Separation in mm at contact pressures in MPa."""
-        return plain(np.full(np.shape(pressure), self.gap))
+        return to_python(np.full(np.shape(pressure), self.gap))
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class PowerRoughness(Checked):
         """Separation in mm at contact pressures in MPa."""
         p, (least, at) = np.asarray(pressure), self._tangent
         law = self.gap * (np.where(p.real > least, p, least) / self.pressure) ** -self.exponent
-        return plain(np.where(p.real > least, law, self.open_gap - self.exponent * at * p / least))
+        return to_python(np.where(p.real > least, law, self.open_gap - self.exponent * at * p / least))
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class ExponentialRoughness:
         p, least = np.asarray(pressure), self._least
         inside = np.where(p.real < self.pressure, p, self.pressure)
         law = self.decay * np.log(self.pressure / np.where(p.real > least, inside, least))
-        return plain(np.where(p.real > least, law, self.open_gap - self.decay * p / least))
+        return to_python(np.where(p.real > least, law, self.open_gap - self.decay * p / least))
 
 
 LAWS = {cls.law: cls for cls in (ConstantRoughness, PowerRoughness, ExponentialRoughness)}
@@ -179,7 +179,7 @@ def separation_derivative(law: RoughnessLaw, pressure: Values) -> Values:
     own = getattr(law, "separation_derivative", None)
     if own is not None:
         return own(pressure)
-    return plain(derivative(law.separation, np.asarray(pressure), PRESSURE_STEP))
+    return to_python(derivative(law.separation, np.asarray(pressure), PRESSURE_STEP))
 
 
 #: iterations for the length of a core, and its relative error
@@ -272,17 +272,17 @@ class Cored:
         outside = np.where(gap.real < at.end, at.end, gap)
         found = self.law.traction(outside, voltage, layers) + at.slope * (outside - gap)
         if not (deeper := gap.real < self.closed).any():
-            return plain(found)
+            return to_python(found)
         pressed = np.where(deeper, gap, self.closed)
         more = np.asarray(self.law.traction(pressed, voltage, layers))
         more = more - self.law.traction(self.closed, voltage, layers)
-        return plain(found - at.slope * (self.closed - pressed) + more)
+        return to_python(found - at.slope * (self.closed - pressed) + more)
 
     def traction_derivative(self, gap: Values, voltage: Values, layers: Any) -> Values:
         """dp/dg in MPa/mm."""
         at, gap = self.line(voltage, layers), np.asarray(gap)
         outer = np.asarray(traction_derivative(self.law, gap, voltage, layers))
-        return plain(np.where((gap.real >= self.closed) & (gap.real < at.end), -at.slope, outer))
+        return to_python(np.where((gap.real >= self.closed) & (gap.real < at.end), -at.slope, outer))
 
     def potential(self, gap: Values, voltage: Values, layers: Any) -> Values:
         """Pi in N/mm, that of the law beyond the core."""
@@ -292,8 +292,8 @@ class Cored:
         found = law.potential(np.where(gap.real < at.end, at.end, gap), voltage, layers)
         found = found - inside * (at.traction + 0.5 * at.slope * inside)
         if not (deeper := gap.real < self.closed).any():
-            return plain(found)
+            return to_python(found)
         pressed = np.where(deeper, gap, self.closed)
         more = law.potential(pressed, voltage, layers) - law.potential(self.closed, voltage, layers)
         short = np.asarray(law.traction(self.closed, voltage, layers)) - at.closed
-        return plain(found + more + short * (self.closed - pressed))
+        return to_python(found + more + short * (self.closed - pressed))

@@ -32,7 +32,7 @@ from evfem.common.tables import MOST_ROWS, names_of
 from evfem.electrostatics import wav
 from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
 from evfem.electrostatics.timesignals import Sampled
-from evfem.errors import ABSENT, InputError, quoted, readable
+from evfem.errors import ABSENT, InputError, describe_value, readable
 
 MAP_FORM = "evfem-friction-map-1"
 MOST_COLUMNS, ROWS = 100_000, 64
@@ -50,7 +50,7 @@ def _coefficients(key: str, entry: Any) -> tuple[float, float]:
 
 def _bits(key: str, value: Any) -> int:
     if value not in wav.LARGEST or isinstance(value, (bool, float)):
-        raise InputError(key, quoted(value), " | ".join(map(str, wav.LARGEST)))
+        raise InputError(key, describe_value(value), " | ".join(map(str, wav.LARGEST)))
     return int(value)
 
 
@@ -135,7 +135,7 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     True
     """
     if not isinstance(profile, VoltageProfile):
-        raise InputError("profile", quoted(profile), "a VoltageProfile")
+        raise InputError("profile", describe_value(profile), "a VoltageProfile")
     ending = Path(path).suffix.lower()
     if ending not in (".csv", ".wav", ".png", ".hjif"):
         raise InputError("path", str(path), "a file called .csv, .wav, .png or .hjif")

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Values, Within, above, check_fields, number, plain, set_frozen
+from evfem.common.checks import Values, Within, above, check_fields, number, set_frozen, to_python
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
 from evfem.common.views import plus
@@ -54,7 +54,7 @@ class VoltageProfile:
 
     def __call__(self, position: Values) -> Values:
         """Voltage in V at `position` in mm."""
-        return plain(piecewise_linear(self.position, self.voltage, position))
+        return to_python(piecewise_linear(self.position, self.voltage, position))
 
     @classmethod
     def from_csv(cls, path: str | Path) -> VoltageProfile:
@@ -142,7 +142,7 @@ class FollowForce:
 
     def __call__(self, position: Values) -> Values:
         """Wished force in N/mm at `position` in mm."""
-        return plain(piecewise_linear(self.position, self.tangential_force, position))
+        return to_python(piecewise_linear(self.position, self.tangential_force, position))
 
 
 #: kinds of voltages in a file that are found
@@ -155,7 +155,7 @@ def carrier_amplitude(effective: Values) -> Values:
     >>> round(carrier_amplitude(1000.0), 3)
     1414.214
     """
-    return plain(np.sqrt(2.0) * np.asarray(effective))
+    return to_python(np.sqrt(2.0) * np.asarray(effective))
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,9 @@ from evfem.common.checks import (
     above,
     check_fields,
     number,
-    plain,
     real,
     set_frozen,
+    to_python,
     yes_or_no,
 )
 from evfem.common.storage import write_text
@@ -132,7 +132,7 @@ class Sine(_Periodic):
     def __call__(self, time: Values) -> Values:
         """Voltage (V) at `time` (s, any shape)."""
         turns = 2.0 * np.pi * self.frequency * np.asarray(time) + self.phase
-        return plain(self.bias + self.amplitude * np.sin(turns))
+        return to_python(self.bias + self.amplitude * np.sin(turns))
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Square(_Periodic):
     def __call__(self, time: Values) -> Values:
         """Voltage (V) at `time` (s, any shape); a flip within rounding of a time has happened."""
         half = np.floor(2.0 * self.frequency * np.asarray(time) + FLIP)
-        return plain(self.amplitude * (1.0 - 2.0 * np.mod(half, 2.0)))
+        return to_python(self.amplitude * (1.0 - 2.0 * np.mod(half, 2.0)))
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class OpenCircuit(Checked):
 
     def __call__(self, time: Values) -> Values:
         """Voltage (V) of the source at `time` (s, any shape)."""
-        return plain(np.full(np.shape(time), self.voltage))
+        return to_python(np.full(np.shape(time), self.voltage))
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ class ChargeControl:
 
     def __call__(self, time: Values) -> Values:
         """Voltage (V) before the charge is there, at `time` (s, any shape)."""
-        return plain(np.zeros(np.shape(time)))
+        return to_python(np.zeros(np.shape(time)))
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ class Carrier:
         time = np.asarray(time)
         height = self.envelope(time) if isinstance(self.envelope, TimeSignal) else self.envelope
         swing = np.sin(2.0 * np.pi * self.frequency * time) if self.resolved else np.sqrt(0.5)
-        return plain(np.asarray(height * swing) + np.zeros_like(time, dtype=float))
+        return to_python(np.asarray(height * swing) + np.zeros_like(time, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -357,7 +357,7 @@ class Sampled:
         """Voltage (V) at `time` (s, any shape)."""
         sample_index = (np.asarray(time, dtype=float) - self.start) * self.rate
         size = self.voltage.size
-        return plain(
+        return to_python(
             np.interp(sample_index, np.arange(size), self.voltage, period=size if self.repeat else None)
         )
 

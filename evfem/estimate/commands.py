@@ -12,7 +12,7 @@ from evfem.common.checks import keys_of
 from evfem.common.notices import status, tell
 from evfem.common.storage import write_text
 from evfem.electrostatics.signalfile import write_signal
-from evfem.errors import ABSENT, InputError, quoted
+from evfem.errors import ABSENT, InputError, describe_value
 from evfem.estimate.display import LOST, Device, Rendering, exact_voltage, playback, render, render_exact
 from evfem.estimate.estimate import estimate, known_error
 from evfem.estimate.rendering import record
@@ -126,7 +126,9 @@ def _check_outputs(args: argparse.Namespace) -> None:
     endings = {"out": (".csv",), "signal": (".csv", ".wav", ".png", ".hjif")}
     for key, path in ((key, getattr(args, key)) for key in endings):
         if path is not None and path.suffix.lower() not in endings[key]:
-            raise InputError(f"--{key}", quoted(str(path)), f"a file called {', '.join(endings[key])}")
+            raise InputError(
+                f"--{key}", describe_value(str(path)), f"a file called {', '.join(endings[key])}"
+            )
         if path is not None and is_data(path):
             raise InputError(f"--{key}", f"{path}, which has the rows of a texture", "another file")
 

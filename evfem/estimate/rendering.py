@@ -19,7 +19,7 @@ from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import Encoding, share_not_renderable
 from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.protocols import ForceLaw, Observer, RoughnessLaw, Surface
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
@@ -171,7 +171,9 @@ def voltage_for(
     (1000.0, 0.859, 0.098)
     """
     if not isinstance(reference, ApparentFriction):
-        raise InputError("reference", quoted(reference), "an ApparentFriction, as apparent_friction makes it")
+        raise InputError(
+            "reference", describe_value(reference), "an ApparentFriction, as apparent_friction makes it"
+        )
     x = reference.position
     force = depth * reference.normal_force
     voltage = display.voltage_for_friction(np.maximum(reference.friction, 0.0), force)

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Values, finite, plain, real
+from evfem.common.checks import Values, finite, real, to_python
 from evfem.electrostatics.laws import Layer
-from evfem.errors import EvfemError, InputError, quoted
+from evfem.errors import EvfemError, InputError, describe_value
 from evfem.field.bounds import capacitance_bounds
 from evfem.field.curves import curved
 from evfem.field.fieldmesh import make_mesh
@@ -54,13 +54,13 @@ class FieldSolution:
         75.0
         """
         x, y = _places(x, y)
-        return plain(self.voltage * self.solved.values(x, y))
+        return to_python(self.voltage * self.solved.values(x, y))
 
     def field(self, x: Values, y: Values) -> tuple[Values, Values]:
         """The two components of the field in V/mm at positions in slab or air (mm)."""
         x, y = _places(x, y)
         gradient = -self.voltage * self.solved.gradients(x, y)
-        return plain(gradient[0]), plain(gradient[1])
+        return to_python(gradient[0]), to_python(gradient[1])
 
     def surface_field(self, x: Values) -> Values:
         """Vertical field in V/mm in the air on the slab's upper face (without slab: on the electrode).
@@ -70,12 +70,12 @@ class FieldSolution:
         1000.0
         """
         x, y = _places(x, 0.0)
-        return plain(-self.voltage * self.solved.gradients(x, y)[1])
+        return to_python(-self.voltage * self.solved.gradients(x, y)[1])
 
     def outline_field(self, x: Values) -> Values:
         """Field in V/mm in the air on the outline above `x`, its strength: the body is a conductor."""
         x, y = _places(x, np.inf)
-        return plain(abs(self.voltage) * np.hypot(*self.solved.gradients(x, y)))
+        return to_python(abs(self.voltage) * np.hypot(*self.solved.gradients(x, y)))
 
 
 def _places(x: Values, y: Values) -> tuple[Floats, Floats]:
@@ -104,7 +104,7 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
     8.2053
     """
     if slab is not None and not isinstance(slab, Layer):
-        raise InputError("slab", quoted(slab), "None or a Layer(thickness, eps_r)")
+        raise InputError("slab", describe_value(slab), "None or a Layer(thickness, eps_r)")
     thickness, eps_r = (0.0, 1.0) if slab is None else _scalars(slab)
     voltage = real("voltage", voltage, "a voltage in V")
     outline = Outline.of(x, height, periodic)
@@ -129,5 +129,5 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
 
 def _scalars(slab: Layer) -> tuple[float, float]:
     if np.ndim(slab.thickness) or np.ndim(slab.eps_r):
-        raise InputError("slab", quoted(slab), "a Layer of one thickness and one permittivity")
+        raise InputError("slab", describe_value(slab), "a Layer of one thickness and one permittivity")
     return float(slab.thickness), float(slab.eps_r)

@@ -19,7 +19,7 @@ import numpy as np
 
 from evfem.common.checks import check_fields, one_of, set_frozen, truth
 from evfem.common.views import short
-from evfem.errors import ABSENT, InputError, Mistakes, quoted, unknown
+from evfem.errors import ABSENT, InputError, Mistakes, describe_value, unknown
 from evfem.finger.layers import NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.scan import RidgeScan, ScannedRidges, is_texture
@@ -67,7 +67,7 @@ def _ridges(key: str, value: Any) -> Any:
     """True, False, or a scan: what a file has in `ridge_scan`."""
     if isinstance(value, str):
         patterns = 'patterns and prints are those of a Fingertip (kind = "fingertip"), scans are `ridge_scan`'
-        raise InputError(key, quoted(value), f"true | false; {patterns}")
+        raise InputError(key, describe_value(value), f"true | false; {patterns}")
     return value if isinstance(value, RidgeScan) or is_texture(value) else truth(key, value)
 
 
@@ -77,7 +77,7 @@ _SCAN = str | dict[str, list[float]]
 
 def _mesh(key: str, value: Any) -> Any:
     if not isinstance(value, str | os.PathLike) and not memory.is_mesh(value):
-        raise InputError(key, quoted(value), memory.ALLOWED)
+        raise InputError(key, describe_value(value), memory.ALLOWED)
     return value
 
 
@@ -91,10 +91,10 @@ def _named(what: str, place: str) -> dict[str, Any]:
 
     def check(key: str, names: Any) -> Mapping[str, Any]:
         if not isinstance(names, Mapping):
-            raise InputError(key, quoted(names), allowed)
+            raise InputError(key, describe_value(names), allowed)
         for one in names.values():
             if isinstance(one, bool) or not isinstance(one, Integral | str | Mapping):
-                raise InputError(key, quoted(one), allowed)
+                raise InputError(key, describe_value(one), allowed)
         return names
 
     return {"allowed": allowed, "check": check}

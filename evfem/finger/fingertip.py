@@ -19,7 +19,7 @@ import numpy as np
 from evfem import data
 from evfem.common.checks import between, check_fields, one_of, set_frozen
 from evfem.common.views import short
-from evfem.errors import InputError, Mistakes, quoted
+from evfem.errors import InputError, Mistakes, describe_value
 from evfem.finger import fingerprint
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.fingerprint import PATTERNS, FingerprintPattern, HeightMap
@@ -169,7 +169,7 @@ class Fingertip(LayeredFinger):
             if not shape > SMALLEST_SHAPE:
                 problem = f"a print that leaves cells with a scaled Jacobian of {shape:.2g}"
                 allowed = "a smoother or lower print, or a finer finger.resolution or finger.ridge_width"
-                raise InputError("finger.ridges", quoted(problem), allowed)
+                raise InputError("finger.ridges", describe_value(problem), allowed)
         return mesh
 
     @property
@@ -259,7 +259,7 @@ def _ridges(tip: Fingertip) -> str | HeightMap:
         return pattern
     if isinstance(pattern, str | os.PathLike) and _is_file(os.fspath(pattern)):
         return fingerprint.read(Path(pattern), tip.ridge_pixel, tip.ridge_height, tip.ridge_dark)
-    raise InputError("finger.ridges", quoted(pattern), _RIDGES)
+    raise InputError("finger.ridges", describe_value(pattern), _RIDGES)
 
 
 def _check_shape(tip: Fingertip, solid: Solid) -> None:

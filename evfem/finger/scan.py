@@ -19,7 +19,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
 from evfem.common.tables import numbers, read_headed
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.finger.outline import Ellipse, quintic
 
 #: most points of a scan, and how near to each other they may be (mm)
@@ -91,7 +91,7 @@ class RidgeScan:
             return cls.from_csv(source)
         if isinstance(source, Mapping) and set(source) in ({"x", "height"}, {"x", "y"}):
             return cls(**source)
-        raise InputError("finger.ridge_scan", quoted(source), f"a RidgeScan, or {ALLOWED}")
+        raise InputError("finger.ridge_scan", describe_value(source), f"a RidgeScan, or {ALLOWED}")
 
     @property
     def columns(self) -> dict[str, list[float]]:

@@ -12,7 +12,7 @@ from evfem import data
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, between, choice, number, set_frozen, whole
 from evfem.common.views import called, changed, short, table
-from evfem.errors import InputError, quoted, unknown
+from evfem.errors import InputError, describe_value, unknown
 from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
 from evfem.finger.outline import Ridges
 from evfem.mesh.mesh import Mesh
@@ -164,7 +164,7 @@ class LayeredFinger:
     def mesh(self, order: int = 2) -> Mesh:
         """The mesh: linear cells of order 1, or half as many divisions of quadratic ones of order 2."""
         if order not in (1, 2):
-            raise InputError("order", quoted(order), "1 or 2")
+            raise InputError("order", describe_value(order), "1 or 2")
         mesh: Mesh = self._shape.mesh(order)
         return mesh
 
@@ -197,7 +197,7 @@ class LayeredFinger:
         """Complete `materials`: layers without a law get that of Table 2."""
         if not isinstance(self.materials, Mapping):
             allowed = "a law for each region that is not to have that of Table 2"
-            raise InputError("finger.materials", quoted(self.materials), allowed)
+            raise InputError("finger.materials", describe_value(self.materials), allowed)
         laws = self._usual
         for name in self.materials:
             if name not in laws:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.mesh.hexahedron import EDGES, face_nodes
 
 
@@ -245,12 +245,12 @@ def raised(mesh: Mesh) -> Mesh:
 def interface_of(mesh: Mesh, region: str) -> Ints:
     """Nodes (K, ...) of every side that cells of two given regions share; raises `InputError` without one."""
     if region not in mesh.region_names:
-        raise InputError("region", quoted(region), " | ".join(mesh.region_names))
+        raise InputError("region", describe_value(region), " | ".join(mesh.region_names))
     inside = mesh.region == mesh.region_names[region]
     sides, of_cell = mesh.sides
     own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(sides)) for cells in (inside, ~inside))
     shared = (own > 0) & (other > 0)
     interface = mesh.cell_sides[inside][shared[of_cell[inside]]]
     if not len(interface):
-        raise InputError("region", quoted(region), "a region that has another one below it")
+        raise InputError("region", describe_value(region), "a region that has another one below it")
     return interface

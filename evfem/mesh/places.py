@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.mesh.groups import Group
 from evfem.mesh.mesh import Mesh, joined
 
@@ -145,4 +145,4 @@ def _told(place: Any) -> str:
     """A place as a scene file has it."""
     if not isinstance(place, Mapping):
         return str(place)
-    return "{" + ", ".join(f"{axis} = {quoted(ends)}" for axis, ends in place.items()) + "}"
+    return "{" + ", ".join(f"{axis} = {describe_value(ends)}" for axis, ends in place.items()) + "}"

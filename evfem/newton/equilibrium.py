@@ -107,7 +107,7 @@ class Equilibrium:
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in `state`; touching nodes are those of `old`, accepted last."""
         pad = replace(self.interface.pad_state(state, old.touching), voltage=voltage)
-        return self.interface.foundation.tilted(state, self.attraction.forces(pad))
+        return self.interface.foundation.turned(state, self.attraction.forces(pad))
 
     def pad_state(self, state: State) -> PadState:
         """The pad of an accepted state."""
@@ -115,7 +115,7 @@ class Equilibrium:
 
     def pulls(self, state: State) -> dict[str, Floats]:
         """Forces (P, dim) of every traction by name in an accepted state, not tilted by surface strain."""
-        rest, found = self.interface.foundation.untilted(state, state.attraction), {}
+        rest, found = self.interface.foundation.turned_back(state, state.attraction), {}
         for traction in self.attraction.parts[:0:-1]:
             found[traction.name] = state.memory[f"forces.{traction.name}"]
             rest = rest - found[traction.name]

@@ -15,7 +15,7 @@ import numpy as np
 
 from evfem.calibration.result import FitResult
 from evfem.common.checks import choice
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.plotting import figures, labels
 from evfem.plotting.fields import frame_of
 from evfem.plotting.finger import check_plane, told
@@ -177,7 +177,7 @@ def _mark_motions(ax: Axes, result: Result) -> None:
 def history(result: Result, columns: Sequence[str], over: str | None = None) -> figures.Panels:
     """Columns of the history over `over` (see `forces`), a panel for each kind of quantity."""
     if isinstance(columns, str) or not columns:
-        raise InputError("columns", quoted(columns), "a list of at least one column of the history")
+        raise InputError("columns", describe_value(columns), "a list of at least one column of the history")
     over = checked_over(over, result)
     kinds: dict[tuple[str, str], dict[str, Any]] = {}
     for name in columns:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import EvfemError, InputError, quoted
+from evfem.errors import EvfemError, InputError, describe_value
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.figures import BOTH_SIGNS, EDGE, ONE_SIGN, STATUS, TISSUE
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
@@ -77,7 +77,7 @@ def frame_of(result: Result, number: int) -> Frame:
     """A frame by its number among those kept, from the end if negative; InputError for another."""
     if not -len(result.frames) <= number < len(result.frames):
         allowed = f"the number of one of the {len(result.frames)} frames kept"
-        raise InputError("frame", quoted(number), allowed)
+        raise InputError("frame", describe_value(number), allowed)
     return result.frames[number]
 
 
@@ -173,7 +173,7 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
     if field == "contact_status":
         return Scale("status", -0.5, len(STATUS) - 0.5)
     if vmin is not None and vmax is not None and not vmin < vmax:
-        raise InputError("vmin", quoted(vmin), f"a value below vmax, which is {vmax:g}")
+        raise InputError("vmin", describe_value(vmin), f"a value below vmax, which is {vmax:g}")
     least, most = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     least = min(least, 0.0) if field in FROM_ZERO else least
     middle = MIDDLES.get(field)

@@ -11,7 +11,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.mesh.mesh import Mesh
 from evfem.plotting import fields, figures
 from evfem.plotting.labels import field_label, named
@@ -198,7 +198,7 @@ def checked_window(window: Any) -> fields.Window:
         left, right, bottom, top = (float(value) for value in window)
         if left < right and bottom < top and np.isfinite([left, right, bottom, top]).all():
             return left, right, bottom, top
-    raise InputError("near", quoted(window), "contact, or a window (left, right, bottom, top) in mm")
+    raise InputError("near", describe_value(window), "contact, or a window (left, right, bottom, top) in mm")
 
 
 def _whole(points: Floats, height: fields.Height) -> fields.Window:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.plotting import figures
 from evfem.plotting.labels import key_label, key_unit
 from evfem.sweeps.file import FIRST, LAST
@@ -68,7 +68,7 @@ def sweep_histogram(table: SweepResult, column: str, ax: Axes | None = None) -> 
     """
     found = [row[column] for row in _done(table, column)]
     if not all(type(value) in (int, float) for value in found):
-        raise InputError("column", quoted(column), "a column of numbers")
+        raise InputError("column", describe_value(column), "a column of numbers")
     values, ax = np.array(found, dtype=float), figures.axes_or_new(ax)
     ax.hist(values, bins="auto", color=figures.SKY, edgecolor="white")
     low, high = np.quantile(values, [0.05, 0.95])
@@ -122,10 +122,10 @@ def _ranked(x: Any, y: Any) -> float:
 
 def _check_log(log: str, rows: Sequence[dict[str, Any]], keys: dict[str, str]) -> None:
     if log not in ("", "x", "y", "xy"):
-        raise InputError("log", quoted(log), '"", "x", "y" or "xy"')
+        raise InputError("log", describe_value(log), '"", "x", "y" or "xy"')
     for axis in log:
         if not all(type(row[keys[axis]]) in (int, float) and row[keys[axis]] > 0.0 for row in rows):
-            raise InputError("log", quoted(log), f"numbers above 0 along {axis}")
+            raise InputError("log", describe_value(log), f"numbers above 0 along {axis}")
 
 
 def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = None) -> Axes:
@@ -156,7 +156,7 @@ def _done(table: SweepResult, *columns: str) -> list[dict[str, Any]]:
     """The rows in which these columns have a value; InputError for other columns, or none left."""
     for name in columns:
         if name not in table.columns:
-            raise InputError("column", quoted(name), ", ".join(table.columns))
+            raise InputError("column", describe_value(name), ", ".join(table.columns))
     rows = [row for row in table.rows if all(row[name] is not None for name in columns)]
     if not rows:
         raise InputError("table", f"no point with {' and '.join(columns)}", "a sweep with results")

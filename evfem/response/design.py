@@ -16,7 +16,7 @@ import numpy as np
 
 from evfem.common import notices
 from evfem.common.arrays import Floats
-from evfem.errors import InputError, NotConverged, quoted
+from evfem.errors import InputError, NotConverged, describe_value
 from evfem.response.parameters import parameter_of, scene_of
 from evfem.response.sensitivities import sensitivities
 from evfem.scene.scene import Scene
@@ -163,7 +163,7 @@ def _bounds(scene: Scene, keys: tuple[str, ...], bounds: Any) -> Floats:
         numbers = isinstance(pair, Sequence) and len(pair) == 2 and not isinstance(pair, str)
         if not numbers or pair[0] == pair[1] or not float(pair[0]) <= value <= float(pair[1]):
             allowed = f"(low, high) around {value:g}, that of the scene"
-            raise InputError(f"bounds.{key}", quoted(pair), allowed)
+            raise InputError(f"bounds.{key}", describe_value(pair), allowed)
     return np.array(pairs, dtype=float)
 
 
@@ -173,7 +173,7 @@ def _objective(scene: Scene, objective: Any) -> Callable[[Result], float]:
         return objective
     if not isinstance(objective, str):
         raise InputError(
-            "objective", quoted(objective), "a function of a result, or COLUMN.STATISTIC[.MOTION]"
+            "objective", describe_value(objective), "a function of a result, or COLUMN.STATISTIC[.MOTION]"
         )
     sign, name = (-1.0, objective[1:]) if objective.startswith("-") else (1.0, objective)
     check_output(name, len(scene.motion))

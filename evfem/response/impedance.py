@@ -38,7 +38,7 @@ from evfem.common.tables import csv_text, numbers
 from evfem.contact.condensed import COMPONENTS
 from evfem.contact.signorini import FORWARD, STICK, sizes
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.newton.state import State
 from evfem.response.parameters import scene_of
 from evfem.scene.scene import Scene
@@ -140,7 +140,7 @@ def _checked(frequencies: Any) -> Floats:
     allowed = "one or several frequencies in Hz, larger than 0"
     found = numbers("frequencies", [frequencies] if np.isscalar(frequencies) else frequencies, allowed)
     if not found.size or found.min() <= 0.0:
-        raise InputError("frequencies", quoted(frequencies), allowed)
+        raise InputError("frequencies", describe_value(frequencies), allowed)
     return found
 
 

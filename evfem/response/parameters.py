@@ -19,7 +19,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import fields_of
 from evfem.electrostatics.laws import LayerStack
-from evfem.errors import ABSENT, InputError, quoted, unknown
+from evfem.errors import ABSENT, InputError, describe_value, unknown
 from evfem.mesh.mesh import Mesh, raised
 from evfem.planning.plan import scene_mesh
 from evfem.scene import file as scenefile
@@ -132,7 +132,9 @@ class Keyed:
         """Attributes, names and numbers from the scene to it."""
         table, *rest = self.name.split(".")
         if table not in TABLES or not rest:
-            raise InputError("parameters", quoted(self.name), f"TABLE.KEY, TABLE one of {', '.join(TABLES)}")
+            raise InputError(
+                "parameters", describe_value(self.name), f"TABLE.KEY, TABLE one of {', '.join(TABLES)}"
+            )
         if table == "electrostatics":
             return self._electric(*rest)
         if (table, rest[0]) == ("surface", "friction_law"):
@@ -165,7 +167,7 @@ class Keyed:
         for step in self.path:
             here = _part(here, step, self.name)
         if isinstance(here, (bool, str)) or not isinstance(here, (int, float, np.floating)):
-            raise InputError(f"parameters.{self.name}", quoted(here), NUMBER)
+            raise InputError(f"parameters.{self.name}", describe_value(here), NUMBER)
         if isinstance(here, int) and self.path[-1] in ("steps", "every"):
             raise InputError(f"parameters.{self.name}", "a whole number", NUMBER)
         return float(here)
@@ -196,7 +198,9 @@ def parameter_of(scene: Scene, wanted: Any) -> Parameter:
         following(scene.finger, scene_mesh(scene)[0], wanted.velocity)
         return wanted
     if not isinstance(wanted, str):
-        raise InputError("parameters", quoted(wanted), "dotted keys of the scene, and ShapeChange objects")
+        raise InputError(
+            "parameters", describe_value(wanted), "dotted keys of the scene, and ShapeChange objects"
+        )
     found = Keyed(scene, wanted)
     if found.value == 0.0:
         raise InputError(f"parameters.{wanted}", 0.0, "a number other than 0: steps are shares of it")

@@ -57,7 +57,7 @@ from evfem.common.arrays import Floats, blas_limits
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.contact.signorini import OPEN
-from evfem.errors import InputError, quoted, readable, unknown
+from evfem.errors import InputError, describe_value, readable, unknown
 from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
 from evfem.newton.control import Target, Unsupported
 from evfem.newton.state import State
@@ -237,7 +237,7 @@ class Sensitivities:
     def __getitem__(self, which: tuple[str, str]) -> Floats:
         """The derivative (steps,) of a column by a parameter."""
         if isinstance(which, str):
-            raise InputError("derivative", quoted(which), "found[column, parameter]")
+            raise InputError("derivative", describe_value(which), "found[column, parameter]")
         column, parameter = which
         if parameter not in self.parameters:
             raise unknown("parameter", str(parameter), tuple(self.parameters), readable(parameter))

@@ -20,7 +20,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, real
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.response.lines import differentiable
 from evfem.response.parameters import parameter_of, scene_of
 from evfem.response.sensitivities import Sensitivities, sensitivities
@@ -117,13 +117,13 @@ def uncertainty(
     """
     scene = scene_of(scene)
     if not isinstance(sd, Mapping) or not sd:
-        raise InputError("sd", quoted(sd), "{key of the scene: standard deviation}")
+        raise InputError("sd", describe_value(sd), "{key of the scene: standard deviation}")
     for key, value in sd.items():
         real(f"sd.{key}", value, "a standard deviation larger than 0", Within(0.0, 1e12, above=True))
     found = sensitivities(scene, list(sd), columns, progress)
     names = [name for name in found.columns if differentiable(name)]
     if not names:
-        raise InputError("columns", quoted(columns), "at least one column that has derivatives")
+        raise InputError("columns", describe_value(columns), "at least one column that has derivatives")
     parts = {(name, key): found[name, key] * float(sd[key]) for name in names for key in sd}
     total = {name: np.sqrt(sum(parts[name, key] ** 2 for key in sd)) for name in names}
     return Uncertainty(found.result, total, parts, _checked(scene, sd, parts, found, names), found)

@@ -14,8 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, get_origin
 
-from evfem.common.checks import GONE, Key, keys_of
-from evfem.errors import ABSENT, InputError, Mistakes, near, readable, together, unknown
+from evfem.common.checks import RENAMED_KEYS, Key, keys_of
+from evfem.errors import ABSENT, InputError, Mistakes, closest_name, combine, readable, unknown
 
 #: of the format
 VERSION = 1
@@ -52,11 +52,11 @@ def read(
         path = _join(prefix, name)
         if name in known:
             continue
-        if path in GONE:
-            mistakes.found.append(InputError(path, shown(value), GONE[path]))
+        if path in RENAMED_KEYS:
+            mistakes.found.append(InputError(path, shown(value), RENAMED_KEYS[path]))
         else:
             mistakes.found.append(_unknown_key(path, name, known, homes or {}))
-            meant |= {*near(name, known)}
+            meant |= {*closest_name(name, known)}
     for key in keys:
         with mistakes.of_a_part(), at(prefix):
             if key.name in table:
@@ -108,7 +108,7 @@ def _unknown_key(
     mistake = unknown(key, name, known)
     home = next((table for table, classes in homes.items() if name in names(*classes)), "")
     here = re.sub(r"\[\d+\]", "", key.rpartition(".")[0])  # whose other kinds may have it
-    if home.strip("[]") in ("", here) or near(name, known):
+    if home.strip("[]") in ("", here) or closest_name(name, known):
         return mistake
     return InputError(key, mistake.given, f"{mistake.allowed}; {name} stands in {home}")
 
@@ -121,7 +121,7 @@ def check_size(key: str, path: Path, most: int) -> None:
         reason = getattr(error, "strerror", None) or "no path"
         problem, allowed = f"{shown(str(path))} ({reason})", "a file that exists and can be read"
         beside = _beside(path)
-        close = [one for one in beside if one == f"{path.name}.toml"] or near(path.name, beside)
+        close = [one for one in beside if one == f"{path.name}.toml"] or closest_name(path.name, beside)
         raise InputError(key, problem, f"{close[0]}? ({allowed})" if close else allowed) from error
     if not path.is_file():
         raise InputError(key, f"{path}, which is no file", "a file")
@@ -172,7 +172,7 @@ def at(prefix: str, renamed: Mapping[str, str] = MappingProxyType({})) -> Iterat
     try:
         yield
     except InputError as error:
-        raise together([_moved(one, prefix, renamed) for one in error.mistakes]) from error
+        raise combine([_moved(one, prefix, renamed) for one in error.mistakes]) from error
 
 
 def _moved(mistake: InputError, prefix: str, renamed: Mapping[str, str]) -> InputError:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 from evfem.common.checks import Named, Within, number, one_of, whole
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.surface.ways import ANGLE, direction
 
 Hold = Literal["indentation", "force"]
@@ -157,7 +157,7 @@ class Press(Motion, kind="press"):
         self._check_one_of("force", "indentation")
         if self.force is not None and self.speed is not None:
             allowed = "no speed with a press to a force, only to an indentation"
-            raise InputError("speed", quoted(self.speed), allowed)
+            raise InputError("speed", describe_value(self.speed), allowed)
         super().__post_init__()
 
     @property

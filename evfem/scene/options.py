@@ -6,8 +6,18 @@ from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field
 from typing import Annotated, Any
 
-from evfem.common.checks import GONE, Checked, Within, among, check_fields, number, real, whole, yes_or_no
-from evfem.errors import ABSENT, InputError, quoted
+from evfem.common.checks import (
+    RENAMED_KEYS,
+    Checked,
+    Within,
+    among,
+    check_fields,
+    number,
+    real,
+    whole,
+    yes_or_no,
+)
+from evfem.errors import ABSENT, InputError, describe_value
 from evfem.newton.strategy import Strategy
 from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.space import ELEMENTS, elements_on
@@ -58,12 +68,12 @@ class Solver:
 
     def __post_init__(self, symmetry: object) -> None:
         if symmetry is not None:
-            raise InputError("symmetry", quoted(symmetry), GONE["solver.symmetry"])
+            raise InputError("symmetry", describe_value(symmetry), RENAMED_KEYS["solver.symmetry"])
         if not isinstance(self.strategy, Strategy):
-            raise InputError("strategy", quoted(self.strategy), "a Strategy")
+            raise InputError("strategy", describe_value(self.strategy), "a Strategy")
         for key in ("penalty_normal", "penalty_tangential"):
             if self.contact == "exact" and getattr(self, key) is not None:
-                raise InputError(key, quoted(getattr(self, key)), 'only with contact = "penalty"')
+                raise InputError(key, describe_value(getattr(self, key)), 'only with contact = "penalty"')
         check_fields(self)
         if self.contact == "penalty" and self.penalty_normal is None:
             allowed = 'a penalty in N/mm3, needed with contact = "penalty"'

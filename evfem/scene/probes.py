@@ -22,7 +22,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Checked, Within, finite, number
 from evfem.common.tables import csv_text
-from evfem.errors import ABSENT, InputError, Mistakes, quoted
+from evfem.errors import ABSENT, InputError, Mistakes, describe_value
 from evfem.mesh.faces import ON, crossings, inverted
 from evfem.mesh.mesh import Mesh
 from evfem.scene.keys import read
@@ -46,7 +46,7 @@ def _numbers(allowed: str) -> dict[str, Any]:
     def check(key: str, value: Any) -> tuple[float, ...]:
         found = np.atleast_1d(finite(key, value, allowed))
         if found.ndim != 1 or not found.size or found.dtype.kind == "c":
-            raise InputError(key, quoted(value), allowed)
+            raise InputError(key, describe_value(value), allowed)
         return tuple(found.tolist())
 
     return {"allowed": allowed, "check": check, "unit": "mm"}
@@ -93,12 +93,14 @@ Wanted = Mapping[str, Any]  # name -> Probe, or points
 def checked(key: str, entry: Any) -> Wanted:
     """Probes by name, their points as tuples of tuples; tables of a scene file become a `Probe`."""
     if not isinstance(entry, Mapping):
-        raise InputError(key, quoted(entry), f"a table of names, each with {_POINTS}")
+        raise InputError(key, describe_value(entry), f"a table of names, each with {_POINTS}")
     mistakes, found = Mistakes(), dict[str, Any]()
     for name, one in entry.items():
         with mistakes.of_a_part():
             if not isinstance(name, str) or not re.fullmatch(r"\w[\w -]{0,59}", name):
-                raise InputError(key, quoted(name), "names of up to 60 letters, digits, _, - and blanks")
+                raise InputError(
+                    key, describe_value(name), "names of up to 60 letters, digits, _, - and blanks"
+                )
             found[name] = _checked_one(f"{key}.{name}", one)
     mistakes.report()
     if (total := sum(map(count, found.values()))) > MOST_POINTS:
@@ -113,7 +115,7 @@ def _checked_one(key: str, entry: Any) -> Any:
         return read(Probe, entry, key)
     points = np.asarray(finite(key, entry, _POINTS))
     if points.ndim != 2 or not len(points) or points.shape[1] not in (2, 3) or points.dtype.kind == "c":
-        raise InputError(key, quoted(entry), _POINTS)
+        raise InputError(key, describe_value(entry), _POINTS)
     return tuple(map(tuple, points.tolist()))
 
 
@@ -164,7 +166,7 @@ class ProbeHistory:
         """A number a step and point (steps, points), such as `cauchy_stress_yy` or `von_mises`."""
         dim = self.position.shape[1]
         if name not in (allowed := columns(dim)[dim:]):
-            raise InputError("quantity", quoted(name), " | ".join(allowed))
+            raise InputError("quantity", describe_value(name), " | ".join(allowed))
         quantity = next(one for one in QUANTITIES if name == one or name.startswith(f"{one}_"))
         at = tuple("xyz123".index(letter) % 3 for letter in name.removeprefix(quantity).strip("_"))
         return np.asarray(getattr(self, quantity)[(..., *at)])
@@ -388,7 +390,7 @@ def points_of(key: str, one: Any, mesh: Mesh) -> tuple[Floats, str | None]:
         allowed = "no z in the plane" if mesh.dim == 2 else "x and z of a finger in three dimensions"
         raise InputError(f"{key}.z", ABSENT if one.z is None else "z of a plane finger", allowed)
     if one.at is not None and one.at not in mesh.region_names:
-        raise InputError(f"{key}.at", quoted(one.at), " | ".join(mesh.region_names))
+        raise InputError(f"{key}.at", describe_value(one.at), " | ".join(mesh.region_names))
     level = np.column_stack([one.x] if one.z is None else [one.x, one.z])
     heights = crossings(mesh, one.at, level)
     for location, found in zip(level, heights, strict=True):

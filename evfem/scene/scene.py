@@ -13,7 +13,16 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Annotated, Any, Protocol, cast, runtime_checkable
 
-from evfem.common.checks import GONE, Within, check_fields, number, one_of, real, set_frozen, yes_or_no
+from evfem.common.checks import (
+    RENAMED_KEYS,
+    Within,
+    check_fields,
+    number,
+    one_of,
+    real,
+    set_frozen,
+    yes_or_no,
+)
 from evfem.common.digest import digest
 from evfem.common.rooms import BodyTerm, Foundation, Room, unchangeable
 from evfem.common.views import called, changed, short, table
@@ -22,7 +31,7 @@ from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
-from evfem.errors import ABSENT, InputError, Mistakes, quoted
+from evfem.errors import ABSENT, InputError, Mistakes, describe_value
 from evfem.protocols import AdhesionLaw, CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive, without_field
 from evfem.scene.motion import MOTIONS, VOLTAGE, Course, Motion, Press, Slide
@@ -56,7 +65,7 @@ Adhesion = Annotated[AdhesionLaw | None, {"allowed": ADHESION, "check": adhesion
 def monolithic(key: str, value: object) -> str:
     """The coupling of old files, which is always that; InputError for another."""
     if not isinstance(value, str) or value != "monolithic":
-        raise InputError(key, quoted(value), GONE["electrostatics.coupling"])
+        raise InputError(key, describe_value(value), RENAMED_KEYS["electrostatics.coupling"])
     return value
 
 
@@ -234,9 +243,9 @@ class Scene:
     def with_term(self, form: Form, on: Region | Boundary) -> Scene:
         """A copy of the scene with `form` added to the internal residual over the region or boundary `on`."""
         if not isinstance(form, Form):
-            raise InputError("form", quoted(form), "a function marked with @evfem.form")
+            raise InputError("form", describe_value(form), "a function marked with @evfem.form")
         if not isinstance(on, (Region, Boundary)):
-            raise InputError("on", quoted(on), "evfem.Region(name) or evfem.Boundary(name)")
+            raise InputError("on", describe_value(on), "evfem.Region(name) or evfem.Boundary(name)")
         return replace(self, forms=(*self.forms, Term(form, on)))
 
     def digest(self) -> str:
@@ -254,26 +263,26 @@ def _volts(voltage: object) -> str:
 
 def _check_parts(scene: Scene) -> None:
     if not isinstance(scene.finger, Finger):
-        raise InputError("finger", quoted(scene.finger), "a FingerPad, a Fingertip or a MeshedFinger")
+        raise InputError("finger", describe_value(scene.finger), "a FingerPad, a Fingertip or a MeshedFinger")
     real("finger.viscosity", scene.finger.viscosity, "a relaxation time in s, not negative", lambda t: t >= 0)
     completed(scene.surface)
     if not isinstance(scene.solver, Solver):
-        raise InputError("solver", quoted(scene.solver), "a Solver")
+        raise InputError("solver", describe_value(scene.solver), "a Solver")
     if not isinstance(scene.output, Output):
-        raise InputError("output", quoted(scene.output), "an Output")
+        raise InputError("output", describe_value(scene.output), "an Output")
     if not isinstance(scene.drive, Drive | None):
-        raise InputError("electrostatics.drive", quoted(scene.drive), "a Drive, or None")
+        raise InputError("electrostatics.drive", describe_value(scene.drive), "a Drive, or None")
     if scene.depth is not None:
         set_frozen(scene, depth=DEPTH["check"]("depth", scene.depth))
     if not isinstance(scene.name, str) or not scene.name or any(c in scene.name for c in "/\\:\0\n"):
-        raise InputError("name", quoted(scene.name), "a name that can be part of a file name")
+        raise InputError("name", describe_value(scene.name), "a name that can be part of a file name")
     if not all(isinstance(term, Term) for term in scene.forms):
-        raise InputError("forms", quoted(scene.forms), "terms as made by Scene.with_term")
+        raise InputError("forms", describe_value(scene.forms), "terms as made by Scene.with_term")
     names = [room.name for room in scene.rooms if isinstance(room, PadTraction)]
     for i, room in enumerate(scene.rooms):
         if not isinstance(room, PadTraction | BodyTerm):
             allowed = "a PadTraction or a BodyTerm; a Foundation goes to elastic=, a hand to hand="
-            raise InputError(f"rooms[{i}]", quoted(room), allowed)
+            raise InputError(f"rooms[{i}]", describe_value(room), allowed)
         if unchangeable(room):
             allowed = "a class that is not frozen: `begin` keeps in it what a step needs"
             raise InputError(f"rooms[{i}]", f"{type(room).__name__}, a frozen dataclass", allowed)
@@ -281,14 +290,14 @@ def _check_parts(scene: Scene) -> None:
             raise InputError(f"rooms[{i}].name", room.name, "a name that no other traction has")
     for i, motion in enumerate(scene.motion):
         if not isinstance(motion, Motion):
-            raise InputError(f"motion[{i}]", quoted(motion), f"one of {_names(MOTIONS)}")
+            raise InputError(f"motion[{i}]", describe_value(motion), f"one of {_names(MOTIONS)}")
 
 
 def _check_electrostatics(scene: Scene) -> None:
     check_fields(scene, "electrostatics.")
     if not scene.is_pulled and scene.roughness_gap != 0.0:
         allowed = "only with a law of attraction, or adhesion: without one it changes nothing"
-        raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
+        raise InputError("electrostatics.roughness_gap", describe_value(scene.roughness_gap), allowed)
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = f"{VOLTAGE['allowed']}, a VoltageProfile or a signal over time"
@@ -300,7 +309,7 @@ def _check_electrostatics(scene: Scene) -> None:
             raise InputError("electrostatics.law", "a voltage without a law", allowed)
     elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
         allowed = f"{_names(FORCE_LAWS, '()')} or an object with a method traction(gap, voltage, layers)"
-        raise InputError("electrostatics.law", quoted(scene.law), allowed)
+        raise InputError("electrostatics.law", describe_value(scene.law), allowed)
     elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
         allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
         raise InputError("electrostatics.direction", "normal with a law without a potential", allowed)
@@ -318,7 +327,7 @@ def _check_hand(scene: Scene) -> None:
     if hand is None:
         return
     if not (isinstance(hand, Hand) or (isinstance(hand, Room) and hasattr(hand, "control"))):
-        raise InputError("hand", quoted(hand), "a Hand, a room with a control, or None")
+        raise InputError("hand", describe_value(hand), "a Hand, a room with a control, or None")
     if isinstance(scene.voltage, FollowForce):
         raise InputError("hand", "a hand together with a target friction force", "one of the two")
 
@@ -346,7 +355,7 @@ def _check_friction(scene: Scene) -> None:
     law = scene.friction_law
     if isinstance(law, type) or not isinstance(law, FrictionLaw):
         allowed = "Coulomb() or another law of friction, or an object with bound(pressure, mu, speed, age)"
-        raise InputError("surface.friction_law", quoted(law), allowed)
+        raise InputError("surface.friction_law", describe_value(law), allowed)
 
 
 def _check_elastic(scene: Scene) -> None:

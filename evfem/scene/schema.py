@@ -91,7 +91,7 @@ def _entry(key: Key) -> Entry:
         shape |= _limits(limits, shape.get("type") == "integer")
     if "names" in rule:
         shape["enum"] = list(rule["names"])
-    shape["description"] = key.told
+    shape["description"] = key.documented
     if not key.required and isinstance(key.default, (bool, int, float, str)):
         shape["default"] = key.default
     default = "" if key.required else _toml(key.default)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import evfem
-from evfem.common.checks import plain
+from evfem.common.checks import to_python
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
 from evfem.newton.state import Beginning, Reusable, State, TangentPoint
@@ -166,7 +166,7 @@ class Checkpoint:
     def _text_of(self, rows: Sequence[Row]) -> str:
         pairs = zip(rows, self._texts, strict=False)
         same = next((i for i, (row, known) in enumerate(pairs) if row is not known[0]), len(self._texts))
-        new = [(row, json.dumps({name: plain(v) for name, v in row.items()})) for row in rows[same:]]
+        new = [(row, json.dumps({name: to_python(v) for name, v in row.items()})) for row in rows[same:]]
         self._texts[same:] = new
         return f"[{', '.join(text for _, text in self._texts[: len(rows)])}]"
 

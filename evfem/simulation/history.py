@@ -19,7 +19,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints, Words
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
-from evfem.errors import InputError, near, readable
+from evfem.errors import InputError, closest_name, readable
 from evfem.terms.columns import COLUMNS as OF_PACKAGE
 from evfem.terms.columns import OfRooms
 
@@ -66,7 +66,7 @@ def no_column(key: str, name: Any, columns: Sequence[str]) -> InputError:
     evfem.errors.InputError: column: given "friction", no column; allowed: tangential_force? (docs, Notation)
     """
     meant = MEANT.get(str(name).lower())
-    close = [meant] if meant in columns else near(str(name), columns)
+    close = [meant] if meant in columns else closest_name(str(name), columns)
     known = f"{close[0]}? (docs, Notation)" if close else f"{', '.join(columns)}"
     return InputError(key, f"{readable(name)}, no column", known)
 

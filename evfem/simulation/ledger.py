@@ -116,7 +116,7 @@ class EnergyAccount:
         removed = np.where(both > 0.0, both, np.inf)
         for traction in model.attraction.parts:
             fraction = traction.restored(state.voltage)[0] / removed
-            pull = interface.foundation.tilted(state, pulls[traction.name]).sum(axis=0)
+            pull = interface.foundation.turned(state, pulls[traction.name]).sum(axis=0)
             found[traction.name] = pull, float(np.sum(fraction * withheld))
         return found
 

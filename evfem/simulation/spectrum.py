@@ -20,7 +20,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.simulation.result import Result
 
 WINDOWS = ("none", "hann")
@@ -83,7 +83,7 @@ def spectrum(
     """
     if column not in result.columns or column == "motion":
         allowed = ", ".join(name for name in result.columns if name != "motion")
-        raise InputError("column", quoted(column), allowed)
+        raise InputError("column", describe_value(column), allowed)
     choice("window", window, WINDOWS)
     used, before = _rows(result, start, stop)
     step = _step(result.time[used], before)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.estimate.display import Device, ExactCurve
 from evfem.estimate.touch import FrictionCurve, Touch
 from evfem.scene.keys import read
@@ -65,10 +65,10 @@ def parse(text: str | bytes) -> State:
 
 def _table(key: str, entry: Any, keys: tuple[str, ...]) -> Mapping[str, Any]:
     if not isinstance(entry, dict):
-        raise InputError(key, quoted(entry), "an object")
+        raise InputError(key, describe_value(entry), "an object")
     odd = sorted(set(entry) - set(keys))
     if odd:
-        raise InputError(key, quoted(odd[0]), ", ".join(keys))
+        raise InputError(key, describe_value(odd[0]), ", ".join(keys))
     return entry
 
 

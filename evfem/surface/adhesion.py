@@ -31,9 +31,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Named, Values, Within, number, plain
+from evfem.common.checks import Named, Values, Within, number, to_python
 from evfem.electrostatics.laws import GAP_STEP
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.protocols import AdhesionLaw
 from evfem.tensor import derivative
 
@@ -69,18 +69,18 @@ class NamedAdhesion(Named):
     def traction(self, gap: Values) -> Values:
         """Attraction in MPa at gaps in mm."""
         depth = self._share(gap)
-        return plain(self.stress * depth**2 * (3.0 - 2.0 * depth))
+        return to_python(self.stress * depth**2 * (3.0 - 2.0 * depth))
 
     def traction_derivative(self, gap: Values) -> Values:
         """dp/dg in MPa/mm."""
         depth = self._share(gap)
-        return plain(-6.0 * self.stress * depth * (1.0 - depth) / (EDGE * self.reach))
+        return to_python(-6.0 * self.stress * depth * (1.0 - depth) / (EDGE * self.reach))
 
     def potential(self, gap: Values) -> Values:
         """Potential in N/mm, 0 beyond the reach."""
         depth, width = self._share(gap), EDGE * self.reach
         below = np.minimum(np.asarray(gap) - (self.reach - 0.5 * width), 0.0)
-        return plain(self.stress * (below - width * depth**3 * (1.0 - 0.5 * depth)))
+        return to_python(self.stress * (below - width * depth**3 * (1.0 - 0.5 * depth)))
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ ADHESIONS = NamedAdhesion.kinds
 def adhesion_of(key: str, value: Any) -> Any:
     """A law of adhesion, or None; InputError for anything else."""
     if value is not None and (isinstance(value, type) or not isinstance(value, AdhesionLaw)):
-        raise InputError(key, quoted(value), ADHESION)
+        raise InputError(key, describe_value(value), ADHESION)
     return value
 
 
@@ -167,13 +167,13 @@ class Softened:
         inside = (gap.real >= self.begin) & (gap.real < self.end)
         found = np.where(inside, self._at_end + self.slope * (self.end - gap), found)
         found = np.where(gap.real < self.closed, found - self.short, found)
-        return plain(np.asarray(voltage) ** 2 * found)
+        return to_python(np.asarray(voltage) ** 2 * found)
 
     def traction_derivative(self, gap: Values, voltage: Values = ON, layers: Any = None) -> Values:
         """dp/dg in MPa/mm."""
         gap = np.asarray(gap)
         inside = (gap.real >= self.begin) & (gap.real < self.end)
-        return plain(np.asarray(voltage) ** 2 * np.where(inside, -self.slope, _derivative(self.law, gap)))
+        return to_python(np.asarray(voltage) ** 2 * np.where(inside, -self.slope, _derivative(self.law, gap)))
 
     def potential(self, gap: Values, voltage: Values = ON, layers: Any = None) -> Values:
         """Potential in N/mm, 0 far away."""
@@ -182,7 +182,7 @@ class Softened:
         line = law.potential(self.end) - distance * (self._at_end + 0.5 * self.slope * distance)
         deeper = line + found - law.potential(self.begin) - self.short * (gap - self.begin)
         found = np.where(gap.real >= self.end, found, np.where(gap.real >= self.begin, line, deeper))
-        return plain(np.asarray(voltage) ** 2 * found)
+        return to_python(np.asarray(voltage) ** 2 * found)
 
     def withheld(self, voltage: Values = ON, layers: Any = None) -> tuple[Floats, Floats]:
         """What the line withholds of the traction of closed faces, and leaves (MPa)."""

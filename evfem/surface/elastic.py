@@ -34,7 +34,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, number, set_frozen
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.protocols import Elastic
 from evfem.surface.patches import Patches, assembled
 
@@ -127,7 +127,7 @@ class ElasticStack(Layered):
         found = tuple(self.layers) if isinstance(self.layers, (list, tuple)) else ()
         if not 1 <= len(found) <= MOST or not all(type(one) is ElasticLayer for one in found):
             allowed = f"1 to {MOST} ElasticLayer(E, nu, thickness), from the top"
-            raise InputError("surface.elastic", quoted(self.layers), allowed)
+            raise InputError("surface.elastic", describe_value(self.layers), allowed)
         set_frozen(self, layers=found)
 
 
@@ -136,7 +136,7 @@ def elastic_of(elastic: Any, key: str = "surface.elastic") -> Any:
     if isinstance(elastic, (list, tuple)):
         return ElasticStack(tuple(elastic))
     if elastic is not None and (isinstance(elastic, type) or not isinstance(elastic, Elastic)):
-        raise InputError(key, quoted(elastic), ELASTIC)
+        raise InputError(key, describe_value(elastic), ELASTIC)
     return elastic
 
 
@@ -146,7 +146,9 @@ def strips(x: Any, lengths: Any) -> tuple[Floats, Floats]:
     long = np.broadcast_to(np.asarray(lengths, dtype=float), found.shape[:1])
     flat = found.ndim == 1 or found.shape[1:] == (2,)
     if not flat or not np.isfinite(found).all() or not (np.isfinite(long) & (long > 0.0)).all():
-        raise InputError("lengths", quoted(lengths), "positions in mm, and a length in mm above 0 for each")
+        raise InputError(
+            "lengths", describe_value(lengths), "positions in mm, and a length in mm above 0 for each"
+        )
     return found, long
 
 

@@ -32,7 +32,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Named, Values, Within, number, plain
+from evfem.common.checks import Named, Values, Within, number, to_python
 from evfem.protocols import FrictionLaw
 from evfem.tensor import derivative
 
@@ -90,7 +90,7 @@ class LoadIndexFriction(NamedFriction, kind="load_index"):
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
         lowest = LOWEST * self.pressure if self.lowest is None else self.lowest
-        return plain(mu * pressure * (_at_least(pressure, lowest) / self.pressure) ** (self.index - 1.0))
+        return to_python(mu * pressure * (_at_least(pressure, lowest) / self.pressure) ** (self.index - 1.0))
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class AdhesiveFriction(NamedFriction, kind="adhesive"):
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
         share = np.asarray(pressure) / (self.strength if self.full is None else self.full)
-        return plain(self.strength * np.where(share.real < 1.0, share, 1.0) + mu * pressure)
+        return to_python(self.strength * np.where(share.real < 1.0, share, 1.0) + mu * pressure)
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class RateFriction(NamedFriction, kind="rate"):
         slowest = LOWEST * self.speed if self.slowest is None else self.slowest
         stribeck = self.ratio + (1.0 - self.ratio) * np.exp(-np.asarray(speed) / self.speed)
         power = (_at_least(speed, slowest) / self.speed) ** self.exponent
-        return plain(mu * pressure * stribeck * power)
+        return to_python(mu * pressure * stribeck * power)
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class AgeingFriction(NamedFriction, kind="ageing"):
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
-        return plain(mu * pressure * (1.0 - (1.0 - self.fresh) * np.exp(-np.asarray(age) / self.time)))
+        return to_python(mu * pressure * (1.0 - (1.0 - self.fresh) * np.exp(-np.asarray(age) / self.time)))
 
 
 KINDS = NamedFriction.kinds

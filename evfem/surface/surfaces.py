@@ -28,7 +28,7 @@ from evfem.common.checks import Checked, Within, number, real, set_frozen
 from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.common.views import changed
 from evfem.electrostatics.laws import FILM, Insulator, Layer
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.protocols import Elastic
 from evfem.surface.elastic import ELASTIC, elastic_of
 from evfem.surface.ways import ANGLE, FrictionMap, Unidirectional, direction
@@ -229,7 +229,7 @@ class Display(_Level):
         table = np.array(rows)
         ends = table[:, :2].ravel()
         if np.any(np.diff(ends) <= 0.0) or np.any(np.abs(table[:, 2]) > 1.0):
-            raise InputError("surface.electrodes", quoted(self.electrodes), ELECTRODES)
+            raise InputError("surface.electrodes", describe_value(self.electrodes), ELECTRODES)
         set_frozen(self, electrodes=rows)
 
 
@@ -418,7 +418,7 @@ def _terms(key: str, value: Any) -> tuple[tuple[float, ...], ...]:
         rows = [[*row, 0.0] if size == 3 else row for row, size in zip(rows, sizes, strict=True)]
     found = _rows(key, rows, 4 if long else 3, TERMS, MOST_TERMS)
     if (np.abs(found) > [HIGHEST, FASTEST, FASTEST, 360.0][: len(found[0])]).any():
-        raise InputError(key, quoted(value), TERMS)
+        raise InputError(key, describe_value(value), TERMS)
     return found
 
 

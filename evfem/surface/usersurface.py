@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.protocols import CompleteSurface, Surface
 from evfem.surface.surfaces import Friction, GivesWay, Insulator, RigidSurface, Shift
 from evfem.tensor import Array, derivative, difference
@@ -37,7 +37,7 @@ def completed(surface: Surface) -> CompleteSurface:
         allowed = (
             "a surface of evfem, for instance Flat, Display or Grating, or an object with a method height(x)"
         )
-        raise InputError("surface", quoted(surface), allowed)
+        raise InputError("surface", describe_value(surface), allowed)
     keys = ("friction", "y", "insulator", "elastic")
     return OwnSurface(surface, **{key: getattr(surface, key) for key in keys if hasattr(surface, key)})
 

@@ -22,7 +22,7 @@ from typing import Annotated, Any
 import tomli_w
 
 from evfem.common.checks import instance, real, set_frozen
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.scene import schema as scenes
 from evfem.scene.file import read_text, scene_at, tables_of
 from evfem.scene.format import SceneTable
@@ -221,7 +221,7 @@ def plain_value(where: str, value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return [plain_value(where, one) for one in value]
     if not isinstance(value, (bool, int, float, str)):
-        raise InputError(where, quoted(value), "numbers, text, true or false, and lists of them")
+        raise InputError(where, describe_value(value), "numbers, text, true or false, and lists of them")
     return value
 
 
@@ -254,7 +254,7 @@ def check_output(output: Any, motions: int) -> None:
     if words[0] not in columns:
         raise no_column(f"outputs: {output}", words[0], columns)
     if len(words) == 3 and not (words[2].isdecimal() and int(words[2]) < motions):
-        raise InputError("outputs", quoted(output), f"motions from 0 to {motions - 1}")
+        raise InputError("outputs", describe_value(output), f"motions from 0 to {motions - 1}")
 
 
 @dataclass(frozen=True)

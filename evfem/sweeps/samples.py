@@ -16,7 +16,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import SEED, Checked, one_of, real, set_frozen, whole
-from evfem.errors import ABSENT, InputError, quoted
+from evfem.errors import ABSENT, InputError, describe_value
 
 METHODS = ("latin_hypercube", "random")
 MOST_SAMPLES = 100_000
@@ -58,7 +58,9 @@ class Normal:
     def __post_init__(self) -> None:
         set_frozen(self, mean=_number("normal", self.mean), sd=_number("normal", self.sd))
         if not self.sd > 0.0:
-            raise InputError("normal", quoted(self.sd), "a mean and a standard deviation larger than 0")
+            raise InputError(
+                "normal", describe_value(self.sd), "a mean and a standard deviation larger than 0"
+            )
         if self.between is None:
             return
         low, high = (_number("between", value) for value in self.between)
@@ -84,11 +86,11 @@ Distribution = Uniform | Normal
 
 def _parameters(key: str, entry: Any) -> dict[str, Distribution]:
     if not isinstance(entry, Mapping) or not entry:
-        said = quoted(entry) if entry else ABSENT
+        said = describe_value(entry) if entry else ABSENT
         raise InputError(key, said, "at least one parameter with a distribution")
     for name, distribution in entry.items():
         if not isinstance(distribution, Distribution):
-            raise InputError(f"{key}.{name}", quoted(distribution), "Uniform or Normal")
+            raise InputError(f"{key}.{name}", describe_value(distribution), "Uniform or Normal")
     return dict(entry)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from evfem.common.storage import disk, write_text
 from evfem.common.tables import csv_rows, frame
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.fingertip import Fingertip
 from evfem.scene.scene import Scene
@@ -65,7 +65,7 @@ areas where every finger has a depth or is one in three dimensions
         kinds = {one.get(output.split(".")[0]) for one in found}
         if None in kinds:
             allowed = "areas where every finger has a depth or is one in three dimensions"
-            raise InputError("outputs", f"{quoted(output)} of a finger without it", allowed)
+            raise InputError("outputs", f"{describe_value(output)} of a finger without it", allowed)
         if len(kinds) > 1:
             problem = f"{output} in {' and '.join(sorted(map(str, kinds)))}"
             raise InputError("finger.depth", problem, "a depth for every finger in the plane, or for none")
@@ -132,7 +132,9 @@ class SweepResult:
         for name in self._numeric if columns is None else columns:
             values = self[name]
             if isinstance(values, list):
-                raise InputError("columns", quoted(name), f"columns of numbers: {', '.join(self._numeric)}")
+                raise InputError(
+                    "columns", describe_value(name), f"columns of numbers: {', '.join(self._numeric)}"
+                )
             values = values[~np.isnan(values)]
             row: dict[str, Any] = {"column": name, "unit": self.units.get(name, ""), "points": values.size}
             row["mean"] = np.mean(values) if values.size else math.nan

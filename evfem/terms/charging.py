@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import SHARE, WAY, Floats
+from evfem.common.arrays import NODES, WEIGHTS, Floats
 from evfem.common.constants import KILOVOLT
 from evfem.common.rooms import Column, Room
 from evfem.electrostatics.laws import eps_0
@@ -280,8 +280,8 @@ class ChargeBooks(Room):
         grown = lengths(after.position) - lengths(before.position)
         volts, work = charging.old.voltage, 0.0
         none = np.zeros_like(before.position)
-        path = PadPath(before, after, none, none, (none, none)).at(WAY, np.full(WAY.shape, volts))
-        for pad, weight in zip(path.states(), SHARE, strict=True):
+        path = PadPath(before, after, none, none, (none, none)).at(NODES, np.full(NODES.shape, volts))
+        for pad, weight in zip(path.states(), WEIGHTS, strict=True):
             carried = {"charges": charging.carried(lengths(pad.position))}
             at = self.attraction.charged(replace(pad, memory=carried))
             work += weight * float(charging.energy_density(at) @ grown)

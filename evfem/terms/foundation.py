@@ -157,11 +157,11 @@ class Rigid(Room):
         """The undeformed surface `found` with the slopes of the deformed one in `state`."""
         return found
 
-    def tilted(self, state: Any, force: Floats) -> Floats:
+    def turned(self, state: Any, force: Floats) -> Floats:
         """Attraction (P, dim) along the normal of the deformed surface of `state`."""
         return force
 
-    def untilted(self, state: Any, force: Floats) -> Floats:
+    def turned_back(self, state: Any, force: Floats) -> Floats:
         """The same attraction as above the undeformed surface, whose work is that of the field."""
         return force
 
@@ -288,12 +288,12 @@ class ElasticFoundation(Rigid):
         slope = np.linalg.solve(_kept(state), (found.slope - state.memory[GRADIENT][:, :, 1])[:, :, None])
         return replace(found, slope=np.asarray(slope[:, :, 0]))
 
-    def tilted(self, state: Any, force: Floats) -> Floats:
+    def turned(self, state: Any, force: Floats) -> Floats:
         found, pushed = force.copy(), force[:, ::2] + state.memory[GRADIENT][:, :, 1] * force[:, 1:2]
         found[:, ::2] = np.linalg.solve(_kept(state), pushed[:, :, None])[:, :, 0]
         return found
 
-    def untilted(self, state: Any, force: Floats) -> Floats:
+    def turned_back(self, state: Any, force: Floats) -> Floats:
         found, along = force.copy(), np.einsum("pkj,pj->pk", _kept(state), force[:, ::2])
         found[:, ::2] = along - state.memory[GRADIENT][:, :, 1] * force[:, 1:2]
         return found

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evfem.common.arrays import FINE_SHARE, FINE_WAY, LEGENDRE, SEEN, SHARE, WAY, Floats, Ints
+from evfem.common.arrays import FINE_NODES, FINE_WEIGHTS, LEGENDRE, NODES, RESOLVED, WEIGHTS, Floats, Ints
 from evfem.common.constants import LEFT_OVER, STABLE
 from evfem.common.rooms import Column, Room
 from evfem.contact.byforce import OF_GAP_ALONE, ByForce, OfGapAlone
@@ -321,11 +321,11 @@ class PadTraction(Room):
 
     def power(self, path: PadPath, along: Floats) -> float:
         """Work along `along` (P, dim) of the straight path by quadrature (N mm)."""
-        values = self.powers(path, along, WAY)
+        values = self.powers(path, along, NODES)
         size = np.abs(LEGENDRE @ values)
-        if size[-2:].max() > SEEN * size.max():
-            return float(FINE_SHARE @ self.powers(path, along, FINE_WAY))
-        return float(SHARE @ values)
+        if size[-2:].max() > RESOLVED * size.max():
+            return float(FINE_WEIGHTS @ self.powers(path, along, FINE_NODES))
+        return float(WEIGHTS @ values)
 
     def powers(self, path: PadPath, along: Floats, fractions: Floats, begin: Floats | None = None) -> Floats:
         """Powers (w,) along `along` (P, dim) at fractions (w,) of the straight path, from `begin` (P, dim) if

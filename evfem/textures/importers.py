@@ -23,7 +23,7 @@ from evfem.common.foreign import read_grey
 from evfem.common.tables import TABLES, is_even, names_of, read_headed
 from evfem.common.units import UNITS, factor
 from evfem.electrostatics import wav
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.textures.generate import phases
 from evfem.textures.importing import IMPORTERS, POSITIVE, Heights, Importer, line_of
 from evfem.textures.scans import line_in
@@ -315,7 +315,7 @@ def _channel(value: int | str | None, names: list[str], count: int) -> int:
     if value is None and count == 1:
         return 0
     if value is None or str(value).lower() not in called:
-        said = f"nothing, of {count}" if value is None else quoted(str(value))
+        said = f"nothing, of {count}" if value is None else describe_value(str(value))
         raise InputError("channel", said, " | ".join(called))
     return called.index(str(value).lower()) % count
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.errors import InputError, quoted, unknown
+from evfem.errors import InputError, describe_value, unknown
 from evfem.textures.generate import FREE, Knobs, make
 from evfem.textures.texture import Texture, read
 
@@ -60,7 +60,9 @@ def reference(name: Any) -> Texture:
     Texture('wave-2mm', sinusoids, 256 heights, period 16 mm, 0.06 mm from lowest to highest)
     """
     if not isinstance(name, str) or name not in names():
-        raise unknown("texture", str(name), [*names(), "a .json or folder, a recording"], str(quoted(name)))
+        raise unknown(
+            "texture", str(name), [*names(), "a .json or folder, a recording"], str(describe_value(name))
+        )
     if name in REFERENCES:
         _, kind, knobs = REFERENCES[name]
         return make(kind, knobs, name)

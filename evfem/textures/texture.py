@@ -22,7 +22,7 @@ from evfem.common.checks import above, choice, real, set_frozen
 from evfem.common.storage import disk, write_text
 from evfem.common.tables import csv_text, numbers, read_bytes, read_columns
 from evfem.common.views import plus
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 
 FORMAT = "evfem-texture-1"
 #: what the `.json` is called in a folder
@@ -72,7 +72,7 @@ class Texture:
         x = numbers("x", self.x, "a list of numbers")
         values = numbers(self.quantity, self.values, "a list of numbers")
         if not isinstance(self.provenance, (list, tuple)):
-            raise InputError("provenance", quoted(self.provenance), "a list of sentences")
+            raise InputError("provenance", describe_value(self.provenance), "a list of sentences")
         set_frozen(self, x=x, values=values, provenance=tuple(self.provenance))
         if len(self.provenance) > MOST_NOTES:
             raise InputError("provenance", f"{len(self.provenance)} sentences", f"at most {MOST_NOTES}")
@@ -167,21 +167,23 @@ def read(path: str | Path) -> Texture:
     path = path / NAME if path.is_dir() else path
     table = _table(path)
     if set(table) != set(KEYS) or table["format"] != FORMAT:
-        odd = sorted(set(table) ^ set(KEYS)) or [f"format {quoted(table['format'])}"]
+        odd = sorted(set(table) ^ set(KEYS)) or [f"format {describe_value(table['format'])}"]
         raise InputError("texture", f"{path}: {', '.join(odd)[:80]}", f"exactly the keys {', '.join(KEYS)}")
     quantity = choice("quantity", table["quantity"], tuple(QUANTITIES))
     header, units = QUANTITIES[quantity]
     if table["units"] != dict(zip(header, units, strict=True)):
-        raise InputError("units", quoted(table["units"]), f"{', '.join(units)} for {', '.join(header)}")
+        raise InputError(
+            "units", describe_value(table["units"]), f"{', '.join(units)} for {', '.join(header)}"
+        )
     data = table["data"]
     if not isinstance(data, str) or Path(data).name != data or not data.endswith(".csv"):
-        raise InputError("data", quoted(data), "the name of a csv file beside the .json")
+        raise InputError("data", describe_value(data), "the name of a csv file beside the .json")
     x, values = read_columns(path.with_name(data), dict(zip(header, units, strict=True)), "data")
     names = ("name", "kind", "licence", "quantity", "period", "provenance")
     found = Texture(x=x, values=values, **{name: table[name] for name in names})
     length = real("length", table["length"], "the length of the rows in mm")
     if abs(length - found.length) > 1e-6 * max(found.length, 1.0):
-        raise InputError("length", quoted(table["length"]), f"that of the rows, {found.length:g} mm")
+        raise InputError("length", describe_value(table["length"]), f"that of the rows, {found.length:g} mm")
     return found
 
 
@@ -213,7 +215,7 @@ def _table(path: Path) -> Mapping[str, Any]:
 
 def _text(key: str, value: object) -> None:
     if not isinstance(value, str) or not value.strip() or len(value) > MOST_LETTERS or "\n" in value:
-        raise InputError(key, quoted(value), f"a line of 1 to {MOST_LETTERS} letters")
+        raise InputError(key, describe_value(value), f"a line of 1 to {MOST_LETTERS} letters")
 
 
 def _check(texture: Texture) -> None:

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.protocols import WeakForm
 from evfem.tensor import Array, ddot, det, dot, grad, identity, inv, mul, transpose
 
@@ -135,7 +135,7 @@ def form(function: WeakForm) -> Form:
     """
     if not callable(function):
         raise InputError(
-            "form", quoted(function), "a function (u, v, w) that returns the integrand of a residual"
+            "form", describe_value(function), "a function (u, v, w) that returns the integrand of a residual"
         )
     return Form(function)
 

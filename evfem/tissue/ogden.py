@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from evfem.common.checks import Checked, Within, check_fields, number, real, yes_or_no
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.tensor import Array, ddot, det, mul, symmetric_power, transpose
 from evfem.tissue.splitlaw import Hyperelastic, stepped_tangent
 
@@ -30,7 +30,7 @@ def shares_of(key: str, entered: Any) -> Pairs:
     except TypeError:
         rows = [()]
     if any(len(row) != 2 for row in rows):
-        raise InputError(key, quoted(entered), _SHARES)
+        raise InputError(key, describe_value(entered), _SHARES)
     return tuple((real(key, r, _SHARES, positive), real(key, t, _SHARES, positive)) for r, t in rows)
 
 
@@ -44,7 +44,9 @@ def relaxation_of(g: Sequence[Sequence[float]]) -> Pairs:
     rows = shares_of("g", g)
     rest = 1.0 - sum(ratio for ratio, _ in rows)
     if not rest > 0.0:
-        raise InputError("g", quoted(g), "fractions of the instantaneous shear modulus, in all below 1")
+        raise InputError(
+            "g", describe_value(g), "fractions of the instantaneous shear modulus, in all below 1"
+        )
     return tuple((ratio / rest, time) for ratio, time in rows)
 
 

@@ -17,7 +17,7 @@ from typing import Any, Literal, Protocol, cast, runtime_checkable
 import numpy as np
 
 from evfem.common.constants import INCOMPRESSIBLE
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.tensor import (
     Array,
     cofactor,
@@ -200,7 +200,7 @@ def split(law: Any, dim: int = 2, key: str = "material") -> SplitLaw:
         return cast(SplitLaw, FormLaw(law, SimpleNamespace(x=np.zeros((dim, 1, 1)), n=None, law=None)))
     if not (hasattr(law, "P") or hasattr(law, "psi")):
         allowed = "a law of evfem, a form, or an object with a method P(F) or psi(F)"
-        raise InputError(key, quoted(law), allowed)
+        raise InputError(key, describe_value(law), allowed)
     return cast(SplitLaw, UserLaw(law))
 
 

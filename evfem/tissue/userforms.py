@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.mesh import faces
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import Array, complex_step, difference, inv
@@ -141,7 +141,9 @@ def _cell_places(mesh: Mesh, name: str) -> tuple[Floats, None]:
     """Centres (dim, C, 1) of a few cells of a region."""
     if name not in mesh.region_names:
         raise InputError(
-            "region", quoted(name), f"one of the mesh's regions: {', '.join(sorted(mesh.region_names))}"
+            "region",
+            describe_value(name),
+            f"one of the mesh's regions: {', '.join(sorted(mesh.region_names))}",
         )
     centres = mesh.points[_few(mesh.cells[mesh.cells_of(name)])].mean(axis=1)
     return centres.T[..., None], None
@@ -172,11 +174,11 @@ def sides_of(mesh: Mesh, name: str) -> tuple[Ints, Ints]:
     """Cells (K,) and their sides (K,) of a boundary's outer edges (faces); `InputError` without any."""
     if name not in mesh.node_sets:
         allowed = f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
-        raise InputError("boundary", quoted(name), allowed)
+        raise InputError("boundary", describe_value(name), allowed)
     cells, sides = np.nonzero(mesh.in_set(name))
     if not len(cells):
         facet = "face" if mesh.dim == 3 else "edge"
-        raise InputError("boundary", quoted(name), f"a boundary with at least one outer {facet}")
+        raise InputError("boundary", describe_value(name), f"a boundary with at least one outer {facet}")
     return cells, sides
 
 

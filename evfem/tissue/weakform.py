@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError, describe_value
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
 from evfem.tissue.assembly import Integral, UserIntegral, gathered, points_of, projected
@@ -244,5 +244,7 @@ def check_laws(mesh: Mesh, laws: Mapping[str, Any]) -> None:
     for name in laws:
         if name not in mesh.region_names:
             raise InputError(
-                f"finger.materials.{name}", quoted(name), f"one of the mesh's regions: {', '.join(names)}"
+                f"finger.materials.{name}",
+                describe_value(name),
+                f"one of the mesh's regions: {', '.join(names)}",
             )

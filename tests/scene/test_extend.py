@@ -9,7 +9,7 @@ from tools.refusals import refuses
 from tools.scenes import HOVER, head
 
 import evfem as ev
-from evfem.common.checks import Within, number, plain
+from evfem.common.checks import Within, number, to_python
 from evfem.electrostatics.laws import FORCE_LAWS, GapPermittivity, NamedLaw
 from evfem.errors import InputError
 from evfem.scene.file import dump, loads
@@ -28,7 +28,7 @@ def softened():
 
         def traction(self, gap, voltage, layers):
             far = np.asarray(gap) + self.softening + self.gap_eps_r * layers.reduced
-            return plain(0.5 * self.gap_eps_r * ev.electrostatics.eps_0 * (voltage / far) ** 2)
+            return to_python(0.5 * self.gap_eps_r * ev.electrostatics.eps_0 * (voltage / far) ** 2)
 
     yield Softened
     del FORCE_LAWS["softened"]
