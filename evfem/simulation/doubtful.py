@@ -84,10 +84,16 @@ def lost_stresses(model: Model, u: Floats) -> Iterator[str]:
         strain = np.abs(F - np.eye(3)[..., None]).max(axis=(0, 1))
         most = np.argsort(strain)[-STRAINED_POINTS:]
         name, method = ("P", law.law.P) if hasattr(law.law, "P") else ("psi", law.law.psi)
-        lost = lost_derivatives(method, F[..., most, None])[:, 0]
+        what = f"{name}(F) of {type(law.law).__name__}"
+        try:
+            lost = lost_derivatives(method, F[..., most, None])[:, 0]
+        except Exception as error:  # whatever a user's code raises
+            at = f"near the largest strain of the run, {strain.max():.0%}"
+            yield f"{what} raises {type(error).__name__} {at}, where its derivative was tried: {error}"
+            continue
         if lost.any():
             yield (
-                f"{name}(F) of {type(law.law).__name__} loses its derivative in a complex step at a strain "
+                f"{what} loses its derivative in a complex step at a strain "
                 f"of {strain[most][lost].min():.0%}: stresses are wrong there; it must be of {COMPLEX_SAFE}"
             )
 

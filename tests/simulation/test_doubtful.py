@@ -1,5 +1,6 @@
 """`Result.warnings`: what a run shows that its numbers may not be worth."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ from tools.domes import dome_scene
 from tools.meshes import block
 
 import evfem as ev
+from evfem.simulation.run import Run
 
 BLOCK = block(8, 3, sag=0.1)
 
@@ -132,6 +134,31 @@ def test_a_derivative_that_is_lost_deep_in_a_run_is_told(depth, lost):
     motion = ev.Press(indentation=depth, steps=4)
     result = ev.simulate(ev.Scene(body, ev.Flat(friction=0.0), motion=motion))
     assert any("loses its derivative in a complex step" in said for said in result.warnings) is lost
+
+
+def test_a_law_that_raises_where_its_derivative_is_tried_is_told():
+    """Just beyond the strains of the run: squared stretches across the display below its `least`."""
+
+    class Own:
+        least = 0.0
+
+        def psi(self, F):
+            if (F[0, 1] ** 2 + F[1, 1] ** 2).real.min() < self.least:
+                raise ValueError("no such stretch")
+            return ev.NeoHookean(E=0.1, nu=0.3).psi(F)
+
+    own, motion = Own(), [ev.Press(indentation=0.2, steps=2)]
+    body = ev.MeshedFinger(block(4, 4, width=2.0, height=1.0), {"tissue": own})
+    run = Run(ev.Scene(body, ev.Flat(friction=0.0), motion=motion), None)
+    for request in run.requests():
+        run.advance(request)
+    own.least = 0.9
+    (said,) = run.result().warnings
+    assert re.fullmatch(
+        r"psi\(F\) of Own raises ValueError near the largest strain of the run, [23]\d%, "
+        "where its derivative was tried: no such stretch",
+        said,
+    )
 
 
 def test_a_constant_in_an_energy_is_no_energy_from_nowhere():
