@@ -400,12 +400,17 @@ def test_the_derivatives_of_the_voltage_of_a_gap_are_those_of_the_closed_form():
     np.testing.assert_allclose(found["min_gap", modulus][1:], 0.0, atol=1e-9)
 
 
-def test_the_derivatives_of_the_voltage_of_a_charge_are_those_of_the_closed_form():
-    """U = Q (g + s) / (eps_0 A), x = Q^2 / (2 eps_0 A k): stiffer columns leave x/E more of the gap."""
-    asked, travel, charge = charging(2, farthest=0.35)
-    modulus = "finger.materials.columns.E"
-    found = ev.sensitivities(asked, [modulus], ["voltage", "min_gap"])
+@pytest.mark.parametrize("farthest", [0.35, 0.9])
+def test_the_derivatives_of_the_voltage_of_a_charge_are_those_of_the_closed_form(farthest):
+    """U = Q (g + s) / (eps_0 A), x = Q^2 / (2 eps_0 A k): stiffer columns leave x/E more of the gap, and a
+    thicker insulator takes a third of its thickness of gap more; beyond a third of the gap too.
+    """
+    asked, travel, charge = charging(2, farthest)
+    modulus, thickness = "finger.materials.columns.E", "electrostatics.insulator_thickness"
+    found = ev.sensitivities(asked, [modulus, thickness], ["voltage", "min_gap"])
     _, area = spring(2)
     np.testing.assert_allclose(found["min_gap", modulus], travel / 0.1, rtol=3e-3, atol=1e-9)
     by_gap = charge / (eps_0 * area)
     np.testing.assert_allclose(found["voltage", modulus], by_gap * travel / 0.1, rtol=3e-3, atol=1e-6)
+    np.testing.assert_allclose(found["voltage", thickness], by_gap / 3.0, rtol=1e-5, atol=1e-6)
+    assert not found.reasons
