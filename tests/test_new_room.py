@@ -691,3 +691,16 @@ class Kept:
     def step(self, row, frame, checkpoint):
         if row["step"] == self.at:
             self.arrays = checkpoint()
+
+
+@dataclass(frozen=True)
+class Borrowed(Hand):
+    """A hand whose control is that of another one: its own spring would be left out in silence."""
+
+    @property
+    def control(self):
+        return Hand(0.02).control
+
+
+def test_a_control_of_another_hand_is_refused():
+    refuses("Borrowed.control: given .*a HandControl of this hand", ev.simulate, base(2, hand=Borrowed(0.05)))

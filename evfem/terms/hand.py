@@ -27,6 +27,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, check_fields, number
 from evfem.common.rooms import Room
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
+from evfem.errors import InputError, describe_value
 from evfem.tissue.dynamics import Difference
 
 #: an accepted state, or an iterate (`evfem.newton.state.State`)
@@ -169,8 +170,15 @@ RIGID = Drive()
 
 
 def drive_of(hand: Hand | None) -> Drive:
-    """The drive of a scene: a hand, or rigid."""
-    return RIGID if hand is None else hand.control
+    """The drive of a scene: a hand, or rigid. InputError for a control that is that of another hand."""
+    if hand is None:
+        return RIGID
+    control = hand.control
+    if getattr(control, "hand", None) is not hand:
+        raise InputError(
+            f"{type(hand).__name__}.control", describe_value(control), "a HandControl of this hand"
+        )
+    return control
 
 
 @dataclass(frozen=True)

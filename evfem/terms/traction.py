@@ -182,10 +182,10 @@ def limited_gain(gain: Floats) -> Floats:
 class PadTraction(Room):
     """Forces on the pad's nodes that depend on their positions; here none.
 
-    A user-defined traction has a `name` and `forces`, and `weakening` where these fall with the gap. Its
-    columns are NAME_force (N/mm, downwards), NAME_force_x and NAME_work (N). `begin` and `accept` get the
-    `PadState` instead of the state. Its energy is the work of its forces: `stored`, `kinetic`, `work` and
-    `dissipation` are not called.
+    A user-defined traction has a `name` and `forces`, `by_gap` for their slope in closed form, and `of_rates`
+    where they depend on a rate. Its columns are NAME_force (N/mm, downwards), NAME_force_x and NAME_work (N).
+    `begin` and `accept` get the `PadState` instead of the state. Its energy is the work of its forces:
+    `stored`, `kinetic`, `work` and `dissipation` are not called.
     """
 
     #: of its columns in the history
