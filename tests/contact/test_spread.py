@@ -12,6 +12,7 @@ from tools.solids import bent, sheet
 
 import evfem as ev
 from evfem.mesh.mesh import raised
+from evfem.simulation.model import make_model
 from evfem.surface.elastic import transfer
 from evfem.surface.skin import make_skin
 from evfem.surface.spread import Facets, strips_below
@@ -186,3 +187,21 @@ OTHERS = {
 def test_other_outlines_have_no_facets(name):
     """A curved, a flat and an edged one, and one of linear sides."""
     assert not len(Facets(*OTHERS[name]()).sides)
+
+
+@pytest.mark.parametrize(
+    ("surface", "evens"),
+    [
+        (ev.Flat(elastic=STACK[1]), True),
+        (ev.Flat(), False),
+        (ev.Sinusoid(0.3, [[0.01, 0.5, 0.0]], elastic=STACK[1]), False),
+    ],
+)
+def test_tractions_are_even_above_flat_elastic_surfaces_alone(surface, evens):
+    """On a rigid one they are what nodes carry, and hills may be as narrow as a side."""
+    mesh = contact_block(np.linspace(-2.0, 2.0, 9), np.array([0.0, 1.0]), 2.0, lambda x: 0.01 * x**2, False)
+    finger = ev.MeshedFinger(mesh, {"tissue": ev.LinearElastic(0.1, 0.3)})
+    model = make_model(ev.Scene(finger, surface, motion=[ev.Press(indentation=0.01)]))
+    drawn = np.random.default_rng(4).uniform(1.0, 1.1, len(model.pad.nodes))
+    foundation = model.equilibrium.interface.foundation
+    assert (foundation.evened(drawn, drawn) != drawn).any() == evens
