@@ -145,7 +145,12 @@ def _said(cell: Any) -> str:
 def _matlab(path: Path, key: str) -> list[list[str]]:
     from scipy.io import loadmat
 
-    arrays = dict(_arrays(loadmat(path, simplify_cells=True)))
+    arrays: dict[str, Any] = {}
+    for name, array in _arrays(loadmat(path, simplify_cells=True)):
+        if name in arrays and array.dtype.kind in "iuf" and array.size > 1:
+            rule = "one struct, or names of their own: save the run that is meant alone"
+            raise InputError(key, f"{path.name} with two variables {name}", rule)
+        arrays.setdefault(name, array)
     numbers = {name: array for name, array in arrays.items() if array.dtype.kind in "iuf" and array.size > 1}
     vectors = {name: array for name, array in numbers.items() if array.ndim == 1}
     lengths = [len(array) for array in vectors.values()]

@@ -150,6 +150,8 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
         if getattr(playback, key, None) is None:
             raise InputError(key, ABSENT, f"{what}, needed for {ending}")
     assert playback is not None
+    if ending != ".wav" and (playback.bits, playback.second) != (16, None):
+        raise InputError("path", str(path), "a file called .wav for bits or a second channel")
     if not np.ptp(profile.position) > 0.0:
         raise InputError("profile", f"{profile.position.size} rows at one position", "a signal with a length")
     if ending == ".hjif":

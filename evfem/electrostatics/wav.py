@@ -96,7 +96,8 @@ def read(
             rate, samples = wavfile.read(io.BytesIO(data))
     except Exception:  # whatever scipy raises for a damaged file
         raise InputError(key, f"{path.name}, cut off or of another kind", allowed) from None
-    scale = _comment(data)
+    if scale := _comment(data):
+        scale |= _stored_bits(data)
     if samples.ndim == 2 and "second" in scale:
         samples = samples[:, 0]
     if samples.ndim > 1 + several or samples.size == 0 or rate <= 0:
@@ -114,9 +115,15 @@ def _comment(data: bytes) -> dict[str, Any]:
     return {}
 
 
+def _stored_bits(data: bytes) -> dict[str, int]:
+    """The bits of a sample by the file itself: a converter keeps evfem's comment, and changes them."""
+    at = data.find(b"fmt ")
+    return {"bits": struct.unpack_from("<H", data, at + 22)[0]} if 0 <= at <= len(data) - 24 else {}
+
+
 def normalised_samples(samples: Any, bits: int = 0) -> Floats:
     """Samples of any width as fractions of the largest one, -1 to 1; 24 `bits` are those above 8 zeros."""
-    if bits == 24:
+    if bits == 24 and samples.dtype.kind == "i":
         return np.asarray(samples / (256.0 * LARGEST[24]))
     if samples.dtype.kind == "f":
         return np.asarray(samples, dtype=float)
@@ -170,7 +177,7 @@ def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
 
 
 def _pattern(whole: Any, path: Path, key: str, tap: float) -> tuple[list[Event], list[Point], list[Any]]:
-    """Events, points of an amplitude that is straight in between, and an AHAP's controls."""
+    """Events, points of an amplitude that is straight in between, and those of an AHAP's controls."""
     if "timings" in whole:
         return _waveform(whole, path, key), [], []
     if "signals" in whole:
@@ -179,7 +186,9 @@ def _pattern(whole: Any, path: Path, key: str, tap: float) -> tuple[list[Event],
         return *_amplitude(whole["signals"]["continuous"]["envelopes"]["amplitude"], tap), []
     _check_envelopes(whole["Pattern"], path, key)
     events = [_event(one["Event"], tap) for one in whole["Pattern"] if "Event" in one]
-    return [one for one in events if one[2] > 0.0], [], whole["Pattern"]
+    controls = [one.get("ParameterCurve") or one.get("Parameter") or {} for one in whole["Pattern"]]
+    rows = [_points(one) for one in controls if one.get("ParameterID") == "HapticIntensityControl"]
+    return [one for one in events if one[2] > 0.0], [], rows
 
 
 def _amplitude(rows: list[dict[str, Any]], tap: float) -> tuple[list[Event], list[Point]]:
@@ -270,12 +279,10 @@ def _points(control: dict[str, Any]) -> list[tuple[float, float]]:
     return sorted(points, key=lambda point: point[0])
 
 
-def _control(pattern: list[dict[str, Any]], time: Floats) -> Floats:
+def _control(rows: list[list[Point]], time: Floats) -> Floats:
     """What all intensities are multiplied with: 1, until a value or a curve, straight between its points,
     replaces what was in force; the last point holds until the next one begins.
     """
-    controls = [one.get("ParameterCurve") or one.get("Parameter") or {} for one in pattern]
-    rows = [_points(one) for one in controls if one.get("ParameterID") == "HapticIntensityControl"]
     found = np.ones_like(time)
     for points in sorted(filter(None, rows), key=lambda points: points[0][0]):
         places, values = np.array(points).T

@@ -225,7 +225,7 @@ def _part(owner: Any, step: str, key: str) -> Any:
         return owner[step]
     if isinstance(owner, (tuple, list, np.ndarray)):
         if not (step.isdecimal() and int(step) < len(owner)):
-            raise InputError(f"parameters.{key}", step, f"numbers from 0 to {len(owner) - 1}")
+            raise InputError(f"parameters.{key}", step or "no number", f"numbers from 0 to {len(owner) - 1}")
         return owner[int(step)]
     attribute = _field(owner, step)
     if attribute is None and not hasattr(owner, "__dict__"):  # a number, or a part that is not there

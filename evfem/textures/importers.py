@@ -311,13 +311,16 @@ def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]
 
 
 def _channel(value: int | str | None, names: list[str], count: int) -> int:
-    called = [*names, *map(str, range(1, count + 1))]
+    numbers = [*map(str, range(1, count + 1))]
+    called = [*(name for name in names if names.count(name) == 1), *numbers]
     if value is None and count == 1:
         return 0
+    if value is not None and str(value) in numbers:
+        return int(value) - 1
     if value is None or str(value).lower() not in called:
         said = f"nothing, of {count}" if value is None else describe_value(str(value))
         raise InputError("channel", said, " | ".join(called))
-    return called.index(str(value).lower()) % count
+    return names.index(str(value).lower())
 
 
 def _recorded(path: Path, value: str | None, column: str) -> str:

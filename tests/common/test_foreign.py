@@ -72,6 +72,10 @@ def test_a_matrix_without_names_has_numbers_for_them(tmp_path, right):
             "a.mat with 0 vectors and 0 matrices; allowed: vectors of one length, .*table2struct",
         ),
         ({"a": np.eye(3), "b": np.eye(3)}, "a.mat with 0 vectors and 2 matrices"),
+        (
+            {"one": {"indentation": [0.1, 0.2], "force": [1.0, 2.0]}, "two": {"force": [3.0, 4.0]}},
+            "a.mat with two variables force; allowed: one struct",
+        ),
         (b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(500), "a.mat, of version 7.3; allowed: save"),
         (b"nothing", "a.mat .damaged or of another kind"),
     ],

@@ -375,3 +375,9 @@ def test_what_is_no_pattern_gets_a_sentence(tmp_path):
     refuses("allowed: 2 to 1000000 samples", ev.Sampled.from_ahap, path, 100.0)
     refuses("full_scale: given -1", ev.Sampled.from_ahap, path, -1.0)
     refuses("No such file", ev.Sampled.from_ahap, tmp_path / "none.ahap", 1.0)
+
+
+@pytest.mark.parametrize("lacking", [{}, {"Time": "a"}])
+def test_a_control_without_a_time_is_damaged(tmp_path, lacking):
+    one = {"Parameter": {"ParameterID": "HapticIntensityControl", "ParameterValue": 0.5} | lacking}
+    refuses("of another kind or damaged", ev.Sampled.from_ahap, pattern(tmp_path / "a.ahap", one), 100.0)

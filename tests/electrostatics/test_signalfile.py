@@ -88,6 +88,22 @@ def test_wide_samples_and_a_second_channel_are_read_by_others_and_come_back(tmp_
         assert not {"bits", "second"} & comment_of(path).keys()  # as 0.3 wrote it
 
 
+@pytest.mark.parametrize(("kept", "stored"), [(24, 16), (16, 24), (32, 16)])
+def test_bits_are_those_of_the_file_where_a_converter_kept_the_comment(tmp_path, kept, stored):
+    """By the comment's bits 2000 V of 24 would be 0.03 V in 16."""
+    paths, profile = (
+        [tmp_path / f"{bits}.wav" for bits in (kept, stored)],
+        ev.VoltageProfile([0, 5], [0, 2000]),
+    )
+    for path, bits in zip(paths, (kept, stored), strict=True):
+        ev.write_signal(path, profile, ev.Playback(full_scale=2500.0, speed=20.0, bits=bits))
+    chunks = [path.read_bytes().partition(b"LIST") for path in paths]
+    comments = [b"LIST" + chunk[: 4 + int.from_bytes(chunk[:4], "little")] for _, _, chunk in chunks]
+    whole = paths[1].read_bytes().replace(comments[1], comments[0])
+    paths[1].write_bytes(b"RIFF" + (len(whole) - 8).to_bytes(4, "little") + whole[8:])
+    assert ev.read_signal(paths[1]).voltage.max() == pytest.approx(2000.0, rel=1e-4)
+
+
 @pytest.mark.others
 @pytest.mark.parametrize("bits", [16, 24, 32])
 def test_soundfile_reads_what_is_written(tmp_path, bits):
@@ -377,3 +393,9 @@ def test_a_wav_that_is_no_voltage_is_refused_under_its_key(tmp_path, carrier, cu
     data = (tmp_path / "voltage.wav").read_bytes()
     (tmp_path / "voltage.wav").write_bytes(data[: max(len(data) - cut, 0)])
     assert refuses(says, loads, WITH_WAV, tmp_path).key == "electrostatics.voltage_file"
+
+
+def test_bits_and_a_second_channel_are_those_of_a_wav(tmp_path):
+    wide = ev.Playback(full_scale=100.0, speed=20.0, bits=24)
+    profile = ev.VoltageProfile([0, 5], [0, 50])
+    refuses("path: given .*a file called .wav for bits", ev.write_signal, tmp_path / "a.png", profile, wide)

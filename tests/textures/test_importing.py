@@ -250,6 +250,9 @@ def test_what_a_recording_holds_and_which_channel_must_be_said(tmp_path):
     for channel, wave in (("X", 2.0), (1, 2.0), ("y", 1.0), ("2", 1.0)):
         texture = Recording(**SOURCE, speed=50.0, quantity="velocity", channel=channel)(path)
         assert texture.x[np.argmax(texture.values)] == pytest.approx(wave, rel=5e-3)
+    twice = csv(tmp_path / "twice.csv", "time,velocity,velocity", time, one, other)
+    with pytest.raises(InputError, match=r'channel: given "velocity"; allowed: 1 \| 2'):
+        Recording(**SOURCE, speed=50.0, channel="velocity")(twice)
     wrong = csv(tmp_path / "a.csv", "time,acceleration", time, one)
     with pytest.raises(InputError, match="quantity: given height, of acceleration"):
         Recording(**SOURCE, speed=50.0, quantity="height")(wrong)
