@@ -85,7 +85,8 @@ def _x3p(path: Path, row: float) -> Line:
         else:
             numbers = [[one] for one in _linked(parts, tree)]
     heights = np.array([float(one[-1] or "nan") for one in numbers]) * scales[2][0] + scales[2][1]
-    if kind == "PCL":
+    absolute = tree.findtext("Record1/Axes/CX/AxisType") == "A"
+    if kind == "PCL" or (kind == "PRF" and absolute):
         points = np.array(
             [[float(x) * size for x, (size, _) in zip(one[:2], scales, strict=False)] for one in numbers]
         )

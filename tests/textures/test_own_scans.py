@@ -89,6 +89,17 @@ def test_a_list_of_points_is_a_line_or_a_grid(tmp_path):
     np.testing.assert_allclose(texture.x, 0.02 * np.arange(5), atol=1e-9)
 
 
+def test_a_profile_whose_x_are_absolute_is_that_of_its_points(tmp_path):
+    """ISO 25178-72: of an axis of type A each datum has its own x."""
+    texts = [
+        f"{x:.6E};0;{1e-6 * height:.6E}"
+        for x, height in zip((0.0, 1e-5, 2e-5, 4e-5), (0, 2, 1, 3), strict=True)
+    ]
+    path = x3p(tmp_path / "a.x3p", datums(texts), "PRF", x=("A", ""), size=(4, 1, 1))
+    _, texture = heights(path, 0.0)
+    assert np.ptp(texture.x) == pytest.approx(0.04)
+
+
 def test_a_profile_in_a_part_of_its_own_knows_its_valid_points(tmp_path):
     link = "<DataLink><PointDataLink>bindata/data.bin</PointDataLink>{}</DataLink>"
     data = {"data": (ROWS[0] * 1e3).astype("<i4").tobytes()}
