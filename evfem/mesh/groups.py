@@ -55,7 +55,7 @@ def body_of(raw: meshio.Mesh) -> int:
 
 
 def groups_in(raw: meshio.Mesh) -> list[Group]:
-    """All groups of cells in a file: those that its reader found, else by numbers, else by sets."""
+    """All groups of cells in a file: those that its reader found, else by numbers and by sets."""
     if hasattr(raw, "groups"):
         found: list[Group] = raw.groups
         return found
@@ -65,9 +65,18 @@ def groups_in(raw: meshio.Mesh) -> list[Group]:
     if PHYSICAL in raw.cell_data:  # of a meshio.Mesh in memory: name -> number, dimension
         own = {key: number for key, number in raw.field_data.items() if np.size(number) == 2}
         names = {(int(number[1]), int(number[0])): key for key, number in own.items()} | names
-    return numbered(raw, names) or [
-        Group(name, i, k, np.asarray(cells))
-        for i, name in enumerate([one for one in raw.cell_sets if not one.startswith("gmsh:")], 1)
+    found = numbered(raw, names)
+    return found + _cell_sets(raw, names, max([0, *(one.number for one in found)]))
+
+
+def _cell_sets(raw: meshio.Mesh, names: Mapping[tuple[int, int], str], last: int) -> list[Group]:
+    """Named sets of cells. They stand beside the numbers, of which meshio keeps one per cell where Gmsh has
+    it in several groups; those without a number of the file count from the `last` one.
+    """
+    numbers, body = {(dimension, name): number for (dimension, number), name in names.items()}, body_of(raw)
+    return [
+        Group(name, numbers.get((dimension_of(raw.cells[k].type, body), name), i), k, np.asarray(cells, int))
+        for i, name in enumerate([one for one in raw.cell_sets if not one.startswith("gmsh:")], last + 1)
         for k, cells in enumerate(raw.cell_sets[name])
         if cells is not None and len(cells) and np.max(cells) < len(raw.cells[k])
     ]

@@ -199,6 +199,37 @@ def test_groups_of_a_meshio_mesh_are_named_by_its_field_data():
     )
 
 
+def test_a_curve_in_two_groups_is_in_both_in_a_mesh_of_meshio():
+    """As meshio 5.3 has them of a `.msh` 4.1: of the numbers the first, in the sets all."""
+    mesh = square_mesh()
+    lines = [("line", np.array([[0, 1]])), ("line", np.array([[1, 2]])), ("line", np.array([[6, 7], [7, 8]]))]
+    one, two, none = np.arange(1, dtype=np.uint64), np.arange(2, dtype=np.uint64), np.arange(0)
+    raw = meshio.Mesh(
+        np.column_stack([mesh.points, np.zeros(9)]),
+        [*lines, ("quad", mesh.cells)],
+        cell_data={"gmsh:physical": [np.full(n, tag) for n, tag in ((1, 2), (1, 3), (2, 4), (4, 1))]},
+        field_data={"t": [1, 2], "left": [2, 1], "pad": [3, 1], "bone": [4, 1], "nail": [5, 1]},
+        cell_sets={
+            "left": [one, none, none, none],
+            "pad": [one, one, none, none],
+            "bone": [none, none, two, none],
+            "nail": [none, none, two, none],
+            "t": [none, none, none, np.arange(4, dtype=np.uint64)],
+            "gmsh:bounding_entities": [np.array([1, -2])] * 4,
+        },
+    )
+    sets = ev.MeshedFinger(raw, {"t": LAW}).mesh(1).node_sets
+    assert {name: nodes.tolist() for name, nodes in sets.items()} == {
+        "left": [0, 1],
+        "pad": [0, 1, 2],
+        "bone": [6, 7, 8],
+        "nail": [6, 7, 8],
+    }
+    raw.field_data = {}  # sets without numbers do not take the place of numbers
+    by_number = ev.MeshedFinger(raw, {"u": LAW}, regions={"u": 1}).mesh(1)
+    assert by_number.node_sets["pad"].tolist() == [0, 1, 2]
+
+
 def test_a_mesh_of_ours_takes_places_and_refuses_regions():
     bare = replace(square_mesh(), node_sets={})
     laws = {"soft": LAW, "hard": LAW}
