@@ -31,6 +31,7 @@ from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
 from evfem.mesh import places
 from evfem.mesh.groups import (
+    NUMBERS,
     PHYSICAL,
     PREFIX,
     body_of,
@@ -112,7 +113,8 @@ def finger_of(
     mesh = Mesh(points, cells, kind, np.zeros(len(cells), np.int64), {})
     sizes = {k: len(raw.cells[k]) for k in solid}
     groups, regions = places.with_regions(groups, sizes, regions or {}, mesh)
-    region, region_names = regions_in(path, groups, sizes, regions, raw.cell_data)
+    texts = [f"{one} as texts" for one in getattr(raw, "texts", ()) if one in NUMBERS]
+    region, region_names = regions_in(path, groups, sizes, regions, [*raw.cell_data, *texts])
     mesh = sound(replace(mesh, region=region, region_names=region_names), path.name)
     below = [one for one in groups if one.block not in solid]
     sets = sets_in(path, raw, below, boundaries, functools.partial(places.nodes_at, mesh))

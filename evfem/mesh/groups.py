@@ -83,14 +83,17 @@ def _cell_sets(raw: meshio.Mesh, names: Mapping[tuple[int, int], str], last: int
 
 
 def numbered(raw: meshio.Mesh, names: Mapping[tuple[int, int], str]) -> list[Group]:
-    """Groups by the numbers in cell data, with names by dimension and number. ValueError where they are no
-    integers.
+    """Groups by the numbers in cell data, with names by dimension and number, or by texts, which are names.
+    ValueError where they are neither.
     """
     groups, body = [], body_of(raw)
     for key in [key for key in NUMBERS if key in raw.cell_data][:1]:
-        for k, numbers in enumerate(raw.cell_data[key]):
-            numbers = np.asarray(numbers).reshape(-1)
-            if not np.isfinite(numbers).all() or (numbers != np.round(numbers)).any():
+        columns = [np.array(np.ravel(one).tolist()) for one in raw.cell_data[key]]
+        if all(column.dtype.kind in "SU" for column in columns if len(column)):
+            return _by_texts(columns)
+        for k, numbers in enumerate(columns):
+            whole = numbers.dtype.kind in "biuf" and np.isfinite(numbers).all()
+            if not whole or (numbers != np.round(numbers)).any():
                 raise ValueError(f"cell data `{key}` that are no integers")
             numbers = np.abs(numbers) if key == PHYSICAL else numbers  # curves may run backwards
             for number in np.unique(numbers).astype(int).tolist():
@@ -98,6 +101,17 @@ def numbered(raw: meshio.Mesh, names: Mapping[tuple[int, int], str]) -> list[Gro
                     name = names.get((dimension_of(raw.cells[k].type, body), number))
                     groups.append(Group(name, number, k, np.flatnonzero(numbers == number)))
     return groups
+
+
+def _by_texts(columns: list[Any]) -> list[Group]:
+    """Groups by a text for each cell of each block, counted from 1; an empty text is no name."""
+    texts = [column.astype(str) for column in columns]
+    return [
+        Group(name or None, i, k, np.flatnonzero(column == name))
+        for i, name in enumerate(np.unique(np.concatenate(texts)).tolist(), 1)
+        for k, column in enumerate(texts)
+        if (column == name).any()
+    ]
 
 
 def regions_in(
@@ -185,8 +199,9 @@ def _point_sets(path: Path, raw: meshio.Mesh) -> dict[Name, Ints]:
         if values.ndim != 1 or name in NUMBERS:
             continue
         if name in ("pad", "bone"):
-            if not np.isfinite(values).all():
-                problem = f"{path.name} with NaN in point data `{name}`"
+            numbers = values.dtype.kind in "biuf"
+            if not numbers or not np.isfinite(values).all():
+                problem = f"{path.name} with {'NaN' if numbers else 'texts'} in point data `{name}`"
                 raise InputError("finger.mesh", problem, "0 or 1 at every point")
         elif values.dtype.kind not in "iub" or not np.isin(values, (0, 1)).all():
             continue
@@ -202,6 +217,8 @@ def unused_in(raw: meshio.Mesh, groups: list[Group], sets: Mapping[str, Ints]) -
     below = [one for one in groups if dimension_of(raw.cells[one.block].type, body) < body]
     numbers = sorted({one.number for one in below if one.name is None})
     data = [name for name in raw.point_data if name not in sets and name not in NUMBERS]
-    return [f"the number {one}" for one in numbers] + [
-        f"point data {one} that are not 0 and 1" for one in data
+    return [
+        *(f"the number {one}" for one in numbers),
+        *(f"point data {one} that are not 0 and 1" for one in data),
+        *(f"{one} as texts" for one in getattr(raw, "texts", ()) if one not in NUMBERS),
     ]

@@ -230,6 +230,30 @@ def test_a_curve_in_two_groups_is_in_both_in_a_mesh_of_meshio():
     assert by_number.node_sets["pad"].tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("kind", [str, object])
+def test_texts_of_cells_are_the_names_of_their_regions(kind):
+    """In two blocks, as meshio has cells of which each region is written by itself."""
+    mesh = square_mesh()
+    raw = meshio.Mesh(
+        np.column_stack([mesh.points, np.zeros(9)]),
+        [("quad", mesh.cells[:2]), ("quad", mesh.cells[2:])],
+        cell_data={"region": [np.array(["skin", "nail"], kind), np.array(["skin", "skin"], kind)]},
+    )
+    laws, places = {"skin": LAW, "nail": LAW}, {"pad": "lowest", "bone": "highest"}
+    found = ev.MeshedFinger(raw, laws, boundaries=places).mesh(1)
+    assert found.cells_of("nail").tolist() == [1]
+    assert found.cells_of("skin").tolist() == [0, 2, 3]
+    for name, data in (("point", np.array(["yes"] * 9)), ("bone", np.full(9, "1"))):
+        raw.point_data = {name: data}
+        given = ev.MeshedFinger, raw, laws
+        if name == "bone":
+            refuses("given the meshio.Mesh with texts in point data `bone`; allowed: 0 or 1", *given)
+        else:
+            refuses("no boundary pad .it has point data point that are not 0 and 1", *given)
+    raw.cell_data["region"][1] = np.array(["skin", None], object)
+    refuses("cell data `region` that are no integers", ev.MeshedFinger, raw, laws)
+
+
 def test_a_mesh_of_ours_takes_places_and_refuses_regions():
     bare = replace(square_mesh(), node_sets={})
     laws = {"soft": LAW, "hard": LAW}

@@ -362,6 +362,23 @@ def test_names_that_a_grid_of_pyvista_has_are_listed_where_the_expected_ones_are
     refuses(said, read, tmp_path / "mesh.vtu", {"skin": 1, "tissue": 2})
 
 
+@pytest.mark.vtk
+@pytest.mark.parametrize("ending", ["vtu", "vtk"])
+def test_regions_and_boundaries_that_vtk_wrote_as_texts_are_said_to_be_such(ending, tmp_path):
+    import pyvista
+
+    grid = pyvista.read(WRITTEN / "pyvista_quad9.vtu")
+    low, first = grid.points[:, 1] < 0.1, np.array(grid.cell_data["region"]) == 1
+    grid.point_data.remove("pad")
+    grid.point_data["pad"] = np.where(low, "yes", "no")
+    grid.save(tmp_path / f"mesh.{ending}")
+    refuses("no boundary pad .*, pad as texts", read, tmp_path / f"mesh.{ending}", {"skin": 1, "tissue": 2})
+    grid.cell_data.remove("region")
+    grid.cell_data["region"] = np.where(first, "skin", "tissue")
+    grid.save(tmp_path / f"mesh.{ending}")
+    refuses("without region numbers .*region as texts.; .*integer", read, tmp_path / f"mesh.{ending}")
+
+
 def test_a_pointer_of_git_lfs_is_no_damaged_file(tmp_path):
     """The specification of Git LFS, version 1: three lines of text in place of the file."""
     path = tmp_path / "body.msh"

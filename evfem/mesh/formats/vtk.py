@@ -7,6 +7,7 @@ VTK in turn reads no integers of meshio's `.vtk`, so that meshio is asked first.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from contextlib import suppress
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     import meshio
 
 LZ4, TEXT, RAW, COLOURS = b"vtkLZ4DataCompressor", b'type="String"', b'encoding="raw"', b"COLOR_SCALARS"
+#: texts where numbers are needed, which are not read
+NAMED = re.compile(rb'type="String" Name="(region|pad|bone)"|^(region|pad|bone) \d+ \d+ string', re.MULTILINE)
 #: seconds after which VTK is not waited for
 LONGEST = 300.0
 #: what to do without VTK
@@ -31,10 +34,19 @@ SAVE = {
 
 
 def read(path: Path) -> meshio.Mesh:
-    """What meshio reads of a file, or of what VTK makes of it. Raises ValueError that says what to do."""
+    """What meshio reads of a file, or of what VTK makes of it, with the names of the `texts` that are missed.
+    Raises ValueError that says what to do.
+    """
+    content = path.read_bytes()
+    raw = _read(path, content)
+    raw.texts = sorted({(one or other).decode() for one, other in NAMED.findall(content)})
+    return raw
+
+
+def _read(path: Path, content: bytes) -> meshio.Mesh:
     import meshio
 
-    content, ending = path.read_bytes(), path.suffix.lower()
+    ending = path.suffix.lower()
     with TemporaryDirectory() as folder:
         clean = Path(folder, "mesh.vtu")
         if ending == ".vtk" and content.startswith(b"# vtk DataFile"):
