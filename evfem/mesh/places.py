@@ -9,6 +9,7 @@ in a box, or the `rest`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -75,6 +76,7 @@ def with_regions(
     local = np.concatenate([np.arange(size) for size in sizes.values()])
     start = dict(zip(sizes, np.cumsum([0, *sizes.values()]), strict=False))
     placed = {name: _cells_in(body, name, box) for name, box in boxes.items()}
+    _refuse_common(placed, rest)
     taken = np.any([np.zeros(len(block), bool), *placed.values()], axis=0)
     keys = {key for key in regions.values() if not isinstance(key, Mapping)}
     groups = [
@@ -94,6 +96,16 @@ def with_regions(
         found[name] = number
         groups += [Group(None, number, k, local[cells & (block == k)]) for k in sizes]
     return groups, found
+
+
+def _refuse_common(boxes: Mapping[str, Any], rest: list[str]) -> None:
+    """Raise `InputError` where two boxes, whose cells (E,) bool are given, or the rest go to two regions."""
+    if len(rest) > 1:
+        raise InputError("finger.regions", f"{' and '.join(rest)} = {REST}", "one region that is the rest")
+    for (first, one), (second, other) in combinations(boxes.items(), 2):
+        if (one & other).any():
+            given = f"{first} and {second} with {(one & other).sum()} cells in both boxes"
+            raise InputError("finger.regions", given, "boxes that have no centre of a cell in common")
 
 
 def _cells_in(body: Mesh, name: str, box: Mapping[str, Any]) -> Any:

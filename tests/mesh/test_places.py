@@ -149,6 +149,16 @@ def test_a_scene_names_places_of_a_mesh_of_medit(tmp_path):
             r"nail = {.*}, where no cell has its centre; .* x from 0 to 8",
         ),
         ("[[4, 4], [8, 8]]", "[[0, 0], [8, 8]]", "tissue = rest, of which no cell is left"),
+        (
+            'tissue = "rest"',
+            "tissue = {box = [[2, 2], [8, 8]]}",
+            r"finger.regions: given nail and tissue with 1 cells in both boxes; allowed: boxes that have no centre",
+        ),
+        (
+            'tissue = "rest"',
+            'tissue = "rest"\nskin = "rest"',
+            "finger.regions: given tissue and skin = rest; allowed: one region that is the rest",
+        ),
         ('"rest"', '"all"', r"finger.regions: given tissue = all; .*block.mesh: 0"),
     ):
         (tmp_path / "wrong.toml").write_text(SCENE.replace(old, new))
