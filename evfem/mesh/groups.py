@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Ints
-from evfem.errors import InputError
+from evfem.errors import InputError, describe_value
 from evfem.mesh.mesh import CELLS
 
 if TYPE_CHECKING:
@@ -139,12 +139,15 @@ def regions_in(
     for name, key in regions.items():
         for one in solid:
             if key in (one.name, one.number):
-                cells, found[name] = start[one.block] + one.cells, one.number
+                cells, number = start[one.block] + one.cells, found.setdefault(name, one.number)
                 if both := next((other for other in owner[cells] if other not in ("", name)), None):
-                    problem, chosen = f"{both} and {name} with the same cells", f'{both} = "{regions[both]}"'
+                    problem, chosen = (
+                        f"{both} and {name} with the same cells",
+                        f"{both} = {describe_value(regions[both])}",
+                    )
                     allowed = f"one name per cell: those that count in [finger.regions], as {chosen}"
                     raise InputError("finger.regions", problem, allowed)
-                region[cells], owner[cells] = one.number, name
+                region[cells], owner[cells] = number, name
         if name not in found:
             listed = dict.fromkeys(str(one.name or one.number) for one in solid)
             problem, allowed = f"{name} = {key}", f"groups that occur in {path.name}: {', '.join(listed)}"

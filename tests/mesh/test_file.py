@@ -117,7 +117,11 @@ def test_pad_is_reduced_to_the_outline(tmp_path):
         (None, "no name for 0, 1"),
         ({"tissue": 0}, "no name for 1"),
         ({"tissue": 0, "skin": 1, "nail": 7}, "nail = 7"),
-        ({"tissue": 0, "skin": 1, "fat": 0}, "tissue and fat with the same cells"),
+        (
+            {"tissue": 0, "skin": 1, "fat": 0},
+            "tissue and fat with the same cells; allowed: one name per cell: those that "
+            "count in [finger.regions], as tissue = 0",
+        ),
     ],
 )
 def test_names_must_fit_the_numbers(regions, words, tmp_path):

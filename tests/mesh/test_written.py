@@ -111,6 +111,28 @@ def test_numbers_of_exodus_blocks_are_those_of_the_file_and_not_places(ending, t
 
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_blocks_of_one_name_are_one_region(tmp_path):
+    path = with_names(tmp_path / "two.exo", eb_names=["body", "body"])
+    mesh = read(path, None, {"pad": 7, "bone": 8})
+    assert list(mesh.region_names) == ["body"]
+    assert mesh.cells_of("body").tolist() == list(range(len(mesh.cells)))
+
+
+def with_names(path, **names):
+    """The body without names, with some."""
+    import netCDF4
+
+    path.write_bytes((WRITTEN / "exodus_unnamed.exo").read_bytes())
+    with netCDF4.Dataset(path, "a") as file:
+        for what, given in names.items():
+            letters = np.zeros(file[what].shape, "S1")
+            for row, name in zip(letters, given, strict=True):
+                row[: len(name)] = list(name)
+            file[what][:] = letters
+    return path
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
 def test_a_side_of_what_no_finger_is_made_of_does_not_hide_that(tmp_path):
     import netCDF4
 
