@@ -170,24 +170,28 @@ def sets_in(
     boundaries: Mapping[str, Any] | None,
     at: Callable[[str, Any, str], Ints],
 ) -> dict[str, Ints]:
-    """Sets of nodes: those of groups below the body's dimension, of the file, and of its point data;
-    what `boundaries` calls neither is looked for `at` a place.
+    """Sets of nodes: those of groups below the body's dimension, of the file, and of its point data; a
+    number is also that of a set with a name. What `boundaries` calls neither is looked for `at` a place.
     """
     sets: dict[Name, Ints] = {}
+    numbers: dict[Name, Name] = dict(getattr(raw, "numbers", {}))
 
     def add(name: Name, nodes: Any) -> None:
         nodes = np.union1d(sets.get(name, np.empty(0, np.int64)), np.ravel(nodes))
         sets[name] = nodes.astype(np.int64)
 
-    for one in groups:
+    body = body_of(raw)
+    for one in sorted(groups, key=lambda one: -dimension_of(raw.cells[one.block].type, body)):
         add(one.name or one.number, raw.cells[one.block].data[one.cells])
+        numbers.setdefault(one.number, one.name or one.number)  # sides before edges and points
     for name, nodes in raw.point_sets.items():
         add(name, nodes)
     sets.update(_point_sets(path, raw))
     named = {name: nodes for name, nodes in sets.items() if isinstance(name, str)}
     for name, key in (boundaries or {}).items():
         known = f"sets of {path.name}: {', '.join(map(str, sets)) or 'none'}"
-        named[name] = sets[key] if isinstance(key, Name) and key in sets else at(name, key, known)
+        own = numbers.get(key, key) if isinstance(key, int) and key not in sets else key
+        named[name] = sets[own] if isinstance(own, Name) and own in sets else at(name, key, known)
     return named
 
 

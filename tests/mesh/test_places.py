@@ -152,7 +152,7 @@ def test_a_scene_names_places_of_a_mesh_of_medit(tmp_path):
         (
             'tissue = "rest"',
             "tissue = {box = [[2, 2], [8, 8]]}",
-            r"finger.regions: given nail and tissue with 1 cells in both boxes; allowed: boxes that have no centre",
+            "finger.regions: given nail and tissue with 1 cells in both boxes; allowed: boxes",
         ),
         (
             'tissue = "rest"',

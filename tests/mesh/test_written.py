@@ -118,6 +118,29 @@ def test_blocks_of_one_name_are_one_region(tmp_path):
     assert mesh.cells_of("body").tolist() == list(range(len(mesh.cells)))
 
 
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_a_boundary_with_a_name_is_known_by_its_number_too(tmp_path):
+    """In Exodus 7 is a side set before a node set; in Gmsh 3 is the curve `pad`."""
+    plain = read(WRITTEN / "exodus_unnamed.exo", {"skin": 20, "tissue": 10}, {"pad": 7, "bone": 8})
+    path = with_names(tmp_path / "names.exo", ss_names=["low side", "high side"], ns_names=["low side"])
+    for name in ("low side", "high"):
+        with_names(path, ss_names=["low side", "high side"], ns_names=[name])
+        sets = read(path, {"skin": 20, "tissue": 10}, {"pad": 7, "bone": 8}).node_sets
+        assert sets["pad"].tolist() == plain.node_sets["pad"].tolist() == sets["low side"].tolist()
+        assert sets["bone"].tolist() == plain.node_sets["bone"].tolist() == sets["high side"].tolist()
+    refuses("pad = 9; .*sets of names.exo: low side, high side", read, path,
+            {"skin": 20, "tissue": 10}, {"pad": 9, "bone": 8})  # fmt: skip
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_a_physical_curve_with_a_name_is_known_by_its_number_too(version):
+    path = WRITTEN / f"gmsh_quad_{version}.msh"
+    numbers = {name: int(tag[0]) for name, tag in meshio.read(path).field_data.items() if tag[1] == 1}
+    mesh = read(path, None, {"low": numbers["pad"], "high": numbers["bone"]})
+    assert mesh.node_sets["low"].tolist() == mesh.node_sets["pad"].tolist()
+    assert mesh.node_sets["high"].tolist() == mesh.node_sets["bone"].tolist()
+
+
 def with_names(path, **names):
     """The body without names, with some."""
     import netCDF4

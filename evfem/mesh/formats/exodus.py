@@ -59,8 +59,9 @@ def read(path: Path) -> meshio.Mesh:
                 groups.append(Group(name or None, number, len(cells), np.arange(len(nodes))))
                 cells.append((kind, nodes))
                 sides.append([nodes[:, place] for place in table])
-        raw = meshio.Mesh(points, cells, point_sets=_sets(file, sides, [len(nodes) for _, nodes in cells]))
-    raw.groups = groups
+        sets, numbers = _sets(file, sides, [len(nodes) for _, nodes in cells])
+        raw = meshio.Mesh(points, cells, point_sets=sets)
+    raw.groups, raw.numbers = groups, numbers
     return raw
 
 
@@ -98,12 +99,14 @@ def _block(connect: Any, dim: int) -> tuple[str, Ints, list[Ints]]:
     return kind, nodes, [*faces * [whole] * 2, *table] if len(table) else [whole] * 6
 
 
-def _sets(file: Any, sides: list[list[Ints]], sizes: list[int]) -> dict[Name, Ints]:
-    """Nodes of the side sets and node sets by name, by number where they have none.
+def _sets(file: Any, sides: list[list[Ints]], sizes: list[int]) -> tuple[dict[Name, Ints], dict[int, Name]]:
+    """Nodes of the side sets and node sets by name, by number where they have none; and what each number is,
+    of a side set before a node set.
 
     One whose name or number another one with other nodes has is called "node set 3" by its number.
     """
     found: dict[Name, Ints] = {}
+    numbers: dict[int, Name] = {}
     for what, words, first in (("ss", "side set", "elem"), ("ns", "node set", "node")):
         for k, (name, number) in enumerate(_labels(file, what, f"num_{words.replace(' ', '_')}s"), 1):
             if f"{first}_{what}{k}" not in file.variables:
@@ -111,9 +114,12 @@ def _sets(file: Any, sides: list[list[Ints]], sizes: list[int]) -> dict[Name, In
             of_nodes = what == "ns"
             nodes = file.variables[f"node_ns{k}"][:] - 1 if of_nodes else _side_nodes(file, k, sides, sizes)
             nodes = np.unique(np.asarray(nodes, dtype=np.int64))
-            if not np.array_equal(found.setdefault(name or number, nodes), nodes):
-                found[f"{words} {number}"] = nodes
-    return found
+            key: Name = name or number
+            if not np.array_equal(found.setdefault(key, nodes), nodes):
+                key = f"{words} {number}"
+                found[key] = nodes
+            numbers.setdefault(number, key)
+    return found, numbers
 
 
 def _side_nodes(file: Any, k: int, sides: list[list[Ints]], sizes: list[int]) -> Ints:
