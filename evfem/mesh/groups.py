@@ -197,7 +197,7 @@ def sets_in(
 
 def _point_sets(path: Path, raw: meshio.Mesh) -> dict[Name, Ints]:
     """`pad` and `bone` of any type, in which less than `NOUGHT` is 0, and every other point data that holds
-    only the integers 0 and 1.
+    only 0 and 1.
     """
     sets: dict[Name, Ints] = {}
     for name, values in raw.point_data.items():
@@ -210,7 +210,7 @@ def _point_sets(path: Path, raw: meshio.Mesh) -> dict[Name, Ints]:
             if not numbers or not np.isfinite(values).all():
                 problem = f"{path.name} with {'NaN' if numbers else 'texts'} in point data `{name}`"
                 raise InputError("finger.mesh", problem, "0 or 1 at every point")
-        elif values.dtype.kind not in "iub" or not np.isin(values, (0, 1)).all():
+        elif values.dtype.kind not in "biuf" or not np.isin(values, (0, 1)).all():
             continue
         sets[name] = np.flatnonzero(np.abs(values) > NOUGHT).astype(np.int64)
     return sets

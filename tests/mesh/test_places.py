@@ -240,6 +240,24 @@ def test_a_curve_in_two_groups_is_in_both_in_a_mesh_of_meshio():
     assert by_number.node_sets["pad"].tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("kind", [int, bool, np.uint8, np.float32, float])
+def test_point_data_of_0_and_1_are_sets_of_whatever_type(kind):
+    mesh = square_mesh()
+    y = mesh.points[:, 1]
+    raw = meshio.Mesh(
+        np.column_stack([mesh.points, np.zeros(9)]),
+        [("quad", mesh.cells)],
+        point_data={"below": (y < 0.1).astype(kind), "bone": (y > 1.9).astype(kind), "height": y},
+    )
+    finger = ev.MeshedFinger(raw, {"t": LAW}, regions={"t": "rest"}, boundaries={"pad": "below"})
+    assert finger.mesh(1).node_sets["pad"].tolist() == [0, 1, 2]
+    refuses(
+        r"no boundary pad \(it has below, bone, point data height that are not 0 and 1\)",
+        *(ev.MeshedFinger, raw, {"t": LAW}),
+        regions={"t": "rest"},
+    )
+
+
 @pytest.mark.parametrize("kind", [str, object])
 def test_texts_of_cells_are_the_names_of_their_regions(kind):
     """In two blocks, as meshio has cells of which each region is written by itself."""
