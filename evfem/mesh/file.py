@@ -230,7 +230,8 @@ def _one_kind(path: Path, kinds: list[str]) -> str:
 def _plane(path: Path, points: np.ndarray) -> np.ndarray:
     """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is refused."""
     points = np.asarray(points, dtype=float)
-    if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > 1e-9:
+    extent = np.ptp(points[:, :2], axis=0).max() if len(points) else 0.0
+    if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > places.SAME * extent:
         problem = f"{path.name} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
         raise InputError("finger.mesh", problem, "a plane mesh: the same z everywhere")
     return np.ascontiguousarray(points[:, :2])

@@ -258,6 +258,18 @@ def test_point_data_of_0_and_1_are_sets_of_whatever_type(kind):
     )
 
 
+def test_a_plane_that_was_turned_there_and_back_in_single_precision_is_a_plane():
+    mesh = square_mesh()
+    turn = np.array([[0.866, 0, 0.5], [0, 1, 0], [-0.5, 0, 0.866]], np.float32)
+    there = (np.column_stack([20 * mesh.points, np.zeros(9)]).astype(np.float32) @ turn).astype(np.float32)
+    raw = meshio.Mesh(there @ np.linalg.inv(turn), [("quad", mesh.cells)])
+    assert np.ptp(raw.points[:, 2]) > 1e-8
+    given = {"regions": {"t": "rest"}, "boundaries": {"pad": "lowest", "bone": "highest"}}
+    assert ev.MeshedFinger(raw, {"t": LAW}, **given).mesh(1).node_sets["pad"].tolist() == [0, 1, 2]
+    raw.points[4, 2] = 1e-3
+    refuses("z from .* to 0.001; allowed: a plane mesh", ev.MeshedFinger, raw, {"t": LAW}, **given)
+
+
 @pytest.mark.parametrize("kind", [str, object])
 def test_texts_of_cells_are_the_names_of_their_regions(kind):
     """In two blocks, as meshio has cells of which each region is written by itself."""
