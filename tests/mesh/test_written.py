@@ -190,6 +190,9 @@ def test_a_marker_of_su2_that_is_a_number_has_no_name(tmp_path):
     sets = read(tmp_path / "numbers.su2", {"tissue": 0}, {"pad": 7}).node_sets
     assert {name: len(nodes) for name, nodes in sets.items()} == {"bone": 3, "pad": 3}
     refuses("no boundary pad .it has bone, the number 7", read, tmp_path / "numbers.su2", {"tissue": 0})
+    said = "".join(f"{line} % by hand\n" for line in text.splitlines())
+    (tmp_path / "said.su2").write_text(said)
+    assert len(read(tmp_path / "said.su2", {"tissue": 0}, {"pad": 7}).node_sets["pad"]) == 3
     (tmp_path / "zones.su2").write_text("NZONE= 2\n" + text)
     refuses("2 zones: keep one", read, tmp_path / "zones.su2", {"tissue": 0})
 

@@ -38,8 +38,8 @@ def read(path: Path) -> meshio.Mesh:
     parts: list[tuple[str | None, int, Blocks]] = []
     tag, dimension = "", 2
     with path.open(encoding="utf-8", errors="replace") as file:
-        lines = (line.strip() for line in file)
-        lines = (line for line in lines if line and not line.startswith("%"))
+        lines = (line.partition("%")[0].strip() for line in file)  # without remarks
+        lines = (line for line in lines if line)
         for line in lines:
             word, _, value = (part.strip() for part in line.partition("="))
             if word == "NZONE" and int(value) > 1:
