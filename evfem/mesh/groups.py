@@ -135,7 +135,7 @@ def regions_in(
     if not regions:
         regions = {one.name: one.name for one in solid if one.name is not None}
     region, owner = np.zeros(sum(sizes.values()), dtype=np.int64), np.full(sum(sizes.values()), "", object)
-    found = {}
+    found: dict[str, int] = {}
     for name, key in regions.items():
         for one in solid:
             if key in (one.name, one.number):
