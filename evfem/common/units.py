@@ -57,7 +57,11 @@ UNITS: Mapping[str, tuple[str, float]] = {
 } | {spelled: (name, 1.0) for name in OTHERS.split() for spelled in sorted(spellings(name))}
 #: those that a name can end with, and labels (`probe_A`) that are none
 LABELS = ("1", "-", "%", "A", "C", "F", "K", "T", "W")
-BRACKETS = re.compile(r"(.+?)\s*[_/,:]?\s*(?:\[(.*)\]|\((.*)\))")
+BRACKETS = re.compile(r"\s*[_/,:]?\s*(?:\[([^\]]*)\]|\(([^)]*)\))")
+#: a bracket beside that of the unit that is a word, and no factor as (x10)
+WORD = re.compile(r"(?!x\s*\d)[^\W\d_].*")
+#: unit in the middle of a name, which no word looks like
+MIDDLE = re.compile(r"(?<=[_ /])(?:[µμunmkcM](?:m|V|N|Pa|Hz)2?|[mn]s|k?gf|lbf)(?=[_ /]).*")
 GAP = re.compile(r"\s+in\s+|\s*[/,:]\s*|_|\s+")
 SIGNED = re.compile(r"(.+?)\s*([/,:])\s*([^/,:]+)")
 
@@ -77,22 +81,40 @@ def plain_unit(text: str | None) -> str | None:
 
 
 def named_unit(cell: str) -> tuple[str, str | None]:
-    """Name and unit of a column: x [mm], x (mm), x/mm, "x, mm", x:mm; x_mm and x mm, where
-    the end is a unit that is known.
+    """Name and unit of a column: x [mm], x (mm), x/mm, "x, mm", x:mm; x_mm, x_N_mm and x mm, where
+    the end is a unit that is known. What looks like a unit elsewhere and is not known is that of the column.
 
     >>> [named_unit(cell) for cell in ("Load [gf]", "pressure kPa", "v/mm/s", "normal_force", "z:furlong")]
     [('Load', 'gf'), ('pressure', 'kPa'), ('v', 'mm/s'), ('normal_force', None), ('z', 'furlong')]
+    >>> [named_unit(cell) for cell in ("Load [mN] avg", "force_N_mm", "load_mN_raw")]
+    [('Load avg', 'mN'), ('force', 'N/mm'), ('load', 'mN_raw')]
     """
-    if found := BRACKETS.fullmatch(cell):
-        name, *units = found.groups()
-        return name, plain_unit(next(unit for unit in units if unit is not None))
+    if brackets := list(BRACKETS.finditer(cell)):
+        return _bracketed(cell, brackets)
     for gap in GAP.finditer(cell, 1):
-        unit, signed = plain_unit(cell[gap.end() :]), any(sign in gap.group() for sign in "/,:")
-        if unit in UNITS and (signed or unit not in LABELS):
-            return cell[: gap.start()], unit
+        end = cell[gap.end() :]
+        signed = any(sign in gap.group() for sign in "/,:")
+        quotient = end if end.startswith("1") else re.sub("[_ ]", "/", end)  # x_1_mm: the first of some
+        for unit in (plain_unit(end), plain_unit(quotient)):
+            if unit in UNITS and (signed or unit not in LABELS):
+                return cell[: gap.start()], unit
     if found := SIGNED.fullmatch(cell):
         return found.group(1), plain_unit(found.group(3))
+    if middle := MIDDLE.search(cell, 1):
+        return cell[: middle.start() - 1], middle.group()
     return cell, None
+
+
+def _bracketed(cell: str, found: list[re.Match[str]]) -> tuple[str, str | None]:
+    """Name and unit of a cell with brackets: the one that is known beside words; all where that is not so."""
+    told = [plain_unit(one.group(1) or one.group(2)) for one in found]
+    known = [i for i, unit in enumerate(told) if unit in UNITS]
+    others = [unit for i, unit in enumerate(told) if i not in known and unit is not None]
+    if len(known) == 1 and all(map(WORD.fullmatch, others)):
+        one, unit = found[known[0]], told[known[0]]
+    else:
+        one, unit = found[-1], " and ".join(unit for unit in told if unit) or None
+    return (cell[: one.start()] + cell[one.end() :]).strip() or cell, unit
 
 
 def header(heads: list[list[str]]) -> list[tuple[str, str, str | None]]:

@@ -185,6 +185,38 @@ def test_names_that_end_like_units_are_names(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("head", "right"),
+    [
+        ("Travel [um] avg,Load [mN] avg", 0.012),
+        ("(um) travel,(mN) load", 0.012),
+        ("travel (avg) [um],load [mN].1", 0.012),  # as pandas writes a name that is there twice
+        ("travel_um,normal_force_mN_mm", 0.012),
+        ("travel_um,load_N_mm", 12.0),
+    ],
+)
+def test_units_within_a_name_and_quotients_are_understood(tmp_path, head, right):
+    assert pressed(tmp_path / "press.csv", f"{head}\n100,12\n200,24\n") == pytest.approx((0.1, right))
+
+
+@pytest.mark.parametrize(
+    ("load", "told"),
+    [
+        ("Load [furlong] avg", "furlong"),
+        ("load_mN_raw", "mN_raw"),
+        ("Load (x10) [mN]", "x10 and mN"),
+        ("Load [mN] (N)", "mN and N"),
+    ],
+)
+def test_what_looks_like_a_unit_in_a_name_is_understood_or_refused(tmp_path, load, told):
+    path, text = tmp_path / "press.csv", f"depth,{load}\n1,12\n2,24\n"
+    refuses(rf"given load.* in {told}; .* factors=", pressed, path, text)
+    assert pressed(path, text, factors={"normal_force": 0.5})[1] == 6.0
+    columns = {"indentation": 1, "normal_force": 3}  # of the others nothing is asked
+    text = f"depth,{load},force\n1,12,7\n2,24,8\n"
+    assert pressed(path, text, columns=columns)[1] == 7.0
+
+
+@pytest.mark.parametrize(
     ("rows", "right"),
     [
         ('depth,load\n1,"1,234"\n2,"2,000.5"\n', 1234.0),  # commas between columns: decimals have points
