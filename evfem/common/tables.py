@@ -166,15 +166,21 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Headed:
-    """Columns, NaN for gaps, with names and units, of the `cells` of the header; `commas`: whether numbers
-    had decimal commas.
-    """
+    """Columns, NaN for gaps, with their `heads`; `commas`: whether numbers had decimal commas."""
 
-    cells: list[str]
-    names: list[str]
-    units: list[str | None]
+    heads: list[units.Head]
     columns: list[Floats]
     commas: bool
+
+    @property
+    def names(self) -> list[str]:
+        """The names."""
+        return [one.name for one in self.heads]
+
+    @property
+    def units(self) -> list[str | None]:
+        """The units, None for none."""
+        return [one.unit for one in self.heads]
 
     @property
     def start(self) -> str:
@@ -188,7 +194,8 @@ class Headed:
         name = str(entry).lower()
         if name in numbers:
             return int(name) - 1
-        found = [i for i, called in enumerate(zip(self.names, self.cells, strict=True)) if name in called]
+        found = [i for i, one in enumerate(self.heads) if name in (one.name, one.cell.lower())]
+        found = found or [i for i, one in enumerate(self.heads) if name == one.above]
         if not found:
             raise unknown(
                 key, str(entry), [*self.names, *numbers], f"{describe_value(entry)}, which is no column"
@@ -208,11 +215,19 @@ class Headed:
         its own it has that of the column `like`. A message about its unit ends with `more`.
         """
         i = self.index(key, entry)
-        unit = self.units[i]
+        name, unit = self._called(i, entry)
         if unit is None and like is not None:
-            unit = self.units[self.index(key, like)]
-        size = units.factor(key, self.names[i], unit, bases, more) if factor is None else factor
+            unit = self._called(self.index(key, like), like)[1]
+        size = units.factor(key, name, unit, bases, more) if factor is None else factor
         return self.columns[i] if size == 1.0 else self.columns[i] * size
+
+    def _called(self, i: int, entry: int | str) -> tuple[str, str | None]:
+        """Name and unit of a column; below another text a cell is a name where it is called by it."""
+        cell, name, unit, above = self.heads[i]
+        called = str(entry).lower() in (cell.lower(), name)
+        if unit is None and above and not (called and units.named_unit(above)[1] is None):
+            return above, cell
+        return name, unit
 
 
 def read_columns(path: Path, header: Mapping[str, str], key: str) -> list[Floats]:
@@ -261,8 +276,7 @@ def read_headed(
             rule = f"{width} {'' if gaps else 'finite '}numbers on each line"
             raise InputError(key, f"{path.name}, line {number}: {line[:60]!r}", rule)
         values.append(row)
-    cells, names = [cell for cell, _, _ in parts], [name for _, name, _ in parts]
-    return Headed(cells, names, [unit for *_, unit in parts], list(np.array(values).T), comma)
+    return Headed(parts, list(np.array(values).T), comma)
 
 
 def names_of(path: Path) -> list[str]:
@@ -270,7 +284,7 @@ def names_of(path: Path) -> list[str]:
     with suppress(OSError, InputError), path.open("rb") as file:
         book = path.suffix.lower() in BOOKS
         start = _text(path, "", "") if book else _decoded(file.read(BEGINNING)) or ""
-        return [name for _, name, _ in _header(_lines(start))[1]]
+        return [one.name for one in _header(_lines(start))[1]]
     return []
 
 
@@ -279,19 +293,29 @@ def _lines(text: str) -> list[tuple[int, str]]:
     return [(n, plain) for n, line in enumerate(text.split("\n"), 1) if (plain := line.strip(" \r"))]
 
 
-def _header(lines: list[tuple[int, str]]) -> tuple[int, list[tuple[str, str, str | None]]]:
-    """Which line is the first one of numbers, and cells, names and units of the header above."""
+def _header(lines: list[tuple[int, str]]) -> tuple[int, list[units.Head]]:
+    """Which line is the first one of numbers, and the heads of the columns above."""
     first = next((i for i, (_, line) in enumerate(lines) if _holds_numbers(line)), None)
     if first is None:
         return len(lines), []
     separator = _separator(lines[first][1])
     row = _cells(lines[first][1], separator)
-    above = [_cells(one.lstrip("#% "), separator) for _, one in lines[:first]]
-    heads = [cells for cells in above if len(cells) == len(row)] or above
-    parts = units.header(heads) or [(str(i), str(i), None) for i in range(1, len(row) + 1)]
-    while len(parts) > 1 and not parts[-1][1]:  # a separator at the end of the header
-        parts.pop()
+    above = [_trimmed(_cells(one.lstrip("#% "), separator)) for _, one in lines[:first]]
+    widths = {len(cells) for cells in above}
+    width = next((one for one in (len(row), len(_trimmed(row))) if one in widths), None)
+    heads = above if width is None else [cells for cells in above if len(cells) == width]
+    parts = units.header(heads) or [units.Head(str(i), str(i), None) for i in range(1, len(row) + 1)]
+    last = max((i for i, cells in enumerate(above) if len(cells) == width), default=first)
+    for cells, (_, line) in zip(above[last + 1 :], lines[last + 1 :], strict=False):
+        sign = units.says_units(cells) if line[0] in "#%" else any(map(units.is_text, cells))
+        if sign and len(cells) < len(parts):
+            parts = units.below(parts, cells)
     return first, parts
+
+
+def _trimmed(cells: list[str]) -> list[str]:
+    """Cells without the empty ones at the end, of separators there."""
+    return cells[: max((i for i, cell in enumerate(cells, 1) if cell), default=0)]
 
 
 def read_bytes(path: Path, key: str, allowed: str, most: int, limit: str) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
+from typing import NamedTuple
 
 from evfem.errors import InputError
 
@@ -117,27 +118,70 @@ def _bracketed(cell: str, found: list[re.Match[str]]) -> tuple[str, str | None]:
     return (cell[: one.start()] + cell[one.end() :]).strip() or cell, unit
 
 
-def header(heads: list[list[str]]) -> list[tuple[str, str, str | None]]:
-    """Whole cells and names, in small letters, and units of columns, of the lines of cells above the numbers:
-    the last line, or the one before and units in the last, of which one that is known, or brackets round
-    all, is a sign.
+class Head(NamedTuple):
+    """Of a column the whole cell, the name in small letters, the unit, and a text above, which is the name
+    where the cell is a unit that is not known.
     """
-    cells, said = (heads[-1] if heads else []), None
+
+    cell: str
+    name: str
+    unit: str | None
+    above: str = ""
+
+
+def header(heads: list[list[str]]) -> list[Head]:
+    """The heads of columns, of the lines of cells above the numbers: the last line, or the one before and
+    units in the last, of which one that is known, or brackets round all, is a sign.
+
+    >>> [(one.name, one.unit) for one in header([["Depth", "Load"], ["um", "furlong"]])]
+    [('depth', 'um'), ('load', 'furlong')]
+    """
+    cells, said, above = (heads[-1] if heads else []), None, None
     if len(heads) > 1 and len(heads[-2]) == len(cells):
-        if _says_units(cells):
+        if says_units(cells):
             cells, said = heads[-2], cells
-        elif _says_units(heads[-2]) and all(plain_unit(cell) in (None, *UNITS) for cell in heads[-2]):
+        elif says_units([cell for cell in heads[-2] if cell not in LABELS]):
             said = heads[-2]
-    found = [(cell.lower(), *named_unit(cell)) for cell in cells]
-    told = [plain_unit(unit) for unit in said or [""] * len(cells)]
-    return [(cell, name.lower(), unit or own) for (cell, name, own), unit in zip(found, told, strict=True)]
+        else:
+            above = heads[-2]
+    blank = [""] * len(cells)
+    found = zip(cells, said or blank, above or blank, strict=True)
+    return [_head(cell, plain_unit(unit), name if is_text(name) else "") for cell, unit, name in found]
 
 
-def _says_units(cells: list[str]) -> bool:
+def _head(cell: str, said: str | None, above: str) -> Head:
+    """The head of a column with its name in `cell` and a unit `said` in another line."""
+    name, own = named_unit(cell)
+    return both(Head(cell, name.lower(), own, above.lower()), said)
+
+
+def both(head: Head, said: str | None) -> Head:
+    """A head with a unit that another line says, too: where they differ, one that is not known."""
+    own = head.unit
+    known = own in UNITS and own not in ("1", "-")
+    if said is None or UNITS.get(said, said) == UNITS.get(own or "", own):
+        return head
+    return head._replace(unit=f"{own} and {said}" if known else said)
+
+
+def below(parts: list[Head], line: list[str]) -> list[Head]:
+    """Heads with a shorter line under them: units, or what is not understood in columns without a unit."""
+    told = [plain_unit(cell) for cell in line] + [None] * (len(parts) - len(line))
+    if any(unit in UNITS for unit in told):
+        return [both(one, unit) for one, unit in zip(parts, told, strict=True)]
+    return [one._replace(unit=one.unit or unit) for one, unit in zip(parts, told, strict=True)]
+
+
+def says_units(cells: list[str]) -> bool:
     """Whether a line is one of units."""
     told = [cell for cell in cells if plain_unit(cell) not in (None, "1", "-")]
     bracketed = all(cell[0] + cell[-1] in ("[]", "()") for cell in told)
     return bool(told) and (bracketed or any(plain_unit(cell) in UNITS for cell in told))
+
+
+def is_text(cell: str) -> bool:
+    """Whether there are letters in a cell."""
+    return any(map(str.isalpha, cell))
 
 
 def factor(key: str, name: str, unit: str | None, bases: Collection[str | None], more: str = "") -> float:

@@ -217,6 +217,55 @@ def test_what_looks_like_a_unit_in_a_name_is_understood_or_refused(tmp_path, loa
 
 
 @pytest.mark.parametrize(
+    ("head", "told"),
+    [
+        ("travel,load\nmillimetres,millinewtons", "travel in millimetres"),
+        ("travel,load\nMM,MN", "travel in MM"),
+        ("travel,load\nmil,dyn", "travel in mil"),
+        ("travel,load,T\nmil,dyn,°C", "travel in mil"),
+        ("travel,load,n\nmil,dyn", "travel in mil"),
+        ("travel,load,n\nmil", "travel in mil"),
+        ("travel [um],load [mN]\nmm,N", "travel in um and mm"),
+        ("travel [um],load [mN],n\nmm,N", "travel in um and mm"),
+        ("travel [um],load [mN]\nfirst,second", r"travel \[um\] in first"),
+    ],
+)
+def test_a_line_of_units_is_understood_or_refused(tmp_path, head, told):
+    path = tmp_path / "press.csv"
+    text = f"{head}\n1,2,7\n2,3,8\n" if head.split("\n")[0].count(",") == 2 else f"{head}\n1,2\n2,3\n"
+    refuses(rf"indentation: given {told}; .* factors=", pressed, path, text)
+    factors = {"indentation": 0.0254, "normal_force": 1e-5}
+    assert pressed(path, text, factors=factors) == pytest.approx((0.0254, 2e-5))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "depth,load,n\num,mN",
+        "depth,load,n\num,mN,,",
+        "# depth,load,n\n# um,mN",
+        "depth,load,n\nµm,mN,counts",
+        "depth [um],load,n\nμm,mN,",
+        "um,mN,counts\nDepth,Load,Gain",
+        "depth [um],load [mN],n\n[Data]",
+        "depth [um],load [mN],n\n# seen twice",
+    ],
+)
+def test_a_line_of_units_counts_for_the_cells_that_it_has(tmp_path, head):
+    found = pressed(tmp_path / "press.csv", f"{head}\n100,12,1\n200,31,1\n")
+    assert found == pytest.approx((0.1, 0.012), rel=1e-12)
+
+
+def test_a_title_above_the_names_is_none_where_these_are_called(tmp_path):
+    path, text = tmp_path / "press.csv", "Sample,Skin\nDepth,Load\n1,2\n2,3\n"
+    assert pressed(path, text, columns={"indentation": "Depth", "normal_force": "load"}) == (1.0, 2.0)
+    refuses("given sample in Depth", pressed, path, text)
+    refuses(
+        "given sample in Depth", pressed, path, text, columns={"indentation": "sample", "normal_force": 2}
+    )
+
+
+@pytest.mark.parametrize(
     ("rows", "right"),
     [
         ('depth,load\n1,"1,234"\n2,"2,000.5"\n', 1234.0),  # commas between columns: decimals have points
