@@ -158,7 +158,8 @@ class MeasuredCurve:
         file is in N, mm2 and mJ over it, as `Result.total` is, and what depends on it is divided by it,
         `sd` too.
         """
-        table = read_headed(Path(path), "data")
+        used = None if columns is None else {f"data.columns.{name}": one for name, one in columns.items()}
+        table = read_headed(Path(path), "data", used=used)
         wanted = dict(zip(table.names, table.names, strict=True)) if columns is None else dict(columns)
         over, *others = (name for name in wanted if name != "sd")
         problem = f"{Path(path).name} with the header {','.join(table.names)[:60]}"

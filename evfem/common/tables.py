@@ -5,10 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from evfem.common import units
 from evfem.common.arrays import Floats
 from evfem.common.foreign import BOOKS, cells_of
+from evfem.common.units import cells_in, decimal_comma, first_row, numbers_in, separator_of, trimmed
 from evfem.errors import InputError, describe_value, unknown
 
 #: endings of tables
@@ -26,9 +26,6 @@ TABLES = (".csv", *BOOKS)
 MOST_ROWS, MOST_BYTES = 1_000_000, 200_000_000
 #: bytes that are read of a file to know its header
 BEGINNING = 65_536
-#: a number whose digits stand in threes, with points and with commas
-BY_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?")
-BY_POINTS = re.compile(r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+(?:,\d*)?")
 
 
 def piecewise_linear(position: Floats, value: Floats, x: Any) -> Floats:
@@ -247,7 +244,7 @@ def read_columns(path: Path, header: Mapping[str, str], key: str) -> list[Floats
 
 def read_headed(
     path: Path, key: str, allowed: str = "columns of numbers below a header, in a text file, .xlsx or .mat",
-    gaps: bool = True,
+    gaps: bool = True, used: Mapping[str, int | str] | None = None,
 ) -> Headed:  # fmt: skip
     """Columns of a text file (or a workbook, or a file of MATLAB: `evfem.common.foreign`) as instruments
     write it: below a header, with commas, semicolons, tabs or blanks between them, units beside the names
@@ -256,7 +253,8 @@ def read_headed(
 
     The header is the last line above the numbers that has as many columns, with or without a # before
     it; other lines that begin with # or % are left out. Raises `InputError` with `key` for anything
-    else, and for missing numbers without `gaps`.
+    else, and for missing numbers without `gaps`. Where only some columns are `used` (key of a message: name
+    or number), others may hold anything, are NaN, and have no say in what a comma is.
     """
     lines = _lines(_text(path, key, allowed))
     first, parts = _header(lines)
@@ -266,17 +264,31 @@ def read_headed(
     rows = [(number, line) for number, line in lines[first:] if line[0] not in "#%"]
     if len(rows) > MOST_ROWS:
         raise InputError(key, f"{path.name} with more rows", f"at most {MOST_ROWS} rows")
-    separator, width, values = _separator(rows[0][1]), len(parts), []
-    comma = _decimal_comma([line for _, line in rows], separator)
-    for number, line in rows:
-        row = _numbers(_cells(line, separator), comma)
-        while len(row) > width and math.isnan(row[-1]):  # separators at the end of a line
-            row.pop()
-        if len(row) != width or not (gaps or all(map(math.isfinite, row))):
+    head = Headed(parts, [], False)
+    places = {head.index(*one) for one in used.items()} if used is not None else set(range(len(parts)))
+    return _filled(head, rows, sorted(places), gaps, path.name, key)
+
+
+def _filled(
+    head: Headed, rows: list[tuple[int, str]], places: list[int], gaps: bool, name: str, key: str
+) -> Headed:
+    """A table with the numbers of `rows` (number and text of a line) in the columns `places`."""
+    separator, width = separator_of(rows[0][1]), len(head.heads)
+    lines = [cells_in(line, separator) for _, line in rows]
+    lines = [cells if len(cells) <= width else cells[:width] + trimmed(cells[width:]) for cells in lines]
+    whole = [[cells[i] for i in places] if len(cells) == width else [] for cells in lines]
+    comma = decimal_comma([cell for cells in whole for cell in cells], separator)
+    columns = np.full((width, len(rows)), math.nan)
+    for j, cells in enumerate(whole):
+        row = numbers_in(cells, comma)
+        if not row or not (gaps or all(map(math.isfinite, row))):
             rule = f"{width} {'' if gaps else 'finite '}numbers on each line"
-            raise InputError(key, f"{path.name}, line {number}: {line[:60]!r}", rule)
-        values.append(row)
-    return Headed(parts, list(np.array(values).T), comma)
+            if len(places) < width:
+                which = " and ".join(str(i + 1) for i in places)
+                rule = f"{width} columns on each line, numbers in {which}"
+            raise InputError(key, f"{name}, line {rows[j][0]}: {rows[j][1][:60]!r}", rule)
+        columns[places, j] = row
+    return replace(head, columns=list(columns), commas=comma)
 
 
 def names_of(path: Path) -> list[str]:
@@ -295,14 +307,14 @@ def _lines(text: str) -> list[tuple[int, str]]:
 
 def _header(lines: list[tuple[int, str]]) -> tuple[int, list[units.Head]]:
     """Which line is the first one of numbers, and the heads of the columns above."""
-    first = next((i for i, (_, line) in enumerate(lines) if _holds_numbers(line)), None)
-    if first is None:
-        return len(lines), []
-    separator = _separator(lines[first][1])
-    row = _cells(lines[first][1], separator)
-    above = [_trimmed(_cells(one.lstrip("#% "), separator)) for _, one in lines[:first]]
+    first = first_row(lines)
+    if first == len(lines):
+        return first, []
+    separator = separator_of(lines[first][1])
+    row = cells_in(lines[first][1], separator)
+    above = [trimmed(cells_in(one.lstrip("#% "), separator)) for _, one in lines[:first]]
     widths = {len(cells) for cells in above}
-    width = next((one for one in (len(row), len(_trimmed(row))) if one in widths), None)
+    width = next((one for one in (len(row), len(trimmed(row))) if one in widths), None)
     heads = above if width is None else [cells for cells in above if len(cells) == width]
     parts = units.header(heads) or [units.Head(str(i), str(i), None) for i in range(1, len(row) + 1)]
     last = max((i for i, cells in enumerate(above) if len(cells) == width), default=first)
@@ -311,11 +323,6 @@ def _header(lines: list[tuple[int, str]]) -> tuple[int, list[units.Head]]:
         if sign and len(cells) < len(parts):
             parts = units.below(parts, cells)
     return first, parts
-
-
-def _trimmed(cells: list[str]) -> list[str]:
-    """Cells without the empty ones at the end, of separators there."""
-    return cells[: max((i for i, cell in enumerate(cells, 1) if cell), default=0)]
 
 
 def read_bytes(path: Path, key: str, allowed: str, most: int, limit: str) -> bytes:
@@ -328,12 +335,6 @@ def read_bytes(path: Path, key: str, allowed: str, most: int, limit: str) -> byt
     if len(data) > most:
         raise InputError(key, f"{path.name}, which is too long", limit)
     return data
-
-
-def _holds_numbers(line: str) -> bool:
-    cells = [] if line[0] in "#%" else _cells(line, _separator(line))
-    found = _numbers(cells, False) or _numbers(cells, True)
-    return len(found) > 1 and bool(np.isfinite(found).any())
 
 
 def _text(path: Path, key: str, allowed: str) -> str:
@@ -359,52 +360,6 @@ def is_even(x: Floats) -> bool:
     """Whether places are evenly spaced, to a tenth of a step, as they are when they were rounded."""
     step = (x[-1] - x[0]) / max(x.size - 1, 1)
     return bool(step > 0.0 and np.abs(x - np.linspace(x[0], x[-1], x.size)).max() <= 0.1 * step)
-
-
-def _separator(line: str) -> str | None:
-    return next((one for one in "\t;," if one in line), None)
-
-
-def _cells(line: str, separator: str | None) -> list[str]:
-    if separator is None:
-        return re.sub(r"\s+(?=[\[(])", "", line).split()
-    try:
-        (cells,) = csv.reader([line], delimiter=separator)
-    except (csv.Error, ValueError):  # a carriage return within, or nothing
-        cells = line.split(separator)
-    return [cell.strip() for cell in cells]
-
-
-def _numbers(cells: list[str], comma: bool) -> list[float]:
-    """Numbers of a line, with a decimal comma or point, NaN for gaps; none where one is something else."""
-    try:
-        values = [float(_pointed(cell, comma) or "nan") for cell in cells]
-    except ValueError:
-        return []
-    return [] if any(map(math.isinf, values)) else values
-
-
-def _pointed(cell: str, comma: bool) -> str:
-    """A number with a decimal point, and nothing between its thousands."""
-    if "," not in cell and not (comma and "." in cell):
-        return cell
-    if comma:
-        return (cell.replace(".", "") if BY_POINTS.fullmatch(cell) else cell).replace(",", ".")
-    return cell.replace(",", "") if BY_COMMAS.fullmatch(cell) else cell
-
-
-def _decimal_comma(lines: list[str], separator: str | None) -> bool:
-    """Whether the commas in numbers are decimal ones: not if all stand before three digits, and points are
-    decimal elsewhere, or commas between the columns.
-    """
-    if separator == ",":
-        lines = [line for line in lines if '"' in line]
-    elif not any("," in line for line in lines):
-        return False
-    cells = [cell for line in lines for cell in _cells(line, separator)]
-    commas = [cell for cell in cells if "," in cell]
-    points = separator == "," or any("." in cell and not BY_POINTS.fullmatch(cell) for cell in cells)
-    return bool(commas) and not (points and all(map(BY_COMMAS.fullmatch, commas)))
 
 
 def words_or_numbers(words: Iterable[str]) -> Any:

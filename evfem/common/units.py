@@ -1,7 +1,9 @@
-"""Units: what tables of others are in, and how a header says so."""
+"""Texts of others: the units they are in, how a header says so, and the numbers in their lines."""
 
 from __future__ import annotations
 
+import csv
+import math
 import re
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
@@ -65,6 +67,9 @@ WORD = re.compile(r"(?!x\s*\d)[^\W\d_].*")
 MIDDLE = re.compile(r"(?<=[_ /])(?:[µμunmkcM](?:m|V|N|Pa|Hz)2?|[mn]s|k?gf|lbf)(?=[_ /]).*")
 GAP = re.compile(r"\s+in\s+|\s*[/,:]\s*|_|\s+")
 SIGNED = re.compile(r"(.+?)\s*([/,:])\s*([^/,:]+)")
+#: a number whose digits stand in threes, with points and with commas
+BY_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?")
+BY_POINTS = re.compile(r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+(?:,\d*)?")
 
 
 def plain_unit(text: str | None) -> str | None:
@@ -196,3 +201,89 @@ def factor(key: str, name: str, unit: str | None, bases: Collection[str | None],
         return size
     rule = " | ".join(name for name, (base, _) in UNITS.items() if base in bases and name.isascii())
     raise InputError(key, f"{name} in {unit}", (rule or "no unit") + more)
+
+
+def first_row(lines: list[tuple[int, str]]) -> int:
+    """The first line of numbers: of one without a word, or else the last line, and those straight above it
+    that have numbers or gaps where it has numbers, two or more.
+    """
+    rows = [(i, line) for i, (_, line) in enumerate(lines) if line[0] not in "#%"]
+    pure = next((j for j, (_, line) in enumerate(rows) if _is_pure(line)), None)
+    j = len(rows) - 1 if pure is None else pure
+    last = _by_cell(rows[j][1]) if rows else []
+    sign = [i for i, found in enumerate(last) if any(map(math.isfinite, found))]
+    if len(sign) < 2:
+        return len(lines) if pure is None else rows[j][0]
+    while j > 0:
+        before = _by_cell(rows[j - 1][1])
+        finite = [i for i, found in enumerate(before) if any(map(math.isfinite, found))]
+        if len(before) != len(last) or len(finite) < 2 or not all(before[i] for i in sign):
+            break
+        j -= 1
+    return rows[j][0]
+
+
+def _by_cell(line: str) -> list[list[float]]:
+    """Of each cell of a line its number, NaN for a gap; nothing of a word."""
+    return [_either([cell]) for cell in cells_in(line, separator_of(line))]
+
+
+def _is_pure(line: str) -> bool:
+    """Whether there are numbers and gaps alone in a line, two or more and not all gaps."""
+    found = _either(cells_in(line, separator_of(line)))
+    return len(found) > 1 and any(map(math.isfinite, found))
+
+
+def _either(cells: list[str]) -> list[float]:
+    """Numbers with points or commas."""
+    return numbers_in(cells, False) or numbers_in(cells, True)
+
+
+def separator_of(line: str) -> str | None:
+    """What is between the cells, None for blanks."""
+    return next((one for one in "\t;," if one in line), None)
+
+
+def cells_in(line: str, separator: str | None) -> list[str]:
+    """The cells of a line, without quotes and blanks round them."""
+    if separator is None:
+        return re.sub(r"\s+(?=[\[(])", "", line).split()
+    try:
+        (cells,) = csv.reader([line], delimiter=separator)
+    except (csv.Error, ValueError):  # a carriage return within, or nothing
+        cells = line.split(separator)
+    return [cell.strip() for cell in cells]
+
+
+def trimmed(cells: list[str]) -> list[str]:
+    """Cells without the empty ones at the end, of separators there."""
+    return cells[: max((i for i, cell in enumerate(cells, 1) if cell), default=0)]
+
+
+def numbers_in(cells: list[str], comma: bool) -> list[float]:
+    """Numbers of a line, with a decimal comma or point, NaN for gaps; none where one is something else."""
+    try:
+        values = [float(_pointed(cell, comma) or "nan") for cell in cells]
+    except ValueError:
+        return []
+    return [] if any(map(math.isinf, values)) else values
+
+
+def _pointed(cell: str, comma: bool) -> str:
+    """A number with a decimal point, and nothing between its thousands."""
+    if "," not in cell and not (comma and "." in cell):
+        return cell
+    if comma:
+        return (cell.replace(".", "") if BY_POINTS.fullmatch(cell) else cell).replace(",", ".")
+    return cell.replace(",", "") if BY_COMMAS.fullmatch(cell) else cell
+
+
+def decimal_comma(cells: list[str], separator: str | None) -> bool:
+    """Whether the commas in numbers are decimal ones: not if all stand before three digits, and points are
+    decimal elsewhere, or commas between the columns.
+    """
+    commas = [cell for cell in cells if "," in cell]
+    if not commas:
+        return False
+    points = separator == "," or any("." in cell and not BY_POINTS.fullmatch(cell) for cell in cells)
+    return not (points and all(map(BY_COMMAS.fullmatch, commas)))

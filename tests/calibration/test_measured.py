@@ -279,6 +279,42 @@ def test_commas_between_thousands_are_no_decimal_commas(tmp_path, rows, right):
     assert pressed(tmp_path / "press.csv", rows)[1] == right
 
 
+@pytest.mark.parametrize("time", ["1.5", "1,5", "12:00:01", "1.234.567,5"])
+@pytest.mark.parametrize(("load", "right"), [("12,500", 12.5), ("12.500", 12.5), ("12,5", 12.5)])
+def test_columns_that_are_not_read_do_not_say_what_a_comma_is(tmp_path, time, load, right):
+    columns = {"indentation": 2, "normal_force": "Load"}
+    text = f"t;Depth;Load\n{time};1;{load}\n{time};2;{load}\n"
+    assert pressed(tmp_path / "press.csv", text, columns=columns) == (1.0, right)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ["2026-11-28 12:00;100;12;OK", "2026-11-28 12:01;200;31;OK"],
+        [";100;12;OK", "1;200;31;"],  # the second line has numbers alone
+        ["1;100;12;", "1;200;31;OK"],
+        ["inf;100;12;OK", "1;;13;OK", "inf;200;31;late"],
+    ],
+)
+def test_columns_that_are_not_read_may_hold_words(tmp_path, rows):
+    path, columns = tmp_path / "press.csv", {"indentation": "depth", "normal_force": "load"}
+    path.write_text("\n".join(["Press;7;of;9", "time;depth;load;state", "s;um;mN;", *rows]))
+    curve = MeasuredCurve.from_csv(path, columns=columns)
+    assert (curve.at, curve.values) == (pytest.approx([0.1, 0.2]), pytest.approx([0.012, 0.031]))
+    refuses(
+        "line [45]: .*; allowed: 4 columns on each line, numbers in 2 and 4",
+        MeasuredCurve.from_csv,
+        path,
+        columns=columns | {"normal_force": 4},
+    )
+
+
+def test_a_first_row_with_a_gap_is_no_header(tmp_path):
+    path = tmp_path / "press.csv"
+    path.write_text("indentation,normal_force\n0.1,\n0.2,3\n0.3,4\n")
+    assert MeasuredCurve.from_csv(path).at.tolist() == [0.2, 0.3]
+
+
 def test_of_two_columns_of_a_name_the_number_is_needed(tmp_path):
     path, text = tmp_path / "press.csv", "depth,load,load\n1,2,7\n2,3,8\n"
     columns = {"indentation": "depth", "normal_force": "load"}
