@@ -28,15 +28,20 @@ AREAS = ("contact_area", "real_contact_area")
 OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name]["unit"] for name in AREAS}}
 
 
-#: last word of a key of a scene file -> its unit
+#: last word of a key of a scene file, before a number in a list -> its unit
 KEY_UNITS = dict.fromkeys(("gap", "indentation", "thickness", "height", "width", "distance", "y"), "mm")
 KEY_UNITS |= {"voltage": "V", "amplitude": "V", "bias": "V", "E": "MPa", "mu": "MPa"}
 KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "Hz"}
 
 
 def unit_of(key: str, force: str = "N/mm") -> str:
-    """Unit of a dotted key of a scene file, "" for a number; `force` is that of forces."""
-    return (KEY_UNITS | {"force": force}).get(key.split(".")[-1].rsplit("_", 1)[-1], "")
+    """Unit of a dotted key of a scene file, or of a number in its list, "" for none; `force` is that of forces.
+
+    >>> [unit_of(key) for key in ("motion.0.gap", "electrostatics.insulator_thickness.0", "solver.steps")]
+    ['mm', 'mm', '']
+    """
+    word = next((part for part in reversed(key.split(".")) if not part.isdigit()), "")
+    return (KEY_UNITS | {"force": force}).get(word.rsplit("_", 1)[-1], "")
 
 
 def units_of(scene: Scene) -> Units:

@@ -311,7 +311,7 @@ def test_columns_that_are_not_read_may_hold_words(tmp_path, rows):
 
 def test_a_first_row_with_a_gap_is_no_header(tmp_path):
     path = tmp_path / "press.csv"
-    path.write_text("indentation,normal_force\n0.1,\n0.2,3\n0.3,4\n")
+    path.write_text("indentation,normal_force\n,2\n0.2,3\n0.3,4\n")
     assert MeasuredCurve.from_csv(path).at.tolist() == [0.2, 0.3]
 
 
@@ -350,6 +350,10 @@ def test_keys_and_outputs_of_a_file_have_units(tmp_path):
     assert values.where["motion.0.gap"] == [0.5, 0.25]
     assert values.values.tolist() == pytest.approx([2e-4, 1e-4])
     assert values.sd.tolist() == pytest.approx([1e-3, 1e-3])  # in the unit of what it belongs to
+    layers = "electrostatics.insulator_thickness.0 [um],electrostatic_force.last"  # one of a list
+    (tmp_path / "hover.csv").write_text(f"{layers}\n2,3\n")
+    layer = MeasuredValues.from_csv(tmp_path / "hover.csv").where["electrostatics.insulator_thickness.0"]
+    assert layer == pytest.approx([0.002], rel=1e-12)
     (tmp_path / "hover.csv").write_text("motion.0.gap [V],electrostatic_force.last\n2,3\n")
     refuses(
         r"data.motion.0.gap: given motion.0.gap in V; allowed: mm",
