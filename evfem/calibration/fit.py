@@ -25,7 +25,7 @@ import numpy as np
 import tomli_w
 
 from evfem.calibration.confidence import confidence
-from evfem.calibration.measured import Measured, MeasuredCurve, MeasuredValues, Question
+from evfem.calibration.measured import Measured, MeasuredCurve, MeasuredValues, Question, check_units
 from evfem.calibration.parameters import Given, Parameters, number_at
 from evfem.calibration.result import FitResult
 from evfem.calibration.runs import Runs, derivative_of
@@ -165,6 +165,8 @@ class _Problem:
         """Whether the scene can be read at start and bounds; `exact` are keys that have derivatives."""
         start = self.parameters.values(np.zeros(len(self.parameters.free)))
         scenes = [loads(self.text(keys, start), self.paths) for keys, _ in self.runs]
+        for measured in self.data:
+            check_units(measured, scenes[0])
         self.exact = []
         for key, one in self.parameters.free.items():
             for end in (one.low, one.high):

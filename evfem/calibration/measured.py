@@ -21,16 +21,25 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice, real, set_frozen
 from evfem.common.tables import numbers, read_headed, read_table
+from evfem.common.units import UNITS as KNOWN
 from evfem.common.units import factor, named_unit
 from evfem.errors import InputError, describe_value, readable, unknown
 from evfem.scene.keys import shown
 from evfem.scene.options import Solver
-from evfem.scene.scene import DEPTH
-from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, SPATIAL_UNITS, UNITS, no_column, over_depth
+from evfem.scene.scene import DEPTH, Scene
+from evfem.simulation.history import (
+    ROOM_COLUMNS,
+    SPATIAL,
+    SPATIAL_UNITS,
+    UNITS,
+    WHOLE_UNITS,
+    no_column,
+    over_depth,
+)
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
-from evfem.sweeps.table import unit_of
+from evfem.sweeps.table import unit_of, units_of
 
 NUMBERS = tuple(name for name in (*COLUMNS, *ROOM_COLUMNS, *SPATIAL) if name != "motion")
 #: most measured numbers of one kind
@@ -99,7 +108,8 @@ class MeasuredCurve:
     `values` (N,) of `column` where `over` is `at` (N,), growing or falling throughout: loading and
     unloading are a curve each; `motion` is the number of the motion (None: the whole run, in which
     `over` must grow or fall throughout, too). `where`: keys of the scene that this measurement sets,
-    `sd` the standard deviation of a value, one for all or (N,).
+    `sd` the standard deviation of a value, one for all or (N,). `units` are those of columns that a file
+    says to be N or N/mm, and the like, of which the scene has one.
 
     >>> force = MeasuredCurve("normal_force", over="indentation", at=[0.2, 0.4], values=[0.01, 0.03])
     >>> force.names
@@ -113,6 +123,7 @@ class MeasuredCurve:
     motion: int | None = None
     sd: float | Floats | Sequence[float] | None = None
     where: Mapping[str, Any] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, column in (("column", str(self.column)), ("over", str(self.over))):
@@ -172,17 +183,23 @@ class MeasuredCurve:
         for name in {over, *others} - {*NUMBERS}:
             raise no_column("data.columns", name, list(NUMBERS))
         sizes = _factors(factors, wanted)
-        found = []
+        found: list[Floats] = []
+        said: dict[str, str] = {}
         for name, of in zip((over, *others, "sd"), (over, *others, *others), strict=True):
             if name in wanted:  # per mm of depth, or in all
-                bases = UNITS.get(of), SPATIAL_UNITS.get(of)
-                more = f'; or factors={{"{name}": how many {bases[0] or bases[1] or 1} one of these is}}'
+                bases = (UNITS.get(of), SPATIAL_UNITS.get(of)) if depth is None else (_whole(of),) * 2
+                more = "" if depth is None else ", in all, as a depth is given"
+                more += f'; or factors={{"{name}": how many {bases[0] or bases[1] or 1} one of these is}}'
                 key = f"data.columns.{name}"
                 like = wanted[others[0]] if name == "sd" else None
                 size = sizes.get(name, None if like is None else sizes.get(others[0]))
                 found.append(table.column(key, wanted[name], bases, size, more, like))
+                unit = table.base(key, wanted[name]) if name == of and size is None else None
+                said |= {name: unit} if unit is not None and bases[0] != bases[1] else {}
         at, values, *spread = _branch(np.column_stack(found), branch).T
-        curve = cls(others[0], over, at - zero, values, motion, spread[0] if spread else sd, where or {})
+        curve = cls(
+            others[0], over, at - zero, values, motion, spread[0] if spread else sd, where or {}, said
+        )
         return curve if depth is None else curve._per_depth(DEPTH["check"]("data.depth", depth))
 
     def _per_depth(self, depth: float) -> MeasuredCurve:
@@ -190,7 +207,8 @@ class MeasuredCurve:
         columns = {"at": self.over, "values": self.column, "sd": self.column}
         arrays = {key: getattr(self, key) for key in columns if getattr(self, key) is not None}
         divided = {key: over_depth({columns[key]: array}, 1.0 / depth) for key, array in arrays.items()}
-        return replace(self, **{key: array[columns[key]] for key, array in divided.items()})
+        said = {name: UNITS[name] for name in (self.over, self.column) if _whole(name) != UNITS.get(name, "")}
+        return replace(self, **{key: array[columns[key]] for key, array in divided.items()}, units=said)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -213,7 +231,7 @@ class MeasuredValues:
     """One output of each of N runs, which differ in some keys of the scene.
 
     `output` is COLUMN.STATISTIC as in a sweep, `values` (N,) its measured values, `where` the keys
-    that differ, with N values each; `sd` the standard deviation, one for all or (N,).
+    that differ, with N values each; `sd` the standard deviation, one for all or (N,); `units` as above.
 
     >>> gaps = {"motion.0.gap": [0.25, 0.5]}
     >>> MeasuredValues("electrostatic_force.last", values=[4.1e-4, 2.0e-4], where=gaps).names
@@ -224,6 +242,7 @@ class MeasuredValues:
     values: Floats | Sequence[float]
     where: Mapping[str, Sequence[Any]]
     sd: float | Floats | Sequence[float] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not isinstance(self.where, Mapping) or not self.where:
@@ -240,10 +259,10 @@ class MeasuredValues:
         """The values in a file with the header `KEY,...,OUTPUT[,sd]`, keys as `motion.0.gap`, perhaps with
         units: `motion.0.gap [um]`.
         """
-        table = _without_units(read_table(Path(path), "data"))
+        table, said = _without_units(read_table(Path(path), "data"))
         spread = sd if "sd" not in table else table.pop("sd")
         *keys, last = table
-        return cls(last, table[last], {key: table[key] for key in keys}, spread)
+        return cls(last, table[last], {key: table[key] for key in keys}, spread, said)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -304,11 +323,29 @@ def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Float
     return {"values": found, "sd": np.broadcast_to(spread, count).copy()}
 
 
-def _without_units(table: Mapping[str, Any]) -> dict[str, Any]:
+def check_units(one: Measured, scene: Scene) -> None:
+    """InputError for a measurement whose file says N where the `scene` has N/mm, or the other way round."""
+    space = units_of(scene) is SPATIAL_UNITS
+    for name, unit in one.units.items():
+        columns = SPATIAL_UNITS if space else UNITS
+        own = columns.get(name.split(".")[0]) or unit_of(name, "N" if space else "N/mm")
+        if unit != own:
+            kind = "in three dimensions" if space else "in the plane"
+            over = f"{own}, or `depth`, the mm that it was measured over, in MeasuredCurve.from_csv"
+            raise InputError(f"data.{name}", f"{unit} for a finger {kind}", own if space else over)
+
+
+def _whole(column: str) -> str | None:
+    """Unit of a column over a whole depth."""
+    return WHOLE_UNITS.get(column, SPATIAL_UNITS.get(column))
+
+
+def _without_units(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
     """Columns of a table of runs without the units beside their names, in those of scenes and histories; a
-    deviation is in the unit of the column before it.
+    deviation is in the unit of the column before it. And units of those that differ with the scene.
     """
     found: dict[str, Any] = {}
+    said: dict[str, str] = {}
     size, bases = 1.0, set[str | None]()
     for cell, values in table.items():
         name, unit = named_unit(cell)
@@ -317,12 +354,14 @@ def _without_units(table: Mapping[str, Any]) -> dict[str, Any]:
             bases = {unit_of(name), unit_of(name, "N"), UNITS.get(column), SPATIAL_UNITS.get(column)}
         if name != "sd" or unit is not None:
             size = factor(f"data.{name}", name, unit, bases)
+        if name != "sd" and unit is not None and unit in KNOWN and len(bases - {None, ""}) > 1:
+            said[name] = KNOWN[unit][0]
         if size != 1.0 and isinstance(values, list):
             raise InputError(
                 f"data.{name}", f"{describe_value(values)} in {unit or 'a unit'}", "a number in each row"
             )
         found[name] = values if size == 1.0 else values * size
-    return found
+    return found, said
 
 
 def _factors(factors: Mapping[str, float] | None, wanted: Collection[str]) -> dict[str, float]:

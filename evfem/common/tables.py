@@ -218,6 +218,11 @@ class Headed:
         size = units.factor(key, name, unit, bases, more) if factor is None else factor
         return self.columns[i] if size == 1.0 else self.columns[i] * size
 
+    def base(self, key: str, entry: int | str) -> str | None:
+        """The unit that a column, whose own is known, is given in."""
+        unit = self._called(self.index(key, entry), entry)[1]
+        return units.UNITS.get(unit or "", (None,))[0]
+
     def _called(self, i: int, entry: int | str) -> tuple[str, str | None]:
         """Name and unit of a column; below another text a cell is a name where it is called by it."""
         cell, name, unit, above = self.heads[i]

@@ -35,7 +35,7 @@ KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "
 
 
 def unit_of(key: str, force: str = "N/mm") -> str:
-    """Unit of a dotted key of a scene file, or of a number in its list, "" for none; `force` is that of forces.
+    """Unit of a dotted key of a scene file, or of a number in its list, "" for none; `force` that of forces.
 
     >>> [unit_of(key) for key in ("motion.0.gap", "electrostatics.insulator_thickness.0", "solver.steps")]
     ['mm', 'mm', '']
