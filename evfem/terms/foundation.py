@@ -349,7 +349,7 @@ class ElasticFoundation(Rigid):
     def _made(self, position: Floats, near: Any) -> Yielding:
         length = self.pad.tributary(position)
         over = np.flatnonzero((length > 0.0) & near)
-        below = strips_below(self.pad, position, over, np.maximum(length[over], self.least))
+        below = strips_below(self.pad, position, self.rest, over, self.least)
         x, size, dim = below.places, below.sizes, position.shape[1]
         found = np.asarray(self.elastic.compliance(x, size)), *slopes(self.elastic, x, size)
         compliance, *slope = (by_nodes(below.below_nodes(each), dim) for each in found)
