@@ -95,3 +95,17 @@ def test_a_finger_that_just_touches_is_loose():
     for force, loose in ((0.0, True), (1e-17, True), (-1e-17, True), (1e-8, False)):
         going.rows = [row | {"normal_force": force}]
         assert going.start_of(1)["loose"] == loose
+
+
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
+def test_a_bone_that_stops_has_no_speed_left_of_the_part_before():
+    """Backward differences of second order would give it r/(1 + r) of the speed before, backwards."""
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    motion = [ev.Press(indentation=0.3, steps=4, speed=10.0), ev.Wait(duration=0.03, steps=3)]
+    at_speed = ev.Scene(pad, ev.Flat(), motion=motion, solver=ev.Solver(dynamics="inertial"))
+    going, speeds = Run(at_speed, None), []
+    bone = going.model.mesh.node_sets["bone"][0]
+    for request in going.requests():
+        going.advance(request)
+        speeds.append(float(going.state.memory["velocity"][bone, 1]))
+    assert speeds == pytest.approx([-10.0] * 4 + [0.0] * 3, abs=1e-9)
