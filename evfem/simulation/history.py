@@ -40,7 +40,7 @@ def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> d
     return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE_OF.get(unit, unit), "traits": traits}
 
 
-#: words that people try -> the column that they mean
+#: words that people try -> the column that they mean, the first that is there
 MEANT = {
     "friction": "tangential_force",
     "friction_force": "tangential_force",
@@ -51,7 +51,7 @@ MEANT = {
     "attraction": "electrostatic_force",
     "electric_force": "electrostatic_force",
     "pressure": "peak_contact_pressure",
-    "area": "contact_width",
+    "area": "contact_area contact_width",
     "depth": "indentation",
     "displacement": "position",
     "x": "position",
@@ -65,8 +65,8 @@ def no_column(key: str, name: Any, columns: Sequence[str]) -> InputError:
     Traceback (most recent call last):
     evfem.errors.InputError: column: given "friction", no column; allowed: tangential_force? (docs, Notation)
     """
-    meant = MEANT.get(str(name).lower())
-    close = [meant] if meant in columns else closest_name(str(name), columns)
+    meant = MEANT.get(str(name).lower(), "").split()
+    close = [one for one in meant if one in columns] or closest_name(str(name), columns)
     known = f"{close[0]}? (docs, Notation)" if close else f"{', '.join(columns)}"
     return InputError(key, f"{readable(name)}, no column", known)
 

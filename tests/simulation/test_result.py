@@ -14,7 +14,7 @@ from tools.refusals import refuses
 
 import evfem as ev
 from evfem.errors import InputError, StorageError
-from evfem.simulation.history import MEANINGS, ROOM_COLUMNS, csv_header, csv_line, read_rows
+from evfem.simulation.history import MEANINGS, ROOM_COLUMNS, csv_header, csv_line, no_column, read_rows
 from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, Result, load
 
 #: the promised columns, and their order in history.csv
@@ -182,6 +182,8 @@ def test_a_column_is_found_by_its_name_and_a_misspelt_one_is_guessed():
     for given, meant in {"normal_forse": "normal_force", "friction": "tangential_force"}.items():
         with pytest.raises(InputError, match=f'column: given "{given}", no column; allowed: {meant}\\?'):
             result[given]
+    # a fingertip has areas, and widths that stay empty
+    assert str(no_column("column", "area", ["contact_width", "contact_area"])).count("allowed: contact_area?")
     with pytest.raises(InputError, match="allowed: step, motion_index, motion"):
         result["qqq"]
 
