@@ -7,6 +7,7 @@ those of the paper on modelling and validating electrovibration displays that th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -142,6 +143,113 @@ def pad_force_per_depth(
     t, weight = _near_pole(near, np.full_like(near, np.pi / 2.0))
     traction = law.traction(gap + height * np.sin(0.5 * t) ** 2, voltage, Layers(reduced, thickness))
     return to_python(np.sum(width * weight * np.cos(t) * traction, axis=-1))
+
+
+_PANELS = 0.5 * 0.25 ** np.arange(11)  # shares of a piece towards each of its ends
+
+
+def _graded(start: float, end: float) -> tuple[Values, Values]:
+    """Gauss points and weights on [start, end], in panels that shrink fourfold towards both ends."""
+    edges = np.concatenate([[0.0], _PANELS[::-1], 1.0 - _PANELS[1:], [1.0]])
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    half = 0.5 * np.diff(edges)[:, None]
+    at = (edges[:-1, None] + half * (nodes + 1.0)).ravel()
+    return start + (end - start) * at, (end - start) * (half * weights).ravel()
+
+
+@dataclass(frozen=True)
+class _Superellipsoid:
+    """abs(x/a)^n + abs(y/b)^n + abs(z/c)^n = 1 with semi-axes `semi` in mm; `up`: the vertical in its axes.
+
+    Its points are v = d / |d|_n in units of the semi-axes, d a unit vector at a `turn` around x from y to z
+    and a `latitude` from the plane y, z: what is seen from below lies between two turns. An area of the unit
+    sphere belongs to the area vector a b c / (n a_i) dF/dv_i |d|_n^-3, as F = |v|_n^n is homogeneous.
+    """
+
+    semi: Values
+    up: Values
+    n: float
+
+    @property
+    def lowest(self) -> float:
+        """Height in mm of the centre above the lowest point: the dual norm of the vertical."""
+        power = self.n / (self.n - 1.0)
+        return float(np.sum((self.semi * np.abs(self.up)) ** power) ** (1.0 / power))
+
+    def turns(self) -> Values:
+        """Turns from silhouette to silhouette, with those of the lowest point and of the axes between."""
+        root = 1.0 / (self.n - 1.0)
+        (_, b, c), (_, y, z) = self.semi, self.up
+        start = np.arctan2((y / b) ** root, -np.sign(z) * abs(z / c) ** root)
+        lowest = np.arctan2(-np.sign(z) * abs(c * z) ** root, -((b * y) ** root))
+        special = np.concatenate([[lowest], 0.5 * np.pi * np.arange(4)])
+        inside = start + np.mod(special - start, 2.0 * np.pi)
+        return np.unique(np.round([start, *inside[inside < start + np.pi], start + np.pi], 12))
+
+    def columns(self, start: float, end: float) -> tuple[Values, Values]:
+        """Heights in mm above the lowest point and areas seen from below, in mm^2, between two turns."""
+        (turn, share), (latitude, weight) = _graded(start, end), _graded(0.0, 0.5 * np.pi)
+        across = np.broadcast_to(np.sin(latitude), (len(turn), len(latitude)))
+        d = np.stack([across, *(np.outer(one, np.cos(latitude)) for one in (np.cos(turn), np.sin(turn)))])
+        size = np.sum(np.abs(d) ** self.n, axis=0) ** (1.0 / self.n)
+        outward = np.sign(d) * np.abs(d / size) ** (self.n - 1.0)
+        sphere = 2.0 * np.outer(share, weight * np.cos(latitude)) / size**3  # both signs of x
+        area = -np.tensordot(self.up * np.prod(self.semi) / self.semi, outward, 1) * sphere
+        height = self.lowest + np.tensordot(self.up * self.semi, d / size, 1)
+        return np.maximum(height, 0.0), area
+
+
+def outline_force(
+    law: ForceLaw,
+    width: Values,
+    height: Values,
+    length: Values,
+    gap: Values,
+    voltage: Values,
+    layers: Layers,
+    outline: Values = 2.0,
+    tilt: Values = 0.0,
+) -> Values:
+    """Force in N on a whole superellipsoid whose lowest point is `gap` mm above the display, 1e-8 relative.
+
+    The finger is abs(x/a)^n + abs(y/b)^n + abs(z/c)^n = 1 with n = `outline`, 2 to 4, and the FULL axes
+    `width` 2a, `height` 2b, `length` 2c in mm; its z axis is turned by `tilt` degrees from the display. Each
+    vertical column below it has the traction of `law` at its own gap. All arguments broadcast.
+
+    >>> from evfem.electrostatics.laws import StrongTroxel
+    >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+    >>> round(1e3 * outline_force(StrongTroxel(), 16.68, 12.789, 22.56, 0.25, 2000.0, layers), 3)  # mN, HVLD
+    5.093
+    """
+    axes = [above(f"pad {key}", value, 0.0, "a length in mm above zero")
+            for key, value in (("width", width), ("height", height), ("length", length))]  # fmt: skip
+    gap = at_least("gap", gap, 0.0, "an air gap in mm, not negative")
+    _pole_distance(gap, axes[1], layers)
+    outline = _between("outline", outline, 2.0, 4.0, "an exponent from 2 (an ellipse) to 4")
+    tilt = _between("tilt", tilt, -89.0, 89.0, "an angle in degrees from -89 to 89")
+    given = np.broadcast_arrays(*axes, gap, voltage, layers.reduced, layers.thickness, outline, tilt)
+    found = np.empty(given[0].shape)
+    for at in np.ndindex(found.shape):
+        a, b, c, lowest, volts, reduced, thickness, n, degrees = (float(one[at]) for one in given)
+        turned = np.radians(degrees)
+        body = _Superellipsoid(0.5 * np.array([a, b, c]), np.array([0.0, np.cos(turned), np.sin(turned)]), n)
+        found[at] = _body_force(law, body, lowest, volts, Layers(reduced, thickness))
+    return to_python(found)
+
+
+def _between(key: str, entered: Values, lowest: float, highest: float, allowed: str) -> Values:
+    value = at_least(key, entered, lowest, allowed)
+    if np.any(value > highest):
+        raise InputError(key, float(np.max(value)), allowed)
+    return value
+
+
+def _body_force(law: ForceLaw, body: _Superellipsoid, lowest: float, voltage: float, layers: Layers) -> float:
+    total = 0.0
+    for start, end in pairwise(body.turns()):
+        heights, areas = body.columns(start, end)
+        total += float(np.sum(law.traction(lowest + heights, voltage, layers) * areas))
+    return total
 
 
 def _threshold_weights(

@@ -5,11 +5,13 @@ import warnings
 import numpy as np
 import pytest
 from scipy.integrate import IntegrationWarning, quad
+from scipy.special import beta
 from tools.refusals import refuses
 
 from evfem.electrostatics.forces import (
     EllipsoidalPad,
     effective_thickness_from_thresholds,
+    outline_force,
     pad_force,
     pad_force_per_depth,
     plate_force,
@@ -139,3 +141,79 @@ def test_impossible_input_is_refused_with_a_sentence():
     refuses("'rectangle' or 'ellipse'", pad_force, Kaczmarek(), PAD, 0.1, 1e3, TABLE_2, over="circle")
     refuses("pad height", EllipsoidalPad, 10.0, 0.0, 20.0)
     refuses("area", plate_force, Kaczmarek(), -1.0, 0.0, 1e3, TABLE_2)
+
+
+class Unit:
+    """A law whose force is the area seen from below."""
+
+    def traction(self, gap, voltage, layers):
+        return np.ones_like(gap)
+
+
+@pytest.mark.parametrize("n", [2.0, 2.5, 3.0, 4.0])
+@pytest.mark.parametrize("gap", [0.001, 0.25])
+def test_a_superellipsoid_is_its_generalised_polar_quadrature(n, gap):
+    """x = a sin^(2/n) t cos^(2/n) u, z likewise: the angle u gives a beta function."""
+    law, (a, b, c) = StrongTroxel(), (8.34, 6.39, 11.28)
+
+    def ring(t):
+        height = b * -np.expm1(2.0 / n * np.log(np.cos(t)))
+        return law.traction(gap + height, 2000.0, TABLE_2) * np.sin(t) ** (4.0 / n - 1.0) * np.cos(t)
+
+    points = [0.01, 0.1, 0.5]
+    found, _ = quad(ring, 0.0, np.pi / 2.0, epsabs=0.0, epsrel=1e-11, limit=500, points=points)
+    exact = 8.0 / n**2 * a * c * beta(1.0 / n, 1.0 / n) * found
+    force = outline_force(law, 2 * a, 2 * b, 2 * c, gap, 2000.0, TABLE_2, outline=n)
+    assert force == pytest.approx(exact, rel=2e-8)
+
+
+def test_what_is_seen_of_a_tilted_ellipsoid_is_an_ellipse():
+    tilt = np.array([-60.0, 0.0, 30.0, 89.0])
+    sine, cosine = np.sin(np.radians(tilt)), np.cos(np.radians(tilt))
+    exact = np.pi * 8.0 * np.hypot(6.0 * sine, 11.0 * cosine)
+    found = outline_force(Unit(), 16.0, 12.0, 22.0, 0.1, 1.0, TABLE_2, tilt=tilt)
+    assert found == pytest.approx(exact, rel=1e-10)
+
+
+def heights(x, z, semi, n, tilt):
+    """Lower side of a tilted superellipsoid over a grid, by bisection; NaN beside it."""
+    up, along = (np.array([np.cos(tilt), np.sin(tilt)]), np.array([-np.sin(tilt), np.cos(tilt)]))
+
+    def outside(height):
+        place = (x, *(height * up[i] + z * along[i] for i in (0, 1)))
+        return sum(np.abs(one / axis) ** n for one, axis in zip(place, semi, strict=True)) - 1.0
+
+    low, high = np.full_like(x, -15.0), np.full_like(x, 15.0)
+    for _ in range(60):  # the function is convex: its least value by golden section
+        left, right = high - 0.618 * (high - low), low + 0.618 * (high - low)
+        less = outside(left) < outside(right)
+        low, high = np.where(less, low, left), np.where(less, right, high)
+    inside, above, below = outside(low) < 0.0, low, np.full_like(x, -15.0)
+    for _ in range(60):
+        half = 0.5 * (above + below)
+        above, below = (
+            np.where((outside(half) < 0.0) == hit, half, old) for hit, old in ((True, above), (False, below))
+        )
+    return np.where(inside, above, np.nan)
+
+
+@pytest.mark.parametrize("n", [2.0, 2.7, 4.0])
+def test_a_tilted_superellipsoid_is_its_columns_one_by_one(n):
+    step = 0.05
+    x, z = np.meshgrid(np.arange(0.5, 160) * step, np.arange(-249.5, 250) * step, indexing="ij")
+    found = heights(x, z, (8.0, 6.0, 11.0), n, np.radians(30.0))
+    found = found[~np.isnan(found)]
+    column = StrongTroxel().traction(0.4 + found - found.min(), 1000.0, TABLE_2)
+    force = outline_force(StrongTroxel(), 16.0, 12.0, 22.0, 0.4, 1000.0, TABLE_2, n, 30.0)
+    assert force == pytest.approx(2.0 * step**2 * np.sum(column), rel=1e-3)
+
+
+def test_a_sphere_does_not_see_its_tilt():
+    forces = outline_force(StrongTroxel(), 12.0, 12.0, 12.0, 0.1, 100.0, TABLE_2, tilt=[0.0, 37.0])
+    assert forces[1] == pytest.approx(forces[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("key", "value"), [("outline", 1.5), ("outline", 4.5), ("tilt", 90.0)])
+def test_an_outline_or_a_tilt_out_of_range_is_refused(key, value):
+    pad = (16.0, 12.0, 22.0, 0.1, 1.0, TABLE_2)
+    refuses(f"{key}: given {value}", outline_force, StrongTroxel(), *pad, **{key: value})
