@@ -17,7 +17,7 @@ import evfem as ev
 from evfem import data
 
 from .common import CASES, Series, Study, by_participant, median_interval, paper_display, participants
-from .measured import comparison, participant_forces
+from .hovering_people import comparison, participant_forces
 from .plots import COLOURS, LABELS, Figure, draw_box, new_figure
 from .printed import CUT, Printed
 

@@ -15,7 +15,7 @@ from evfem.electrostatics.forces import EllipsoidalPad, pad_force
 
 from . import hover
 from .common import CASES, LAWS, Study, participants, table2_layers
-from .measured import INCLINATION
+from .hovering_people import INCLINATION
 from .printed import CUT, Printed
 
 PAD = EllipsoidalPad(16.70, 12.80, 22.5)

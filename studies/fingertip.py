@@ -32,7 +32,7 @@ from evfem.surface.skin import Skin, make_skin
 
 from .common import CASES, LAWS, Series, Study, area_law, by_participant, participants, tissue
 from .fingertip_panels import draw
-from .measured import participant_forces
+from .hovering_people import participant_forces
 
 LOADS, QUICK_LOADS = (0.05, 0.1, 0.25, 0.5, 1.0), (0.1, 0.5)
 #: where pads and meshes are compared (N), and the way of ridged ones there: what may touch within a

@@ -39,7 +39,7 @@ from evfem.field.rigid import rigid_field
 from evfem.simulation.model import Model, make_model
 
 from .common import CASES, Series, Study, participants
-from .measured import participant_forces
+from .hovering_people import participant_forces
 from .plots import COLOURS, Figure, panels
 
 PITCH, HEIGHT = 0.5, 0.15

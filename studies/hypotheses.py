@@ -23,7 +23,7 @@ from evfem.electrostatics.forces import pad_force
 from evfem.electrostatics.laws import StrongTroxel, eps_0
 
 from .common import CASES, Study, by_participant, participants, table2_layers
-from .measured import participant_forces, participant_pads
+from .hovering_people import participant_forces, participant_pads
 from .plots import COLOURS, Figure, draw_box, note, panels
 
 #: field (V/mm) at which air breaks down over millimetres, and with it the charge on a face in the open

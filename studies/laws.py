@@ -21,7 +21,7 @@ from evfem.electrostatics.laws import Layer, eps_0
 from evfem.reference import cylinder_force
 
 from .common import CASES, LAWS, Series, Study, by_participant, paper_display, participants, table2_layers
-from .measured import comparison, participant_forces
+from .hovering_people import comparison, participant_forces
 from .plots import COLOURS, LABELS, Figure, draw_box, law_line, note, panels
 
 VOLTAGE, GAP, RADIUS = 2000.0, 0.25, 8.34

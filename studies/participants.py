@@ -19,7 +19,7 @@ import evfem as ev
 from evfem.electrostatics.forces import pad_force, pad_force_per_depth
 
 from .common import CASES, LAWS, Floats, Study, by_participant, paper_display, participants, table2_layers
-from .measured import participant_forces, participant_pads
+from .hovering_people import participant_forces, participant_pads
 from .plots import COLOURS, LABELS, Figure, panels
 
 ASSUMPTIONS = {

@@ -13,7 +13,7 @@ from evfem import data, studies
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.errors import InputError, StorageError
 from evfem.reference import cylinder_force
-from evfem.studies import common, fingertip, fringe, laws, measured, plots
+from evfem.studies import common, fingertip, fringe, hovering_people, laws, plots
 from evfem.surface.skin import make_skin
 
 CASES = ("HVHD", "HVLD", "LVLD")
@@ -143,7 +143,7 @@ def test_frequency_has_the_printed_pressures_and_the_ratio_of_the_waveforms(numb
 def test_hypotheses_bring_the_law_down_to_the_measured_median(numbers_of):
     """The lifts by case, back in the law: medians of measured over computed force are (1 - share)^2."""
     numbers = numbers_of("hypotheses")
-    forces = measured.participant_forces()
+    forces = hovering_people.participant_forces()
     for case, volts in zip(CASES, (2000.0, 2000.0, 1414.0), strict=True):
         share = numbers[f"lift.median_V.{case}"] / volts
         ratio = np.median(common.participants()[case] / forces["strong_troxel", case])

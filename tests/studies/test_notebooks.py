@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evfem.studies.measured import participant_forces
+from evfem.studies.hovering_people import participant_forces
 
 NOTEBOOKS = Path(__file__).parents[2] / "studies" / "notebooks"
 NAMES = (

@@ -5,7 +5,7 @@ import pytest
 
 from evfem.scene import file as scenefile
 from evfem.simulation.run import simulate
-from evfem.studies import common, measured, uncertainty
+from evfem.studies import common, hovering_people, uncertainty
 from evfem.studies import participants as people
 
 pytestmark = pytest.mark.slow
@@ -68,7 +68,7 @@ def test_samples_without_spread_are_fig05():
     }  # fmt: skip
     assert set(exact) == set(uncertainty.INPUTS)
     drawn = {name: np.array([value]) for name, value in exact.items()}
-    for (law, case), expected in measured.participant_forces().items():
+    for (law, case), expected in hovering_people.participant_forces().items():
         np.testing.assert_allclose(uncertainty.forces(drawn, law, case)[0], expected, rtol=1e-12)
 
 
