@@ -36,8 +36,8 @@ _NAMES = {
     "electrostatics.dielectrics": ("Dielectric", "DielectricTable"),
     "electrostatics.laws": ("FILM", "Kaczmarek", "Layer", "Layers", "StrongTroxel", "TOUCHSCREEN", "eps_0"),
     "electrostatics.roughness": ("ConstantRoughness", "ExponentialRoughness", "PowerRoughness"),
-    "electrostatics.signalfile": ("Playback", "read_signal", "write_signal"),
-    "electrostatics.signals": ("Amplifier", "FollowForce", "VoltageProfile"),
+    "circuit.signalfile": ("Playback", "read_signal", "write_signal"),
+    "circuit.signals": ("Amplifier", "FollowForce", "VoltageProfile"),
     "electrostatics.drive": ("Drive",),
     "electrostatics.timesignals": ("Carrier", "ChargeControl", "OpenCircuit", "Sampled", "Sine", "Square"),
     "errors": ("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
@@ -78,7 +78,7 @@ _NAMES = {
 #: public modules -> where they are
 _MODULES = {
     "electrostatics": "electrostatics",
-    "encoding": "electrostatics.encoding",
+    "encoding": "circuit.encoding",
     "export": "export",
     "fieldfiles": "fieldfiles",
     "forces": "electrostatics.forces",
@@ -90,7 +90,7 @@ _MODULES = {
     "rendering": "estimate.rendering",
     "result": "simulation.result",
     "scenefile": "scene.file",
-    "signals": "electrostatics.signals",
+    "signals": "circuit.signals",
     "surfaces": "surface.surfaces",
     "tensor": "tensor",
 }
@@ -135,7 +135,7 @@ class _Moved:
             raise ModuleNotFoundError(f"{own}: {_GONE[own]}")
         with open(f"{__path__[0]}/data/moved.csv", encoding="utf-8") as file:
             if place := dict(line.strip().split(",") for line in file).get(name):
-                raise ModuleNotFoundError(f"{name} has moved in 0.3; its new place: {place}")
+                raise ModuleNotFoundError(f"{name} has moved since 0.2; its new place: {place}")
 
 
 _sys.meta_path.append(_Moved)

@@ -406,8 +406,8 @@ def _mesh(options: argparse.Namespace) -> None:
 
 
 def _signal(options: argparse.Namespace) -> None:
+    from evfem.circuit.signalfile import Playback, read_signal, write_signal
     from evfem.common.views import plus
-    from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
 
     playback = None
     if options.full_scale is not None:

@@ -101,7 +101,7 @@ def _archive(path: Path) -> Found:
 
 
 def _signal(path: Path) -> Found:
-    from evfem.electrostatics.signalfile import read_voltage
+    from evfem.circuit.signalfile import read_voltage
     from evfem.sweeps import table
 
     if table.is_table(path):

@@ -16,12 +16,12 @@ import numpy as np
 
 import evfem as ev
 from evfem import data
+from evfem.circuit.encoding import AreaLaw
 from evfem.common.arrays import Floats
 from evfem.common.notices import LOG
 from evfem.common.pools import processes
 from evfem.common.storage import disk, replacing, write_text
 from evfem.common.tables import csv_text
-from evfem.electrostatics.encoding import AreaLaw
 from evfem.finger.layers import TABLE_2
 from evfem.simulation.provenance import origin
 

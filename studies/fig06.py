@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from evfem import data
-from evfem.electrostatics.encoding import AreaLaw, Encoding, fit_area_to_friction
+from evfem.circuit.encoding import AreaLaw, Encoding, fit_area_to_friction
 
 from .common import LAWS, Series, Study, area_law, table2_layers
 from .plots import COLOURS, LABELS, Figure, law_line, not_shown, panels

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.encoding import PowerFit, fit_power
 from evfem.common.arrays import Floats
-from evfem.electrostatics.encoding import PowerFit, fit_power
 
 from . import fig11_panels
 from .common import LAWS, Series, Study, area_law, table2_layers

@@ -8,8 +8,8 @@ import warnings
 from dataclasses import dataclass, field, replace
 
 import evfem as ev
+from evfem.circuit.encoding import AreaLaw, Encoding
 from evfem.common.arrays import Floats
-from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.estimate import rendering
 
 from .common import table2_layers

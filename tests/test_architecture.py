@@ -52,10 +52,10 @@ ROOMS = {
         "outline lattice layers sizes scan section fingerpad blocks fingerprint solid fingertip",
     ),
     "electrostatics": (
-        {"numpy", "scipy", "PIL"},
-        "laws dielectrics relaxation alternating roughness forces signals wav timesignals drive encoding "
-        "signalfile",
+        {"numpy", "scipy"},
+        "laws dielectrics relaxation alternating roughness forces wav timesignals drive",
     ),
+    "circuit": ({"numpy", "scipy", "PIL"}, "signals encoding signalfile"),
     "field": (
         {"numpy", "scipy", "skfem"},
         "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",

@@ -1,4 +1,4 @@
-"""Electrostatic attraction and voltage signals: force laws, dielectrics, closed forms, encoding, files.
+"""Electrostatic attraction: force laws, dielectrics, closed forms of plates and fingers, voltages in time.
 
 The full field of rigid bodies is loaded when it is first asked for: the closed forms need numpy alone.
 """

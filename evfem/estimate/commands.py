@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.signalfile import write_signal
 from evfem.common.checks import keys_of
 from evfem.common.notices import status, tell
 from evfem.common.storage import write_text
-from evfem.electrostatics.signalfile import write_signal
 from evfem.errors import ABSENT, InputError, describe_value
 from evfem.estimate.display import LOST, Device, Rendering, exact_voltage, playback, render, render_exact
 from evfem.estimate.estimate import estimate, known_error

@@ -21,14 +21,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from evfem.circuit.encoding import AreaLaw, Encoding, share_not_renderable
+from evfem.circuit.signalfile import Playback
+from evfem.circuit.signals import Amplifier, VoltageProfile
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, among, between, one_of
 from evfem.electrostatics.drive import Drive
-from evfem.electrostatics.encoding import AreaLaw, Encoding, share_not_renderable
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
 from evfem.electrostatics.roughness import WIDEST
-from evfem.electrostatics.signalfile import Playback
-from evfem.electrostatics.signals import Amplifier, VoltageProfile
 from evfem.estimate import rendering
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of
 from evfem.planning.attracted import broken_down, touching

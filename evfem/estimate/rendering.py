@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.encoding import Encoding, share_not_renderable
+from evfem.circuit.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.common.views import plus
 from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.drive import Drive
-from evfem.electrostatics.encoding import Encoding, share_not_renderable
-from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.errors import InputError, describe_value
 from evfem.protocols import ForceLaw, Observer, RoughnessLaw, Surface
 from evfem.scene.motion import Press
@@ -159,7 +159,7 @@ def voltage_for(
     `amplifier` limits the profile (its slew needs `speed` in mm/s).
 
     >>> from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
-    >>> from evfem.electrostatics.encoding import AreaLaw
+    >>> from evfem.circuit.encoding import AreaLaw
     >>> layers = Layers.of(Layer(0.20, 1650.0), Layer(0.09, 3.35))
     >>> display = Encoding(Kaczmarek(), layers, AreaLaw(112.0), friction=0.5)
     >>> felt = ApparentFriction([0.0, 2.5, 10.0], [0.05, 0.05, 0.05], [0.025, 0.03, 0.03])

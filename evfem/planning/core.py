@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.signals import FollowForce
 from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import traction_derivative
 from evfem.electrostatics.roughness import Cored, roughness_of
-from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import path_depth
 from evfem.scene.electrics import Electrics

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.signals import FollowForce, VoltageProfile
 from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import StrongTroxel
 from evfem.electrostatics.roughness import WIDEST
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
 from evfem.protocols import RoughnessLaw, TimeSignal
 from evfem.scene.scene import Scene

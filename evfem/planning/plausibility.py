@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.signals import FollowForce
 from evfem.electrostatics.roughness import roughness_of
-from evfem.electrostatics.signals import FollowForce
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2

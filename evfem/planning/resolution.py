@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.signals import FollowForce, VoltageProfile
 from evfem.common.arrays import Floats, Ints
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal

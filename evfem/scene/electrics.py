@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.signals import FollowForce, VoltageProfile
 from evfem.common.arrays import Ints
 from evfem.common.checks import Values
 from evfem.electrostatics.dielectrics import seen_at
 from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import Sandwich
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import NANO, Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.faces import layer_thickness

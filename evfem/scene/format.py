@@ -12,14 +12,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from evfem.circuit.signalfile import read_voltage
+from evfem.circuit.signals import FOUND, FollowForce, VoltageProfile
 from evfem.common.checks import Within, among, instance, keys_of, number, one_of, real, yes_or_no
 from evfem.common.tables import TABLES
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer
-from evfem.electrostatics.signalfile import read_voltage
-from evfem.electrostatics.signals import FOUND, FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import RATE, START, Sampled
 from evfem.errors import ABSENT, InputError, Mistakes
 from evfem.finger.fingerpad import Electrical, FingerPad

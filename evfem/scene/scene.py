@@ -13,6 +13,7 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Annotated, Any, Protocol, cast, runtime_checkable
 
+from evfem.circuit.signals import FollowForce, VoltageProfile
 from evfem.common.checks import (
     RENAMED_KEYS,
     Within,
@@ -29,7 +30,6 @@ from evfem.common.views import called, changed, short, table
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError, Mistakes, describe_value
 from evfem.protocols import AdhesionLaw, CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal

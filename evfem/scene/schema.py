@@ -13,10 +13,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args, get_origin
 
+from evfem.circuit.signals import FOUND
 from evfem.common.checks import Key, Within, keys_of
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
-from evfem.electrostatics.signals import FOUND
 from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.finger.fingertip import FINGERS
 from evfem.newton.strategy import Strategy

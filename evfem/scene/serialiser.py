@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from evfem.circuit.signals import FOUND, FollowForce, VoltageProfile
 from evfem.common.checks import keys_of
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS, LayerStack
-from evfem.electrostatics.signals import FOUND, FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import SIGNALS
 from evfem.errors import InputError
 from evfem.finger.fingerpad import MeshedFinger

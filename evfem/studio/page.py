@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.signalfile import write_signal
 from evfem.common.arrays import Floats
 from evfem.common.checks import Key, choice, keys_of
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
-from evfem.electrostatics.signalfile import write_signal
 from evfem.estimate.display import Device, Rendering, playback, render, render_exact, spectrum_of
 from evfem.estimate.estimate import Estimate, estimate
 from evfem.estimate.touch import touch_scene

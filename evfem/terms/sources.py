@@ -19,10 +19,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from evfem.circuit.signals import FollowForce, VoltageProfile
 from evfem.common.arrays import Floats
 from evfem.common.rooms import Column
 from evfem.electrostatics.laws import Layers, eps_0
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import NANO, ChargeControl, OpenCircuit
 from evfem.errors import InputError
 from evfem.protocols import TimeSignal

@@ -23,7 +23,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import evfem as ev
-from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.circuit.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Layers
 from evfem.estimate.rendering import (
     apparent_friction,

@@ -84,7 +84,7 @@ def test_impossible_input_is_refused_with_a_sentence():
 def test_importing_the_formulas_stays_light():
     heavy = ("skfem", "matplotlib", "scipy", "meshio")
     code = (
-        "import sys, evfem.electrostatics.forces, evfem.electrostatics.encoding, evfem.data; "
+        "import sys, evfem.electrostatics.forces, evfem.circuit.encoding, evfem.data; "
         f"print([m for m in {heavy!r} if m in sys.modules])"
     )
     assert printed(code) == "[]"

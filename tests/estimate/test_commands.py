@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from evfem import cli
-from evfem.electrostatics.signalfile import read_signal
+from evfem.circuit.signalfile import read_signal
 from evfem.textures.library import names
 from evfem.textures.texture import read
 

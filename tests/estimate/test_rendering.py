@@ -9,7 +9,7 @@ from tools.meshes import block
 from tools.refusals import refuses
 
 import evfem as ev
-from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.circuit.encoding import AreaLaw, Encoding
 from evfem.estimate.rendering import (
     ApparentFriction,
     apparent_friction,

@@ -8,7 +8,7 @@ from simulation.test_spheres import NU, sphere
 from tools.meshes import between, block, both_sides, contact_block, graded, held, parabola
 
 import evfem as ev
-from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.circuit.encoding import AreaLaw, Encoding
 from evfem.reference import HertzLine, plane_modulus, pull_in_kaczmarek, pull_in_strong_troxel
 from evfem.tensor import STEP
 

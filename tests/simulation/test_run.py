@@ -10,8 +10,8 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem import Dugdale, ElasticLayer, Hand
+from evfem.circuit.signals import VoltageProfile
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
-from evfem.electrostatics.signals import VoltageProfile
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.newton.condensation import Pardiso, SuperLU
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait

@@ -8,9 +8,9 @@ from tools.builders import INSULATOR, SKIN, coarse_pad, finger, left_over
 from tools.meshes import block
 
 import evfem as ev
+from evfem.circuit.signals import VoltageProfile
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek, Layers, StrongTroxel
-from evfem.electrostatics.signals import VoltageProfile
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.newton.control import GivenVoltage, Indentation, Target
 from evfem.reference import pull_in_strong_troxel

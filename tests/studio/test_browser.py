@@ -13,7 +13,7 @@ import warnings
 import numpy as np
 import pytest
 
-from evfem.electrostatics.signalfile import read_signal
+from evfem.circuit.signalfile import read_signal
 
 pytestmark = [pytest.mark.browser, pytest.mark.filterwarnings("ignore::ImportWarning")]
 FLAGS = ("--headless", "--no-sandbox", "--no-first-run", "--disable-gpu", "--disable-quic", "--disable-sync")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tools.refusals import refuses
 
-from evfem.electrostatics.signals import Amplifier, VoltageProfile, carrier_amplitude
+from evfem.circuit.signals import Amplifier, VoltageProfile, carrier_amplitude
 
 JUMP = VoltageProfile([0.0, 2.0, 2.0, 4.0], [10.0, 10.0, 100.0, 50.0])
 

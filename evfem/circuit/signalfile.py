@@ -25,12 +25,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from evfem.circuit.signals import VoltageProfile, carrier_amplitude
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, among, check_fields, count, number, real, set_frozen
 from evfem.common.storage import replacing, write_text
 from evfem.common.tables import MOST_ROWS, names_of
 from evfem.electrostatics import wav
-from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
 from evfem.electrostatics.timesignals import Sampled
 from evfem.errors import ABSENT, InputError, describe_value, readable
 

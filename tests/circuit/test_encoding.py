@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tools.refusals import refuses
 
-from evfem.electrostatics.encoding import (
+from evfem.circuit.encoding import (
     AreaLaw,
     Encoding,
     fit_area_to_friction,

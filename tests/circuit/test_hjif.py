@@ -8,11 +8,12 @@ import pytest
 from tools.refusals import refuses
 
 import evfem as ev
-from evfem.electrostatics import signalfile, wav
-from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.circuit import signalfile
+from evfem.circuit.encoding import AreaLaw, Encoding
+from evfem.circuit.signalfile import Playback, write_signal
+from evfem.circuit.signals import VoltageProfile
+from evfem.electrostatics import wav
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
-from evfem.electrostatics.signalfile import Playback, write_signal
-from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
 from evfem.textures.importers import Haptics
 

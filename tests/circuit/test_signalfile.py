@@ -16,7 +16,7 @@ from tools.scenes import PRESS, head
 
 import evfem as ev
 from evfem import cli
-from evfem.electrostatics import signalfile
+from evfem.circuit import signalfile
 from evfem.scene.file import dump, loads
 
 JUMP = ev.VoltageProfile([1.0, 3.5, 6.0, 6.0, 11.0], [0.0, 2000.0, 500.0, 1500.0, -1500.0])

@@ -1,0 +1,1 @@
+"""What the amplifier plays and sees: voltages over the position, encoding, signal files."""
