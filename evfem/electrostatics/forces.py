@@ -7,6 +7,7 @@ those of the paper on modelling and validating electrovibration displays that th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -231,10 +232,20 @@ def outline_force(
     found = np.empty(given[0].shape)
     for at in np.ndindex(found.shape):
         a, b, c, lowest, volts, reduced, thickness, n, degrees = (float(one[at]) for one in given)
-        turned = np.radians(degrees)
-        body = _Superellipsoid(0.5 * np.array([a, b, c]), np.array([0.0, np.cos(turned), np.sin(turned)]), n)
-        found[at] = _body_force(law, body, lowest, volts, Layers(reduced, thickness))
+        rise, areas = _columns_of(a, b, c, n, degrees)
+        found[at] = np.sum(law.traction(lowest + rise, volts, Layers(reduced, thickness)) * areas)
     return to_python(found)
+
+
+@lru_cache(maxsize=1)  # other gaps, voltages and laws of one finger
+def _columns_of(width: float, height: float, length: float, n: float, tilt: float) -> tuple[Values, Values]:
+    """Heights above the lowest point and areas of all columns below a turned superellipsoid."""
+    turned = np.radians(tilt)
+    up = np.array([0.0, np.cos(turned), np.sin(turned)])
+    body = _Superellipsoid(0.5 * np.array([width, height, length]), up, n)
+    pieces = [body.columns(start, end) for start, end in pairwise(body.turns())]
+    rise, areas = (np.concatenate([np.ravel(one) for one in column]) for column in zip(*pieces, strict=True))
+    return rise, areas
 
 
 def _between(key: str, entered: Values, lowest: float, highest: float, allowed: str) -> Values:
@@ -242,14 +253,6 @@ def _between(key: str, entered: Values, lowest: float, highest: float, allowed: 
     if np.any(value > highest):
         raise InputError(key, float(np.max(value)), allowed)
     return value
-
-
-def _body_force(law: ForceLaw, body: _Superellipsoid, lowest: float, voltage: float, layers: Layers) -> float:
-    total = 0.0
-    for start, end in pairwise(body.turns()):
-        heights, areas = body.columns(start, end)
-        total += float(np.sum(law.traction(lowest + heights, voltage, layers) * areas))
-    return total
 
 
 def _threshold_weights(
