@@ -3,12 +3,14 @@
 Cases HVHD (2000 V, 0.50 mm), HVLD (2000 V, 0.25 mm), LVLD (1414 V, 0.25 mm). Measured: Table 1, with means
 1.81, 2.95, 1.31 mN, medians 1.85, 2.73, 1.37 mN, standard deviations 0.547, 1.07, 0.558 mN. Closed forms:
 (8a), (8b) with (24) for each participant's own ellipsoid, full axes a_i, b_i, c_i cos 30 degrees, over the
-rectangle. Finite elements: Table 2's cross-section, deformable, in plane strain, times 8 and 10 mm of width
-out of the plane. Expected: Kaczmarek's law within about 10 % of the medians, Strong-Troxel's 1.4 to 1.9 times
-above; a smooth rigid outline gives 0.1976, 0.4036, 0.2017 mN/mm, and letting it deform adds 0.4 to 1.6 %.
+rectangle. Beside them the columns below the whole ellipsoid, turned by the 30 degrees at which the fingers
+were held (`tilted`), also of flatter outlines. Finite elements: Table 2's cross-section, deformable, in plane
+strain, times 8 and 10 mm of width out of the plane. Expected: untilted Kaczmarek's law within about 10 % of
+the medians, Strong-Troxel's 1.4 to 1.9 times above; tilted .6 to .7 and .9 to 1.25; a smooth rigid outline
+gives 0.1976, 0.4036, 0.2017 mN/mm, and letting it deform adds 0.4 to 1.6 %.
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ import evfem as ev
 from evfem import data
 
 from .common import CASES, Series, Study, by_participant, median_interval, paper_display, participants
-from .hovering_people import comparison, participant_forces
+from .hovering_people import comparison, falls, participant_forces, tilted_forces
 from .plots import COLOURS, LABELS, Figure, draw_box, new_figure
 from .printed import CUT, Printed
 
@@ -42,9 +44,11 @@ PAPER |= {
     )
     for case in CASES
 }
+OUTLINES = (2.25, 2.5, 3.0)  # exponents of flatter pads
 WIDTHS = (8, 10)  # mm out of the plane
 MODELS = {"fe": ("finite elements, ridges", True), "fe_smooth": ("finite elements, smooth", False)}
 ASSUMPTIONS = {
+    "tilted": "full axes a_i, b_i, c_i, turned by 30 deg; every column below the whole ellipsoid",
     "voltages": "HV = 2000 V, LV = 1414 V (Table 1's footnotes print 2500 V for HV)",
     "participants": "full axes a_i, b_i, c_i cos 30 deg; rectangle of the half axes; layers of Table 2",
     "finite elements": "plane strain, N/mm times 8 and 10 mm out of the plane; Kaczmarek's law; bone held",
@@ -55,22 +59,25 @@ ASSUMPTIONS = {
 
 def main(quick: bool = False) -> Study:
     """Statistics of the measurements, forces of both laws and by finite elements, verdict."""
-    forces = participant_forces()
+    forces, tilted = participant_forces(), tilted_forces()
     elements = {
         (model, case): hover_force(ridges, gap, voltage, "coarse" if quick else "medium")
         for model, (_, ridges) in MODELS.items()
         for case, (voltage, gap) in CASES.items()
     }
-    numbers = _measured_numbers() | _law_numbers(forces)
+    numbers = _measured_numbers() | falls() | _law_numbers(forces) | _law_numbers(tilted, "tilted.")
     for (model, case), force in elements.items():
         numbers |= {f"{model}.kaczmarek.{case}_mN_at_{width}mm": 1e3 * force * width for width in WIDTHS}
         numbers |= {
             f"verdict.{model}.mm_of_width_for_median.{case}": 1e-3 * np.median(participants()[case]) / force
         }
-    numbers |= comparison(forces)
-    return Study(
-        "fig05", numbers, PAPER, ASSUMPTIONS, _series(forces, elements), lambda: _draw(forces, elements)
-    )
+    numbers |= comparison(forces) | comparison(tilted, "tilted.")
+    for outline in OUTLINES:
+        for (law, case), values in tilted_forces(outline).items():
+            ratio = np.median(values) / np.median(participants()[case])
+            numbers[f"verdict.tilted.outline_{outline:g}.{law}.median_over_measured.{case}"] = ratio
+    series, picture = _series(forces, tilted, elements), partial(_draw, forces, tilted, elements)
+    return Study("fig05", numbers, PAPER, ASSUMPTIONS, series, picture)
 
 
 @cache
@@ -98,18 +105,19 @@ def _measured_numbers() -> dict[str, float]:
     return found
 
 
-def _law_numbers(forces: dict[Any, Any]) -> dict[str, float]:
+def _law_numbers(forces: dict[Any, Any], how: str = "") -> dict[str, float]:
     found: dict[str, Any] = {}
     for (law, case), values in forces.items():
-        found[f"{law}.median_mN.{case}"] = np.median(values)
+        found[f"{how}{law}.median_mN.{case}"] = np.median(values)
         names = participants()["participant"]
-        found |= {f"{law}.{name}.{case}_mN": force for name, force in zip(names, values, strict=True)}
+        found |= {f"{how}{law}.{name}.{case}_mN": force for name, force in zip(names, values, strict=True)}
     return found
 
 
-def _series(forces: dict[Any, Any], elements: dict[Any, float]) -> list[Series]:
+def _series(forces: dict[Any, Any], tilted: dict[Any, Any], elements: dict[Any, float]) -> list[Series]:
     series = [by_participant(f"measured {case}", participants()[case]) for case in CASES]
     series += [by_participant(f"{law} {case}", values) for (law, case), values in forces.items()]
+    series += [by_participant(f"tilted {law} {case}", values) for (law, case), values in tilted.items()]
     widths = np.array(WIDTHS, dtype=float)
     for (model, case), force in elements.items():
         y = 1e3 * force * widths
@@ -117,26 +125,28 @@ def _series(forces: dict[Any, Any], elements: dict[Any, float]) -> list[Series]:
     return series
 
 
-def _draw(forces: dict[Any, Any], elements: dict[Any, float]) -> Figure:
+def _draw(forces: dict[Any, Any], tilted: dict[Any, Any], elements: dict[Any, float]) -> Figure:
     from matplotlib.patches import Patch
 
     figure = new_figure(4.2)
     ax = figure.add_subplot()
-    bars = {"fe": (0.22, COLOURS["fe"]), "fe_smooth": (0.34, "white")}
+    bars = {"fe": (0.34, COLOURS["fe"]), "fe_smooth": (0.43, "white")}
     for place, case in enumerate(CASES):
-        draw_box(ax, place - 0.32, participants()[case], 0.15, COLOURS["measured"])
-        for law, at in (("kaczmarek", -0.13), ("strong_troxel", 0.06)):
-            draw_box(ax, place + at, forces[law, case], 0.15, COLOURS[law])
+        draw_box(ax, place - 0.40, participants()[case], 0.11, COLOURS["measured"])
+        for law, at in (("kaczmarek", -0.27), ("strong_troxel", 0.01)):
+            draw_box(ax, place + at, forces[law, case], 0.11, COLOURS[law])
+            draw_box(ax, place + at + 0.13, tilted[law, case], 0.11, COLOURS[law], hatch="////")
         for model, (at, face) in bars.items():
             low, high = (1e3 * elements[model, case] * width for width in WIDTHS)
             look = {"color": face, "edgecolor": COLOURS["fe"], "linewidth": 1.3}
-            ax.bar(place + at, high - low, 0.09, low, **look)
+            ax.bar(place + at, high - low, 0.07, low, **look)
     labels = [f"{case}\n{voltage:g} V, {gap:.2f} mm" for case, (voltage, gap) in CASES.items()]
     ax.set_xticks(range(len(CASES)), labels)
     ax.set(ylabel="electrostatic force (mN)", ylim=(0, None), xlim=(-0.5, 2.5))
     named = {"measured": "measured"}
     named |= {law: f"{LABELS[law]} ({how})" for law, how in (("kaczmarek", "8b"), ("strong_troxel", "8a"))}
     handles = [Patch(facecolor=COLOURS[key], alpha=0.5, label=label) for key, label in named.items()]
+    handles.append(Patch(facecolor="white", edgecolor="0.4", hatch="////", label="the same, held at 30°"))
     for model, (_, face) in bars.items():
         label = f"{MODELS[model][0]}, width 8-10 mm"
         handles.append(Patch(facecolor=face, edgecolor=COLOURS["fe"], label=label))

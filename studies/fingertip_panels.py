@@ -80,13 +80,17 @@ def _hover(ax: Axes, law: str, forces: Mapping[tuple[str, str, str], Floats]) ->
     from matplotlib.patches import Patch
 
     places = dict(zip(CASES, range(len(CASES)), strict=True))
-    measured_boxes(ax, {case: place - 0.27 for case, place in places.items()}, 0.2)
-    for shift, kind, colour in ((0.0, "smooth", COLOURS[law]), (0.27, "ridged", COLOURS["fe"])):
+    measured_boxes(ax, {case: place - 0.33 for case, place in places.items()}, 0.18)
+    boxes = ((-0.11, "smooth", COLOURS[law], ""), (0.11, "ridged", COLOURS["fe"], ""))
+    for shift, kind, colour, hatch in (*boxes, (0.33, "held", COLOURS[law], "////")):
         for case, place in places.items():
-            draw_box(ax, place + shift, forces[kind, law, case], 0.2, colour)
+            draw_box(ax, place + shift, forces[kind, law, case], 0.18, colour, hatch)
     ax.set_xticks(list(places.values()), list(places))
     ax.set(ylabel="force (mN)", ylim=(0, None))
     ax.set_title(LABELS[law], fontsize="medium")
     kinds = (("measured", COLOURS["measured"]), ("smooth", COLOURS[law]), ("ridged", COLOURS["fe"]))
     handles = [Patch(color=colour, label=label) for label, colour in kinds]
+    handles.append(
+        Patch(facecolor="white", edgecolor=COLOURS[law], hatch="////", label="smooth, held at 30°")
+    )
     ax.legend(handles=handles, fontsize="x-small")

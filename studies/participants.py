@@ -4,7 +4,8 @@ Each participant has a finger of his or her own (`FingerPad.participant`): width
 1, bone, nail and the layers below the stratum corneum scaled with it from Table 2's finger; stratum corneum,
 ridges and moduli are Table 2's. The bone is held, the tissue deforms. A plane model gives N/mm: the force in
 mN is that times the width out of the plane over which a rigid, smooth ellipsoid of the participant's axes
-(8a), (8b), (24) has the same force as its cross-section alone. So what differs from the closed forms of Fig.
+(8a), (8b), (24) has the same force as its cross-section alone; `tilted`: as the whole ellipsoid held at 30
+degrees has. So what differs from the closed forms of Fig.
 5 is what deformation and ridges do. Expected: together they take away 2 to 6 %, about the same for everybody
 (ridges more, deformation gives some back), so that the closed forms' differences from the measured forces, up
 to a factor of three for fingers of the same size, are not theirs to explain.
@@ -16,10 +17,10 @@ from typing import Any
 import numpy as np
 
 import evfem as ev
-from evfem.electrostatics.forces import pad_force, pad_force_per_depth
+from evfem.electrostatics.forces import pad_force_per_depth
 
 from .common import CASES, LAWS, Floats, Study, by_participant, paper_display, participants, table2_layers
-from .hovering_people import participant_forces, participant_pads
+from .hovering_people import participant_forces, participant_pads, tilted_forces
 from .plots import COLOURS, LABELS, Figure, panels
 
 ASSUMPTIONS = {
@@ -37,17 +38,19 @@ def main(quick: bool = False) -> Study:
     names = participants()["participant"][: 3 if quick else None]
     # few points: starting processes costs more than they save
     table = ev.sweep(plan(names), workers=1 if quick else None)
-    forces = widths(len(names))
-    for law, case in forces:
-        chosen = [
-            row["electrostatic_force.last"]
-            for row in table.rows
-            if (row["electrostatics.law"], row["case"]) == (law, case)
-        ]
-        forces[law, case] *= 1e3 * np.array(chosen)
-    closed = {key: values[: len(names)] for key, values in participant_forces().items()}
+    closed, tilted = (
+        {key: values[: len(names)] for key, values in forces.items()}
+        for forces in (participant_forces(), tilted_forces())
+    )
+    sections = _sections(table, len(names))
+    forces = {key: sections[key] * closed[key] for key in sections}
     done = sum(row["status"] == "done" for row in table.rows)
     numbers = _numbers(names, forces, closed) | {"points": len(table.rows), "done": done}
+    for (law, case), section in sections.items():
+        held, measured = section * tilted[law, case], participants()[case][: len(names)]
+        numbers[f"tilted.{law}.median_mN.{case}"] = np.median(held)
+        numbers[f"verdict.tilted.median_over_measured.{law}.{case}"] = np.median(held) / np.median(measured)
+        numbers[f"verdict.tilted.above_measured.{law}.{case}"] = int(np.sum(held > measured))
     every = {f"fe {law} {case}": values for (law, case), values in forces.items()}
     every |= {f"closed form {law} {case}": values for (law, case), values in closed.items()}
     every |= {f"measured {case}": participants()[case][: len(names)] for case in CASES}
@@ -69,14 +72,19 @@ def plan(names: list[str]) -> ev.Sweep:
     return ev.Sweep(scene, grid, outputs=("electrostatic_force.last", "min_gap.last"), name="participants")
 
 
-def widths(count: int) -> dict[tuple[str, str], Floats]:
-    """(law, case) -> width out of the plane in mm of each participant, from the closed forms."""
+def _sections(table: Any, count: int) -> dict[tuple[str, str], Floats]:
+    """(law, case) -> force of each participant's deformed cross-section over that of the rigid smooth one."""
     pads, layers = participant_pads(), table2_layers()
     found = {}
     for name, law in LAWS.items():
         for case, (voltage, gap) in CASES.items():
-            ratio = pad_force(law, pads, gap, voltage, layers)
-            found[name, case] = (ratio / pad_force_per_depth(law, pads, gap, voltage, layers))[:count]
+            rigid = pad_force_per_depth(law, pads, gap, voltage, layers)[:count]
+            chosen = [
+                row["electrostatic_force.last"]
+                for row in table.rows
+                if (row["electrostatics.law"], row["case"]) == (name, case)
+            ]
+            found[name, case] = np.array(chosen) / rigid
     return found
 
 

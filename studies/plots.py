@@ -38,7 +38,7 @@ def panels(height: float, columns: int, width: float = WIDTH, rows: int = 1, **g
     return figure, axes
 
 
-def draw_box(ax: Axes, at: float, values: Floats, width: float, colour: str) -> None:
+def draw_box(ax: Axes, at: float, values: Floats, width: float, colour: str, hatch: str = "") -> None:
     """Box (quartiles), whiskers (extremes), median, its interval as a bar, and the points."""
     low, high, _ = median_interval(values)
     look = {"whis": (0, 100), "showcaps": True, "patch_artist": True, "manage_ticks": False}
@@ -46,7 +46,7 @@ def draw_box(ax: Axes, at: float, values: Floats, width: float, colour: str) -> 
     for part in ("boxes", "whiskers", "caps", "medians"):
         for artist in box[part]:
             artist.set(color=colour, linewidth=1.1)
-    box["boxes"][0].set(facecolor=colour, alpha=0.30)
+    box["boxes"][0].set(facecolor=colour, alpha=0.30, hatch=hatch)
     box["medians"][0].set(linewidth=2.2)
     ax.plot([at, at], [low, high], color=colour, linewidth=3.0, alpha=0.75, solid_capstyle="butt")
     spread = np.linspace(-0.3, 0.3, len(values)) * width
