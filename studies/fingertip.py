@@ -45,7 +45,7 @@ ASSUMPTIONS = {
     "areas": "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that "
     "differs from the hull of the touching nodes; ridge (and smooth pads): all that touches",
     "press": "no friction, no voltage, rim held by the nail; one variant has friction 0.3",
-    "held": "medium mesh, 1.7 % above the columns below the ellipsoid at .25 mm; a coarse one is 7 % above, as "
+    "held": "medium mesh, 1.7 % above the columns below the ellipsoid at .25 mm; a coarse one 7 %, as "
     "the lowest point lies where its cells are large",
     "hover": "rigid, local thickness of the stratum corneum; fingers of Table 1 as Fingertip.participant",
     "ridges": "twelve cells across each; the error of the mesh is that of six",
