@@ -44,6 +44,7 @@ _NAMES = {
     "finger.fingerpad": ("Electrical", "FingerPad", "MeshedFinger"),
     "finger.fingerprint": ("HeightMap",),
     "finger.fingertip": ("Fingertip",),
+    "finger.layers": ("stiffening_skin",),
     "finger.scan": ("RidgeScan",),
     "loading": ("load",),
     "response.impedance": ("impedance",),

@@ -51,6 +51,7 @@ from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
 from evfem.finger.fingerprint import HeightMap as HeightMap
 from evfem.finger.fingertip import Fingertip as Fingertip
+from evfem.finger.layers import stiffening_skin as stiffening_skin
 from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file

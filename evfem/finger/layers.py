@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from evfem.tissue.ogden import Ogden
+
 
 class Moduli(NamedTuple):
     """Young's modulus (MPa) and Poisson's ratio."""
@@ -116,3 +118,24 @@ def thickness_of(name: str) -> float:
     """
     (found,) = (layer.thickness for layer in (*LAYERS, NAIL) if layer.name == name and layer.thickness)
     return found.default
+
+
+def stiffening_skin(exponent: float = 14.0, factor: float = 0.5) -> dict[str, Ogden]:
+    """Materials of the four layers that stiffen with their stretch: one term of Ogden's law each.
+
+    `factor` multiplies Table 2's moduli, which are the initial ones; `exponent` is alpha (2: the default
+    tissue). That one such term describes skin, with an exponent that does not depend on the rate, was
+    measured on pigs (Shergold, Fleck and Radford 2006, doi:10.1016/j.ijimpeng.2004.11.010). The two numbers
+    are illustrative, chosen so that a finger's contact area falls in slip, as Delhaye et al. 2014 measured,
+    where that of neo-Hookean skin grows.
+
+    >>> skin = stiffening_skin()
+    >>> skin["dermis"].alpha, round(skin["dermis"].shear_modulus, 5), round(0.5 * 0.080 / 2 / 1.48, 5)
+    ((14.0,), 0.01351, 0.01351)
+    """
+    found = {}
+    for layer in LAYERS:
+        E, nu = layer.moduli
+        shear = factor * 0.5 * E / (1.0 + nu)
+        found[layer.name] = Ogden(mu=2.0 * shear / exponent, alpha=exponent, nu=nu)
+    return found

@@ -273,3 +273,24 @@ def test_it_shows_what_differs():
     assert repr(ev.Fingertip()) == "Fingertip()"
     assert repr(ev.Fingertip(ridges=False, posture=10)) == "Fingertip(ridges='none', posture=10.0)"
     assert "16.68 x 12.79 x 22.5 mm" in ev.Fingertip()._repr_html_()
+
+
+def test_stiffening_skin_has_the_stress_of_its_term_of_ogden():
+    """Pure shear at constant volume: sigma_1 - sigma_2 = mu (l^alpha - l^-alpha), modulus mu alpha/2."""
+    law, stretch = ev.stiffening_skin(12.0, 0.7)["epidermis"], 1.3
+    mu = 2.0 / 12.0 * 0.7 * 0.136 / (2.0 * 1.3)
+    stress = law.P(np.diag([stretch, 1.0 / stretch, 1.0])) @ np.diag([stretch, 1.0 / stretch, 1.0])
+    assert stress[0, 0] - stress[1, 1] == pytest.approx(mu * (stretch**12 - stretch**-12), rel=1e-12)
+
+
+@pytest.mark.slow
+def test_the_contact_area_falls_in_slip_where_skin_stiffens_and_grows_where_it_does_not():
+    """The sign that Delhaye et al. 2014 measured, doi:10.1098/rsif.2014.0698, and the default's wrong one."""
+    change = {}
+    for name, materials in {"stiff": ev.stiffening_skin(), "default": {}}.items():
+        tip = ev.Fingertip(ridges="none", resolution="coarse", materials=materials)
+        motion = [ev.Press(force=0.5, steps=3), ev.Slide(distance=4.0, steps=6, hold="force")]
+        area = ev.simulate(ev.Scene(tip, ev.Flat(friction=0.8), motion=motion)).real_contact_area
+        change[name] = area[-1] / area[2] - 1.0
+    assert change["stiff"] < -0.02
+    assert change["default"] > 0.01
