@@ -49,7 +49,7 @@ ROOMS = {
     ),
     "finger": (
         {"numpy", "PIL"},
-        "outline lattice layers sizes scan section fingerpad blocks fingerprint solid fingertip",
+        "outline lattice layers crosssection sizes scan section fingerpad blocks fingerprint solid fingertip",
     ),
     "electrostatics": (
         {"numpy", "scipy"},

@@ -165,6 +165,7 @@ class FingerPad(LayeredFinger):
                 set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
                 _check_alone(self)
         mistakes.report()
+        self._measured_sizes()
         self._with_default_laws()
         _check_section(self, self._shape)
 
@@ -182,7 +183,7 @@ class FingerPad(LayeredFinger):
 
     @property
     def _shape(self) -> Section:
-        outer = Ellipse(0.5 * self.width, 0.5 * self.height)
+        outer = self.outer
         bone = Ellipse(0.5 * self.bone_width, 0.5 * self.bone_height, self.bone_offset)
         ridges: Ridges | ScannedRidges | None = None
         if isinstance(self.ridge_scan, RidgeScan):
@@ -240,7 +241,7 @@ def _check_section(pad: FingerPad, section: Section) -> None:
         height = "ridge_scan" if isinstance(ridges, ScannedRidges) else "ridge_height"
         meaning = f"0.7 times the {outermost.spoken}'s thickness"
         check_at_most(height, ridges.height, 0.7 * thickness, meaning)
-        steeper = 1.0 / (1.0 - ridges.height * outer.b / outer.a**2)
+        steeper = 1.0 / (1.0 - ridges.height * outer.sharpest(FULL * outer.a))
         if isinstance(ridges, ScannedRidges):
             spacing = 0.5 * ridges.pitch / section.divisions.per_ridge
             _check_scan(ridges, ridges.steepest * steeper, spacing)
@@ -249,7 +250,7 @@ def _check_section(pad: FingerPad, section: Section) -> None:
     check_nail(pad.nail_thickness, section.layers, section.thickness)
     check_at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
     skin = sum(section.thickness)
-    check_skin(skin, outer.smallest_radius, 0.6)
+    check_skin(skin, outer.smallest_radius)
     theta = np.linspace(-np.pi, np.pi, 361)
     inside = outer.point(theta) - skin * outer.normal(theta)
     bone = section.bone

@@ -21,6 +21,7 @@ from evfem.common.checks import between, check_fields, one_of, set_frozen
 from evfem.common.views import short
 from evfem.errors import InputError, Mistakes, describe_value
 from evfem.finger import fingerprint
+from evfem.finger.crosssection import EXPONENTS, outline_of
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.fingerprint import PATTERNS, FingerprintPattern, HeightMap
 from evfem.finger.layers import NAIL, thickness_of
@@ -37,16 +38,15 @@ from evfem.finger.sizes import (
     check_skin,
     pressure_error,
 )
-from evfem.finger.solid import RECTANGLE, Ellipsoid, Grid, Nail, Solid, rows_that_merge
+from evfem.finger.solid import RECTANGLE, Body, Ellipsoid, Grid, Nail, Solid, rows_that_merge
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import scaled_jacobian
 
 RIMS = ("fixed", "free", "nail")
 #: angle (degrees) at which the finger of Table 1 was held, whose length is seen from above
 HELD = 30.0
-#: smallest scaled Jacobian of a cell below measured ridges, and the largest fraction of the outline's
-#: smallest radius that the skin may have
-SMALLEST_SHAPE, THICKEST = 0.02, 0.7
+#: smallest scaled Jacobian of a cell below measured ridges
+SMALLEST_SHAPE = 0.02
 
 
 @dataclass(frozen=True)
@@ -143,6 +143,7 @@ class Fingertip(LayeredFinger):
             if not mistakes.found:
                 set_frozen(self, ridges=_ridges(self))
         mistakes.report()
+        self._measured_sizes()
         self._with_default_laws()
         _check_shape(self, self._shape)
 
@@ -174,7 +175,7 @@ class Fingertip(LayeredFinger):
 
     @property
     def _shape(self) -> Solid:
-        outer = Ellipsoid(0.5 * self.width, 0.5 * self.height, 0.5 * self.length)
+        outer = self._body
         axes = 0.5 * self.bone_width, 0.5 * self.bone_height, 0.5 * self.bone_length
         relief: Any = self.ridges
         if self.ridges == "none":
@@ -193,6 +194,15 @@ class Fingertip(LayeredFinger):
             posture=self.posture,
             nail=Nail(self.nail_thickness, self.nail_width) if self.rim == "nail" else None,
         )
+
+    @property
+    def _body(self) -> Ellipsoid:
+        """The smooth surface."""
+        axes = 0.5 * self.width, 0.5 * self.height, 0.5 * self.length
+        if self.outline == EXPONENTS.low:
+            return Ellipsoid(*axes)
+        section = outline_of(self.outline, 1.0, 1.0)
+        return Body(*axes, section=section, m=getattr(section, "exponent", 2.0))
 
     @property
     def _usual(self) -> dict[str, Any]:
@@ -265,7 +275,7 @@ def _ridges(tip: Fingertip) -> str | HeightMap:
 def _check_shape(tip: Fingertip, solid: Solid) -> None:
     """Raise InputError for inconsistent sizes."""
     skin = sum(solid.thickness)
-    check_skin(skin, solid.outer.smallest_radius, THICKEST)
+    check_skin(skin, solid.outer.smallest_radius)
     check_cells(tip.cells_per_ridge, tip.ridges != "none")
     if (relief := tip.ridges) != "none":
         axis = tip.length if relief == "across" else tip.width

@@ -1,9 +1,9 @@
 """Fingerprint ridges as they were scanned: a relief or an outline in a file, and how deep it lies
 below the crest line.
 
-A scan with heights has the form of the finger removed: x is the abscissa of the smooth ellipse, its highest
+A scan with heights has the form of the finger removed: x is the abscissa of the smooth outline, its highest
 point lies on it. A scan with y is the outline itself, x = 0 in the middle, y upwards: points are projected
-onto the ellipse along its normal (Newton's method on the eccentric angle), the highest crest touching it from
+onto it along its normal (Newton's method on the angle), the highest crest touching it from
 inside.
 """
 
@@ -20,7 +20,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
 from evfem.common.tables import numbers, read_headed
 from evfem.errors import InputError, describe_value
-from evfem.finger.outline import Ellipse, quintic
+from evfem.finger.outline import Outline, quintic
 
 #: most points of a scan, and how near to each other they may be (mm)
 MOST, NEAREST = 100_000, 1e-6
@@ -39,6 +39,7 @@ class RidgeScan:
     >>> scan = RidgeScan([-1.0, 0.0, 1.0], height=[0.0, 0.1, 0.0])
     >>> scan
     RidgeScan(3 points, x -1 to 1 mm, height 0 to 0.1 mm)
+    >>> from evfem.finger.outline import Ellipse
     >>> x, depth = scan.depths(Ellipse(8.0, 6.0))
     >>> depth.tolist()
     [0.1, 0.0, 0.1]
@@ -104,10 +105,10 @@ class RidgeScan:
         span = f"{name} {values.min():.4g} to {values.max():.4g} mm"
         return f"RidgeScan({len(self.x)} points, x {self.x[0]:.4g} to {self.x[-1]:.4g} mm, {span})"
 
-    def depths(self, outer: Ellipse) -> tuple[Floats, Floats]:
-        """Abscissae (N,) of the feet on the ellipse `outer`, increasing, and depths (N,) below it.
+    def depths(self, outer: Outline) -> tuple[Floats, Floats]:
+        """Abscissae (N,) of the feet on the smooth outline `outer`, increasing, and depths (N,) below it.
 
-        Raises InputError for an outline that reaches beyond the lower half of the ellipse.
+        Raises InputError for an outline that reaches beyond the lower half of it.
         """
         if self.height is not None:
             return self.x, self.height.max() - self.height
@@ -124,7 +125,7 @@ class RidgeScan:
                 break
             lift -= below[crest] / down[crest]
         if (np.diff(foot) <= 0.0).any():
-            problem = "an outline that is folded, seen from the ellipse"
+            problem = "an outline that is folded, seen from that of the finger"
             raise InputError(
                 "finger.ridge_scan", problem, "one that fits finger.width and finger.height, smoothed"
             )
@@ -136,15 +137,11 @@ def is_texture(source: Any) -> bool:
     return all(hasattr(source, name) for name in ("quantity", "x", "values"))
 
 
-def _projected(outer: Ellipse, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Foot of each point on the ellipse's lower half, depth below it, downward part of the normal there."""
-    angle = -np.arccos(np.clip(x / outer.a, -1.0, 1.0))
+def _projected(outer: Outline, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """Foot of each point on the lower half of `outer`, depth below it, downward part of the normal there."""
+    angle = outer.angle_at(np.clip(x, -outer.a, outer.a))
     for _ in range(ITERATIONS):
-        cos, sin = np.cos(angle), np.sin(angle)
-        to_x, to_y = x - outer.a * cos, y - outer.b * sin
-        along = -to_x * outer.a * sin + to_y * outer.b * cos
-        bend = (outer.a * sin) ** 2 + (outer.b * cos) ** 2 + to_x * outer.a * cos + to_y * outer.b * sin
-        step = along / bend
+        step = outer.foot_step(angle, x, y)
         angle = angle + step
         if np.abs(step).max() < EXACT:
             break
@@ -155,7 +152,7 @@ def _projected(outer: Ellipse, x: Floats, y: Floats) -> tuple[Floats, Floats, Fl
 
 @dataclass(frozen=True, eq=False)
 class ScannedRidges:
-    """Depths of a scan over the abscissa of the ellipse, in place of the formula of
+    """Depths of a scan over the abscissa of the smooth outline, in place of the formula of
     `evfem.finger.outline.Ridges`.
 
     `pitch` (mm) says how finely the pad is divided, and over which length, half of it, a scan ends.
@@ -188,7 +185,7 @@ class ScannedRidges:
         return float(np.abs(felt - self.depth(self.x[inside])).max(initial=0.0))
 
     def depth(self, x: Floats) -> Floats:
-        """Depth below the crest line, along the ellipse's normal (mm)."""
+        """Depth below the crest line, along the smooth outline's normal (mm)."""
         half = 0.5 * self.pitch
         beyond = np.maximum(np.maximum(self.x[0] - x, x - self.x[-1]), 0.0)
         faded = quintic(1.0 - beyond / half) * quintic((self.end - np.abs(x)) / (self.end - self.full))

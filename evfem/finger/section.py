@@ -1,7 +1,7 @@
 """The mesh of a finger's cross-section: rings of layers between the outline and the bone.
 
-The nodes of a column lie on one normal of the outer ellipse, as far as the dermis reaches: there
-the interfaces are true offsets of the smooth ellipse. Straight lines towards the bone's centre
+The nodes of a column lie on one normal of the smooth outline, as far as the dermis reaches: there
+the interfaces are true offsets of it. Straight lines towards the bone's centre
 fill the hypodermis. Under the pad the columns are fine and merge three to one inwards.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.finger.lattice import Lattice, ring
 from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
-from evfem.finger.outline import Ellipse, Ridges, layer_coordinates
+from evfem.finger.outline import Ellipse, Outline, Ridges, layer_coordinates
 from evfem.finger.scan import ScannedRidges
 from evfem.mesh.mesh import Mesh
 
@@ -53,7 +53,7 @@ class Section:
     quadratic cells in each; `nail` is the thickness of the nail.
     """
 
-    outer: Ellipse
+    outer: Outline
     bone: Ellipse
     layers: tuple[TissueLayer, ...]
     thickness: tuple[float, ...]
@@ -140,7 +140,7 @@ class Columns:
     and back to it.
 
     In the zone of the pad they are equally wide in x, so that every ridge is divided in the same
-    way; elsewhere equally long along the ellipse.
+    way; elsewhere equally long along the outline.
     """
 
     def __init__(self, section: Section, order: int) -> None:
@@ -166,10 +166,10 @@ class Columns:
         self.splits[middle - fine : middle + fine] = 9
 
     def _angles(self, base: int, around: list[int]) -> tuple[Floats, list[int]]:
-        """Eccentric angles of the base columns' borders, and the number of columns of each stretch."""
+        """Angles of the base columns' borders, and the number of columns of each stretch."""
         outer, edge = self.section.outer, self._edge
         x = self.first_x + self.step * np.arange(base + 1)
-        pad = -np.arccos(x / outer.a)
+        pad = outer.angle_at(np.asarray(x, dtype=float))
         side, upper, nail = around
         left, right = nail // 2, nail - nail // 2
         right_stops = [float(pad[-1]), 0.0, edge, np.pi / 2]
@@ -188,18 +188,19 @@ class Columns:
 
     @property
     def _edge(self) -> float:
-        """Eccentric angle of the nail's right edge."""
-        return float(np.arccos(0.5 * self.section.nail_width / self.section.outer.a))
+        """Angle of the nail's right edge; the left one is its mirror image."""
+        half = np.full(1, 0.5 * self.section.nail_width)
+        return float(self.section.outer.angle_at(half, upper=True)[0])
 
     def at(self, u: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points (N, 2) and normals (N, 2) of the smooth ellipse, depths there of the outline and
+        """Points (N, 2) and normals (N, 2) of the smooth outline, depths there of the outline and
         of the interfaces between the layers (number of layers, N)."""
         section = self.section
         first, last = self.zone
         theta = np.interp(u, np.arange(len(self.theta)), self.theta)
         inside = (u >= first) & (u <= last)
         x = self.first_x + (u[inside] - first) * self.step
-        theta[inside] = -np.arccos(x / section.outer.a)
+        theta[inside] = section.outer.angle_at(x)
         foot, normal = section.outer.point(theta), section.outer.normal(theta)
         foot[inside, 0] = x
         foot[np.isin(theta, (0.0, -np.pi)), 1] = 0.0

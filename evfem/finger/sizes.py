@@ -13,16 +13,17 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, Within, between, choice, number, set_frozen, whole
 from evfem.common.views import called, changed, short, table
 from evfem.errors import InputError, describe_value, unknown
+from evfem.finger.crosssection import CrossSection, FingerOutline, outline_of
 from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
-from evfem.finger.outline import Ridges
+from evfem.finger.outline import Outline, Ridges
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import Material
 from evfem.tissue.laws import LAWS, NeoHookean
 from evfem.tissue.ogden import BRANCHES, BulkRelaxes, Pairs
 
-#: Limits of what can be meshed: largest slope of the walls of rounded and of flat-topped ridges, and
-#: smallest distance between bone and dermis (mm).
-STEEPEST, STEEPEST_FLAT, CLEARANCE = 4.88, 3.5, 0.3
+#: Limits of what can be meshed: largest slope of the walls of rounded and of flat-topped ridges, smallest
+#: distance between bone and dermis (mm), largest thickness of the skin over the surface's smallest radius.
+STEEPEST, STEEPEST_FLAT, CLEARANCE, THICKEST = 4.88, 3.5, 0.3, 0.7
 
 _PITCHES = {"of": "of the pitch"}
 
@@ -81,7 +82,7 @@ class LayeredFinger:
     height: Annotated[float, between(9.0, 20.0, "mm"), "full height of the cross-section"] = 12.79
     ridges: Any = True
     ridge_height: Annotated[
-        float, between(0.02, 0.4, "mm"), "depth of the grooves; crests lie on the ellipse"
+        float, between(0.02, 0.4, "mm"), "depth of the grooves; crests lie on the outline"
     ] = 0.15
     ridge_width: Annotated[float, between(0.3, 0.8, "mm"), "the pitch, from crest to crest"] = 0.50
     ridge_exponent: Annotated[
@@ -120,6 +121,7 @@ class LayeredFinger:
     viscosity: Viscosity = 0.0
     relaxation: Relaxation = ()
     bulk_relaxation: BulkRelaxes = False
+    outline: FingerOutline = 2.0
     layers: ClassVar[tuple[TissueLayer, ...]] = LAYERS
     beside: ClassVar[tuple[TissueLayer, ...]] = ()
 
@@ -193,6 +195,22 @@ class LayeredFinger:
         """Rows of the notebook table that summarise the finger, and the parameters they contain."""
         raise NotImplementedError
 
+    def _measured_sizes(self) -> None:
+        """Width and height are those of a measured outline; InputError for others beside it."""
+        if not isinstance(outline := self.outline, CrossSection):
+            return
+        for name in ("width", "height"):
+            given, own = getattr(self, name), getattr(outline, name)
+            if given not in (getattr(type(self), name), own):
+                allowed = f"none, or {own!r}: points are in mm, and have their own {name}"
+                raise InputError(f"finger.{name}", f"{given} beside a measured outline", allowed)
+            set_frozen(self, **{name: own})
+
+    @property
+    def outer(self) -> Outline:
+        """The smooth outline of the cross-section."""
+        return outline_of(self.outline, 0.5 * self.width, 0.5 * self.height)
+
     def _with_default_laws(self) -> None:
         """Complete `materials`: layers without a law get that of Table 2."""
         if not isinstance(self.materials, Mapping):
@@ -224,11 +242,11 @@ def check_at_most(name: str, value: float, limit: float, meaning: str, unit: str
         raise InputError(f"finger.{name}", value, f"at most {limit:.4g}{unit} ({meaning})")
 
 
-def check_skin(skin: float, radius: float, factor: float) -> None:
-    """Raise InputError if the layers are thicker than `factor` times the smallest radius of curvature."""
+def check_skin(skin: float, radius: float) -> None:
+    """Raise InputError if the layers are thicker than `THICKEST` times the smallest radius of curvature."""
     deepest = [layer for layer in LAYERS if layer.thickness][-1]
-    meaning = f"{factor:g} times the surface's smallest radius, together with the layers above it"
-    check_at_most(deepest.parameter, skin, factor * radius, meaning)
+    meaning = f"{THICKEST:g} times the surface's smallest radius, together with the layers above it"
+    check_at_most(deepest.parameter, skin, THICKEST * radius, meaning)
 
 
 def check_nail(nail: float, layers: Sequence[TissueLayer], thickness: Sequence[float]) -> None:

@@ -4,7 +4,9 @@ and the bone's, or, with a nail, between the whole ones.
 A point of either surface is named by a unit vector e with :math:`e_y \le 0`: :math:`(a e_x, b e_y,
 c e_z)` for semi-axes a, b, c. Seen from below the vectors fill the unit disc :math:`(p, q) = (e_x,
 e_z)`, which is divided into a rectangle of lines p = const and q = const, so that parallel ridges
-follow the lines, and four sides whose lines go on to the rim along great circles:
+follow the lines, and four sides whose lines go on to the rim along great circles (of another body than
+an ellipsoid, `Body`, e is a point of the surface over its axes, and the great circles are those of its
+rays):
 
     +---------+
     |\   q   /|
@@ -14,7 +16,7 @@ follow the lines, and four sides whose lines go on to the rim along great circle
     |/       \|
     +---------+
 
-The skin's interfaces are true offsets of the smooth ellipsoid along its normals; straight lines to
+The skin's interfaces are true offsets of the smooth surface along its normals; straight lines to
 the bone fill the hypodermis. Ridges are cut along the normals, and the columns below them merge
 three to one (`evfem.finger.blocks`). With a nail the upper half is the same lattice with
 :math:`e_y \ge 0`, without ridges; the nail replaces the outermost layer in those columns of
@@ -34,12 +36,15 @@ from evfem.common.arrays import Floats, Ints
 from evfem.finger.blocks import DIGITS, block
 from evfem.finger.fingerprint import faded
 from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
-from evfem.finger.outline import layer_coordinates
+from evfem.finger.outline import Ellipse, Outline, layer_coordinates
 from evfem.mesh.hexahedron import MIRRORED
 from evfem.mesh.mesh import Mesh
 
 #: half of the rectangle's sides over the semi-axes
 RECTANGLE = 0.64
+#: angles along and across on which the smallest radius of a body is sought, and the step to their neighbours
+SAMPLES, STEP = 61, 1e-4
+CIRCLE = Ellipse(1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -65,11 +70,75 @@ class Ellipsoid:
         n = unit / [self.a, self.b, self.c]
         return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
 
+    def ray(self, unit: Floats) -> Floats:
+        """Unit vectors (N, 3) towards the points `unit` in coordinates over the axes."""
+        return unit
+
+    def on(self, ray: Floats) -> Floats:
+        """Where rays (N, 3) meet the surface, over the axes."""
+        return ray
+
+    def depth(self, p: Floats, q: Floats) -> Floats:
+        """Depth (N,) of the surface below the middle at x = p a and z = q c, over b."""
+        return np.asarray(np.sqrt(1.0 - p * p - q * q))
+
     def radial_projection(self, points: Floats) -> Floats:
         """Where the ways from points (N, 3) to the centre meet the surface."""
         centre = [0.0, self.centre, 0.0]
         away = points - centre
         return np.asarray(centre + away / np.linalg.norm(away / [self.a, self.b, self.c], axis=1)[:, None])
+
+
+@dataclass(frozen=True)
+class Body(Ellipsoid):
+    r"""The body with the cross-section `section` (over its axes, of which the lower half counts) through
+    its middle, and along it :math:`G^m + |z/c|^m = 1`, G the size of the section through a point over that
+    in the middle: all sections have one shape. A superellipse with m its exponent makes a superellipsoid.
+    """
+
+    section: Outline = CIRCLE
+    m: float = 2.0
+
+    @property
+    def smallest_radius(self) -> float:
+        """Of curvature, on a grid of the lower half: the normals' derivatives by the points'."""
+        angle = np.linspace(0.02, np.pi - 0.02, SAMPLES)
+        s, t = (grid.ravel() for grid in np.meshgrid(angle, angle))
+        ray = np.column_stack([np.sin(t) * np.cos(s), -np.sin(t) * np.sin(s), np.cos(t)])
+        along = np.column_stack([-np.sin(s), -np.cos(s), 0.0 * s])
+        ends = [ray + sign * STEP * way for way in (along, np.cross(ray, along)) for sign in (-1.0, 1.0)]
+        moved = [self.on(one / np.linalg.norm(one, axis=1)[:, None]) for one in ends]
+        point, normal = (
+            np.stack([f(moved[1]) - f(moved[0]), f(moved[3]) - f(moved[2])], axis=2)
+            for f in (self.point, self.normal)
+        )
+        across = np.swapaxes(point, 1, 2)
+        shape = np.linalg.solve(across @ point, across @ normal)
+        return 1.0 / float(np.linalg.eigvals(shape).real.max())
+
+    def _size(self, points: Floats) -> tuple[Floats, Floats]:
+        """G (N,) of points (N, 3) over the axes, and their angle in the section."""
+        angle = np.arctan2(-np.abs(points[:, 1]), points[:, 0])
+        return np.hypot(points[:, 0], points[:, 1]) / np.hypot(*self.section.point(angle).T), angle
+
+    def ray(self, unit: Floats) -> Floats:
+        return np.asarray(unit / np.linalg.norm(unit, axis=1)[:, None])
+
+    def on(self, ray: Floats) -> Floats:
+        gauge = self._size(ray)[0] ** self.m + np.abs(ray[:, 2]) ** self.m
+        return np.asarray(ray * (gauge ** (-1.0 / self.m))[:, None])
+
+    def depth(self, p: Floats, q: Floats) -> Floats:
+        size = (1.0 - np.abs(q) ** self.m) ** (1.0 / self.m)
+        return np.asarray(-size * self.section.point(self.section.angle_at(p / size))[:, 1])
+
+    def normal(self, unit: Floats) -> Floats:
+        size, angle = self._size(unit)
+        out, at = self.section.normal(angle), self.section.point(angle)
+        out *= (size ** (self.m - 1.0) / np.sum(out * at, axis=1))[:, None]
+        out[:, 1] = np.where(unit[:, 1] > 0.0, -out[:, 1], out[:, 1])
+        z = np.sign(unit[:, 2]) * np.abs(unit[:, 2]) ** (self.m - 1.0)
+        return super().normal(np.column_stack([out, z]))
 
 
 class Relief(Protocol):
@@ -172,21 +241,24 @@ class Solid:
         """Unit vectors (N, 3) of parameters (N, 3) of the middle patch."""
         low, high = np.array(self.grid.low), np.array(self.grid.high)
         p, q = (low + (high - low) * parameters[:, :2]).T
-        return np.column_stack([p, -np.sqrt(1.0 - p * p - q * q), q])
+        return np.column_stack([p, -self.outer.depth(p, q), q])
 
     def _side(self, parameters: Floats, axis: int, end: int) -> Floats:
         """Unit vectors (N, 3) of the patch beyond the `end` (0 or 1) of an `axis` (0 x, 1 z), v outwards."""
         u, v = parameters[:, 0], parameters[:, 1]
         on_edge = np.full((len(u), 2), float(end))
         on_edge[:, 1 - axis] = u
-        start = self._rectangle(on_edge)
+        edge = self._rectangle(on_edge)
+        start = self.outer.ray(edge)
         aside, out = 0.25 * np.pi * (2.0 * u - 1.0), 1.0 if end else -1.0
         rim = np.zeros_like(start)
         rim[:, 2 * axis], rim[:, 2 - 2 * axis] = out * np.cos(aside), np.sin(aside)
         angle = np.arccos(np.clip((start * rim).sum(axis=1), -1.0, 1.0))[:, None]
         t = v[:, None]
-        unit = (np.sin((1.0 - t) * angle) * start + np.sin(t * angle) * rim) / np.sin(angle)
-        unit[v == 0.0], unit[v == 1.0] = start[v == 0.0], rim[v == 1.0]
+        ray = (np.sin((1.0 - t) * angle) * start + np.sin(t * angle) * rim) / np.sin(angle)
+        ray[v == 1.0] = rim[v == 1.0]
+        unit = self.outer.on(ray)
+        unit[v == 0.0] = edge[v == 0.0]
         return unit
 
     def _points(self, unit: Floats, level: Floats) -> Floats:
@@ -202,11 +274,11 @@ class Solid:
             normal,
             depth,
             level,
-            self.bone.radial_projection if whole else lambda _: self.bone.point(unit),
+            self.bone.radial_projection if whole else lambda _: self.bone.point(self.outer.ray(unit)),
         )
 
     def _relief(self, unit: Floats, foot: Floats) -> Floats:
-        """Depth (N,) of the surface below the smooth ellipsoid."""
+        """Depth (N,) of the surface below the smooth surface."""
         if self.relief is None:
             return np.zeros(len(unit))
         low, high = np.array(self.grid.low), np.array(self.grid.high)
@@ -229,8 +301,8 @@ class Solid:
 
     def _towards_nail(self, unit: Floats) -> Floats:
         """0 on the lower side, 1 on the nail, smooth in between."""
-        corner = 1.0 - self._half**2 - self.grid.high[1] ** 2
-        s = np.clip(unit[:, 1] / math.sqrt(corner), 0.0, 1.0)
+        corner = self.outer.depth(np.array([self._half]), np.array([self.grid.high[1]]))
+        s = np.clip(unit[:, 1] / corner, 0.0, 1.0)
         return np.asarray(s * s * (3.0 - 2.0 * s))
 
     def _turned(self, points: Floats) -> Floats:

@@ -2,19 +2,20 @@ r"""Load drift of a slide at held indentation, from friction and geometry.
 
 At constant height of the bone the load is not constant. Friction rotates the pad about the bone, by
 
-    phi = T b / (K + F e),    K = 4 pi G r^2 R^2 / (R^2 - r^2),    e = (a^2 - b^2) / b
+    K phi + F h'(phi) = T b,    K = 4 pi G r^2 R^2 / (R^2 - r^2)
 
-with the friction force T = mu F, the load F, the half axes a > b of the outline, and K the moment of
-an annulus of the softest tissue (shear modulus G) between the bone's larger half axis r and the
-mean radius R of the layers around that tissue; the pressure moves off the middle by e phi and
-resists with F e phi. The outline is wider than high, so that it stands deeper by e phi^2 / 2, and
+with the friction force T = mu F, the load F, half the height b of the outline, its height h(phi) below
+the middle when it is turned by phi (of an ellipse h' = (a^2 - b^2)/b phi for small angles), and K the
+moment of an annulus of the softest tissue (shear modulus G) between the bone's larger half axis r and
+the mean radius R of the layers around that tissue; the pressure moves off the middle by h' and resists
+with F h'. The outline is wider than high, so that it stands deeper by h(phi) - b, and
 
-    dF / F = n e phi^2 / (2 d),    F ~ d^n,    n = 1.6
+    dF / F = n (h(phi) - b) / d,    F ~ d^n,    n = 1.6
 
 with the indentation d, which for a finger like Table 2's is near 0.08 w (F / (G w))^0.62, w = 2 a.
-For fingers 16.7 to 20 mm wide and 12.8 to 14 mm high under 0.02 to 0.2 N/mm at friction 0.5 to 1
-the load drifts by 0.4 to 1.8 times the estimate (some cases are tested). Attraction, slopes and viscosity
-are neglected. Lengths in mm, forces in N/mm, moduli in MPa.
+For fingers 16.7 to 20 mm wide and 12.8 to 14 mm high, and outlines with exponents up to 4, under 0.02
+to 0.2 N/mm at friction 0.5 to 1 the load drifts by 0.4 to 1.8 times the estimate (some cases are
+tested). Attraction, slopes and viscosity are neglected. Lengths in mm, forces in N/mm, moduli in MPa.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.finger.fingerpad import FingerPad
+from evfem.finger.outline import Outline
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import path_lines
 from evfem.scene.scene import Scene
@@ -34,6 +37,8 @@ WORTH = 0.05
 LOAD_EXPONENT, DEPTH_COEFFICIENT = 1.6, 0.08
 #: spacing (mm) of the positions at which the friction is sampled
 STEP = 0.02
+#: largest angle (rad) by which the pad is thought to roll
+FARTHEST = 0.6
 
 
 def load_drift(finger: FingerPad, friction: float, load: float, modulus: float) -> float:
@@ -49,10 +54,19 @@ def load_drift(finger: FingerPad, friction: float, load: float, modulus: float) 
     if outer <= bone:
         return 0.0
     moment = 4.0 * np.pi * modulus * bone * outer / (outer - bone)
-    eccentricity = (a**2 - b**2) / b
-    angle = friction * load * b / (moment + load * abs(eccentricity))
+    angle, rise = _rolled(finger.outer)
+    resisting = moment * angle + load * np.abs(np.gradient(rise, angle))
+    deeper = np.interp(friction * load * b, resisting, rise)
     indentation = DEPTH_COEFFICIENT * width * (load / (modulus * width)) ** (1.0 / LOAD_EXPONENT)
-    return float(LOAD_EXPONENT * eccentricity * angle**2 / (2.0 * indentation))
+    return float(LOAD_EXPONENT * deeper / indentation)
+
+
+def _rolled(outer: Outline) -> tuple[Floats, Floats]:
+    """Angles (K,) by which an outline is turned, and how much deeper (mm) it then reaches."""
+    angle = np.linspace(0.0, FARTHEST, 301)
+    points = outer.point(np.linspace(-np.pi, 0.0, 2001))
+    depth = (points @ np.array([np.sin(angle), -np.cos(angle)])).max(axis=0)
+    return angle, depth - depth[0]
 
 
 def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[str]:

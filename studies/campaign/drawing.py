@@ -12,7 +12,7 @@ from copy import deepcopy
 from .attractions import add_drive, add_field, add_roughness, add_voltage, electrostatics
 from .bodies import LAYERS, TABLE_2_WIDTH, finger, width
 from .grounds import add_both_ways, add_friction_law, surface
-from .parts import PARTS, WISHES, add_parts, add_wish
+from .parts import OUTLINES, PARTS, WISHES, add_outline, add_parts, add_wish
 from .tables import Draw, Tables, six_digits
 
 #: share of the scenes whose finger has three dimensions, and the random numbers that these are drawn with
@@ -22,8 +22,9 @@ SHARE, SOLID = 0.1, 3
 def draw(seed: int, number: int) -> Tables:
     """The tables of scene `number` of a seed."""
     other = Draw(seed, number, SOLID)
+    outline = Draw(seed, number, OUTLINES)
     if other.chance(SHARE):
-        return draw_solid(other)
+        return add_outline(outline, draw_solid(other))
     random = Draw(seed, number)
     tables: Tables = {"version": 1, "finger": finger(random)}
     charged = random.chance(0.7)
@@ -44,7 +45,7 @@ def draw(seed: int, number: int) -> Tables:
     _add_path(other, tables)
     add_parts(Draw(seed, number, PARTS), tables)
     add_wish(Draw(seed, number, WISHES), tables)
-    return deepcopy(tables)
+    return deepcopy(add_outline(outline, tables))
 
 
 def _add_path(random: Draw, tables: Tables) -> None:

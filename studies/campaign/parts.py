@@ -1,5 +1,5 @@
-"""Tissue that relaxes, probes, surfaces that give way, adhesion, friction that a voltage shall make and what
-is beside a charge, added to scenes that are drawn.
+"""Tissue that relaxes, probes, surfaces that give way, adhesion, friction that a voltage shall make, what is
+beside a charge and flatter fingers, added to scenes that are drawn.
 
 They have random numbers of their own: the rest of a scene is what it is without them.
 """
@@ -7,8 +7,9 @@ They have random numbers of their own: the rest of a scene is what it is without
 from .attractions import largest_voltage
 from .tables import Draw, Tables, six_digits
 
-#: the random numbers of these parts, and of wishes
-PARTS, WISHES = 4, 5
+#: the random numbers of these parts, of wishes and of outlines; the flattest one, which all drawn skins fit
+PARTS, WISHES, OUTLINES = 4, 5, 6
+FLATTEST = 2.9
 
 
 def add_parts(random: Draw, tables: Tables) -> None:
@@ -46,6 +47,13 @@ def add_wish(random: Draw, tables: Tables) -> None:
     forces = [six_digits(random.spread(0.5, 4.0) * wished) for _ in places]
     table["voltage"] = {"kind": "follow_force", "position": places, "tangential_force": forces}
     table["voltage"]["largest_voltage"] = six_digits(largest_voltage(table))
+
+
+def add_outline(random: Draw, tables: Tables) -> Tables:
+    """Perhaps a finger flatter than an ellipse."""
+    if "mesh" not in tables["finger"] and random.chance(0.08):
+        tables["finger"]["outline"] = random.between(2.0, FLATTEST)
+    return tables
 
 
 def _sought(tables: Tables) -> bool:
