@@ -216,7 +216,7 @@ class FingerPad(LayeredFinger):
     @property
     def pressure_error(self) -> float:
         """Relative error of the peak contact pressure; of a smooth pad measured at .02 to .2 N/mm."""
-        cells, smooth = self.ridge_cells, {"coarse": 0.1, "medium": 0.06, "fine": 0.03}
+        cells, smooth = self.ridge_cells, {"coarse": 0.1, "medium": 0.06, "paper": 0.06, "fine": 0.03}
         return pressure_error(cells) if cells else smooth[self.resolution]
 
 

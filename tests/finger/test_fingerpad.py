@@ -326,3 +326,11 @@ def test_cells_per_ridge_of_a_file():
         "[finger]\ncells_per_ridge = 20\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.02\n"
     )
     assert ev.scenefile.loads("version = 1\n" + text).finger.cells_per_ridge == 20
+
+
+@pytest.mark.parametrize("ridges", [True, False])
+def test_every_resolution_states_an_error_of_the_pressure(ridges):
+    """None that is larger than that of a coarser one; "paper" has the surface of "medium"."""
+    errors = [FingerPad(ridges=ridges, resolution=one).pressure_error for one in RESOLUTIONS]
+    assert errors == sorted(errors, reverse=True)
+    assert 0.0 < errors[-1] < errors[0] < 1.0
