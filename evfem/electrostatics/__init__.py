@@ -16,6 +16,7 @@ from evfem.electrostatics.alternating import (
 )
 from evfem.electrostatics.dielectrics import SKINS, Dielectric, DielectricTable
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.localgaps import equivalent_gap
 
 if TYPE_CHECKING:
     from evfem.field.rigid import FieldSolution, rigid_field
@@ -33,6 +34,7 @@ __all__ = [
     "complex_length",
     "corner_frequencies",
     "eps_0",
+    "equivalent_gap",
     "rigid_field",
     "square_wave_pressure",
     "step_pressure",

@@ -22,6 +22,9 @@ law ends, at p = `pressure`, contact is complete and s = 0.
 
 A part of one's own needs `separation(pressure)` (`evfem.protocols.RoughnessLaw`). Units: mm, MPa.
 
+With a `distribution` these are means of local gaps, and the attraction sees another one
+(`evfem.electrostatics.localgaps`).
+
 **A linear core** of a force law (`Cored`): below a gap a straight line of the same work takes its place.
 
 Where the traction falls faster than the mesh resolves, the work of adhesion counts, not the strength [1]_
@@ -45,7 +48,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Checked, Values, Within, check_fields, number, real, to_python
+from evfem.common.checks import Checked, Values, Within, among, check_fields, choice, number, real, to_python
 from evfem.electrostatics.laws import traction_derivative
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw, RoughnessLaw
@@ -59,6 +62,9 @@ _OPEN = number(f"a length in mm, larger than 0, up to {WIDEST:g}", Within(0.0, W
 _PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "MPa")
 _EXPONENT = number("an exponent, larger than 0, up to 10", Within(0.0, 10.0, above=True))
 OpenGap = Annotated[float, _OPEN, "at no pressure, where the law itself has no bound"]
+#: distributions of local gaps; without one all are the mean gap
+NONE, DISTRIBUTIONS = "none", ("exponential", "gaussian")
+Distribution = Annotated[str, among((NONE, *DISTRIBUTIONS)), "of the local gaps around their mean"]
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,7 @@ class ConstantRoughness(Checked):
     """
 
     gap: Annotated[float, _GAP, "at every pressure"]
+    distribution: Distribution = NONE
     law = "constant"
 
     def separation(self, pressure: Values) -> Values:
@@ -90,6 +97,7 @@ class PowerRoughness(Checked):
     pressure: Annotated[float, _PRESSURE, "contact pressure of that gap"]
     exponent: Annotated[float, _EXPONENT, "gap (p / pressure)^-exponent"]
     open_gap: OpenGap
+    distribution: Distribution = NONE
     law = "power"
 
     @property
@@ -118,6 +126,7 @@ class ExponentialRoughness:
     decay: Annotated[float, _OPEN, "by which it falls for every factor e of the pressure"]
     pressure: Annotated[float, _PRESSURE, "contact pressure of full contact"]
     open_gap: OpenGap
+    distribution: Distribution = NONE
     law = "exponential"
 
     def __post_init__(self) -> None:
@@ -156,7 +165,17 @@ def roughness_of(given: Any, key: str = "roughness_gap") -> RoughnessLaw | None:
     return ConstantRoughness(gap) if gap != 0.0 else None
 
 
+def distribution_of(given: Any, key: str = "roughness_gap") -> str:
+    """How the local gaps of a scene's roughness are distributed; without a law all are the mean.
+
+    >>> distribution_of(0.001), distribution_of(ConstantRoughness(0.001, "gaussian"))
+    ('none', 'gaussian')
+    """
+    return choice(f"{key}.distribution", getattr(given, "distribution", NONE), (NONE, *DISTRIBUTIONS))
+
+
 def _gap(key: str, given: Any) -> Any:
+    distribution_of(given, key)
     return given if roughness_of(given, key) is given else float(given)
 
 

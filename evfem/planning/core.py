@@ -23,6 +23,7 @@ import numpy as np
 from evfem.circuit.signals import FollowForce
 from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import traction_derivative
+from evfem.electrostatics.localgaps import roughness_below
 from evfem.electrostatics.roughness import Cored, roughness_of
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import path_depth
@@ -93,6 +94,11 @@ class Closing:
         """The attraction between the nodes of the pad and the electrode."""
         return self.scene.electrics.above(self.scene.finger.electrical, self.mesh, self._nodes)
 
+    @cached_property
+    def rough(self) -> Any:
+        """How far apart the attraction sees rough faces, None where they are smooth."""
+        return roughness_below(*self.electrics.attraction, self.scene.roughness_gap)
+
     @property
     def core(self) -> Core | None:
         """The core that takes the law's place in a run, None where there is none or it does not fit."""
@@ -114,8 +120,8 @@ class Closing:
         (law, layers), (stiffness, distance, _) = self.electrics.attraction, self._local
         first = self.first
         given = None if isinstance(wanted, str) else wanted
-        cored = Cored(law, self.closed, self.resolved * stiffness, given)
-        length = np.max((cored.line(voltage, layers).end - self.closed)[first])
+        cored = Cored(law, self._apart, self.resolved * stiffness, given)
+        length = np.max((cored.line(voltage, layers).end - self._apart)[first])
         ratio = np.max(self._slope[first] / (self.resolved * stiffness[first]))
         work = np.max(cored.adhesion(voltage, layers))
         fits = given is not None or float(length) <= SEEN * self._gap
@@ -191,15 +197,20 @@ class Closing:
 
     @cached_property
     def closed(self) -> float:
-        """The gap (mm) of closed faces, that of rough ones without pressure."""
+        """The gap (mm) of closed faces, the mean one of rough faces without pressure."""
         rough = roughness_of(self.scene.roughness_gap)
         return 0.0 if rough is None else float(rough.separation(0.0))
+
+    @cached_property
+    def _apart(self) -> Any:
+        """The same as the attraction sees it, one gap or that of each node (P,)."""
+        return 0.0 if self.rough is None else self.rough.separation(np.zeros(self._nodes.size))
 
     @cached_property
     def _slope(self) -> Floats:
         """How fast the traction falls with the gap of closed faces under the largest voltage (P,), MPa/mm."""
         law, layers = self.electrics.attraction
-        slope = traction_derivative(law, self.closed, self.scene.electrics.largest_voltage, layers)
+        slope = traction_derivative(law, self._apart, self.scene.electrics.largest_voltage, layers)
         return -np.broadcast_to(slope, self._nodes.shape)
 
     @cached_property

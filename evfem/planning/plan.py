@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
+from evfem.electrostatics.localgaps import SpreadGaps, roughness_below
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
@@ -305,10 +306,14 @@ def _roughness(scene: Scene) -> str:
     rough = roughness_of(scene.roughness_gap)
     if rough is None:
         return ""
+    apart, seen = float(rough.separation(0.0)), roughness_below(*scene.electrics.attraction, rough)
+    spread = ""
+    if isinstance(seen, SpreadGaps):
+        even = float(np.min(seen.separation(0.0)))
+        spread = f" on average, {seen.distribution}: it attracts as an even one of {even:.3g} mm does"
     if isinstance(rough, ConstantRoughness):
-        return f", rough faces with an air gap of {rough.gap:g} mm in contact"
-    apart = float(rough.separation(0.0))
-    return f", rough faces with an air gap of up to {apart:g} mm that falls with contact pressure"
+        return f", rough faces with an air gap of {apart:g} mm in contact{spread}"
+    return f", rough faces with an air gap of up to {apart:g} mm that falls with contact pressure{spread}"
 
 
 def _time(scene: Scene, mesh: Mesh, element: str) -> Term:

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from evfem.circuit.signals import FollowForce
+from evfem.common.checks import Values
+from evfem.electrostatics.localgaps import roughness_below
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
@@ -20,7 +22,7 @@ from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.planning.attracted import PRESSED, broken_down, touching
 from evfem.planning.resolution import path_depth
-from evfem.protocols import ForceLaw
+from evfem.protocols import ForceLaw, RoughnessLaw
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
 from evfem.tissue.laws import NeoHookean
@@ -183,7 +185,7 @@ def _weakening(scene: Scene) -> Iterator[str]:
 
 def _out_of_reach(scene: Scene) -> Iterator[str]:
     """Attractions that are exactly 0: beyond the reach of adhesion, or of touching nodes alone in the air."""
-    apart, law = _rough(scene), scene.adhesion
+    apart, law = _pressed(roughness_of(scene.roughness_gap)), scene.adhesion
     if law is not None and not np.any(law.traction(apart)):
         yield (
             f"{type(law).__name__} has no traction at {apart:g} mm, which rough faces keep where they touch: "
@@ -229,7 +231,9 @@ def touching_traction(scene: Scene, law: ForceLaw | None = None) -> float | None
     if not _known(scene):
         return None
     own, layers = scene.electrics.attraction
-    return float(np.max((law or own).traction(_rough(scene), scene.electrics.largest_voltage, layers)))
+    law = law or own
+    apart = _pressed(roughness_below(law, layers, scene.roughness_gap))
+    return float(np.max(law.traction(apart, scene.electrics.largest_voltage, layers)))
 
 
 def _known(scene: Scene) -> bool:
@@ -237,10 +241,9 @@ def _known(scene: Scene) -> bool:
     return scene.electrics.acts and not isinstance(scene.voltage, (FollowForce, ChargeControl))
 
 
-def _rough(scene: Scene) -> float:
+def _pressed(rough: RoughnessLaw | None) -> Values:
     """How far apart (mm) rough faces are under `PRESSED`, 0 for smooth ones."""
-    rough = roughness_of(scene.roughness_gap)
-    return 0.0 if rough is None else float(rough.separation(PRESSED))
+    return 0.0 if rough is None else rough.separation(PRESSED)
 
 
 def _unbearable(scene: Scene) -> Iterator[str]:
@@ -248,7 +251,8 @@ def _unbearable(scene: Scene) -> Iterator[str]:
     pressed = any((course.depth or 0.0) > 0.0 for course in scene.courses)
     if pressed and _known(scene) and not isinstance(scene.finger, MeshedFinger):
         law, layers = scene.electrics.attraction
-        yield from touching(law, layers, scene.electrics.largest_voltage, _rough(scene))
+        apart = _pressed(roughness_below(law, layers, scene.roughness_gap))
+        yield from touching(law, layers, scene.electrics.largest_voltage, apart)
 
 
 def weakens(scene: Scene) -> bool:

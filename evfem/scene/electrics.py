@@ -18,6 +18,7 @@ from evfem.electrostatics.dielectrics import seen_at
 from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import Sandwich
+from evfem.electrostatics.roughness import NONE, distribution_of
 from evfem.electrostatics.timesignals import NANO, Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.faces import layer_thickness
@@ -215,6 +216,9 @@ def _check_resolved(scene: Any, drive: Drive) -> None:
     if isinstance(voltage, Carrier) and not voltage.resolved:
         allowed = "a carrier with resolved=True in a resolved drive"
         raise InputError("electrostatics.signal", "the mean of a carrier", allowed)
+    if (spread := distribution_of(scene.roughness_gap)) != NONE:
+        allowed = '"none" in a resolved drive: the charges of a node are those of one gap'
+        raise InputError("electrostatics.roughness_gap.distribution", spread, allowed)
     for i, course in enumerate(scene.courses):
         if course.largest_voltage is not None:
             raise InputError(f"motion[{i}]", "a voltage ramp in a resolved drive", "a signal over time")

@@ -29,7 +29,7 @@ from evfem.common.rooms import BodyTerm, Foundation, Room, unchangeable
 from evfem.common.views import called, changed, short, table
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
-from evfem.electrostatics.roughness import RoughnessGap
+from evfem.electrostatics.roughness import NONE, RoughnessGap, distribution_of
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError, Mistakes, describe_value
 from evfem.protocols import AdhesionLaw, CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
@@ -298,6 +298,9 @@ def _check_electrostatics(scene: Scene) -> None:
     if not scene.is_pulled and scene.roughness_gap != 0.0:
         allowed = "only with a law of attraction, or adhesion: without one it changes nothing"
         raise InputError("electrostatics.roughness_gap", describe_value(scene.roughness_gap), allowed)
+    if scene.law is None and (spread := distribution_of(scene.roughness_gap)) != NONE:
+        allowed = "only with a law of attraction: adhesion keeps the mean gap"
+        raise InputError("electrostatics.roughness_gap.distribution", spread, allowed)
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = f"{VOLTAGE['allowed']}, a VoltageProfile or a signal over time"

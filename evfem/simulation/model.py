@@ -230,13 +230,12 @@ def make_attraction(closing: Closing, pad: Pad | Skin, surface: Any) -> Attracti
     scene, mesh, electrics = closing.scene, closing.mesh, closing.electrics
     source_of(scene.voltage).check(scene)
     law, layers = electrics.attraction
-    rough = roughness_of(scene.roughness_gap)
     charging: Charging | NoCharges = NO_CHARGES
     if electrics.resolved:
         charging = Charging(electrics.sandwich, pad.nodes.size, electrics.parallel)
     if closing.core is not None:
         law = closing.core.law
-    local = (law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
+    local = (law, layers, pad, surface, scene.direction, scene.air_layer, closing.rough, charging)
     if scene.field == "local":
         return Attraction(*local)
     from evfem.planning.fieldchoice import chosen_field

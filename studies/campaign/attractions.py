@@ -4,11 +4,14 @@ over the position or over time, below 60 V/um in the insulator and 3000 V.
 
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
+from evfem.electrostatics.roughness import DISTRIBUTIONS
 
 from .tables import Draw, Tables, six_digits
 
 LARGEST_FIELD = 60e3  # V/mm
 LARGEST_VOLTAGE = 3000.0
+#: the random numbers that distributions of gaps are drawn with
+LOCAL = 6
 
 
 def electrostatics(random: Draw) -> Tables:
@@ -44,6 +47,14 @@ def add_roughness(random: Draw, tables: Tables) -> None:
         found["open_gap"] = six_digits(gap * random.between(2.0, 10.0))
     whole = gap if law == "constant" and random.chance(0.5) else found
     tables["electrostatics"]["roughness_gap"] = whole
+
+
+def add_distribution(random: Draw, tables: Tables) -> None:
+    """Perhaps local gaps around the mean ones, unless charges are resolved."""
+    table = tables.get("electrostatics", {})
+    rough = table.get("roughness_gap")
+    if isinstance(rough, dict) and table.get("drive") != "resolved" and random.chance(0.5):
+        rough["distribution"] = random.one_of(*DISTRIBUTIONS)
 
 
 def add_drive(random: Draw, tables: Tables) -> None:

@@ -9,7 +9,15 @@ steps, in any direction over flat faces and long waves along x, z and askew.
 
 from copy import deepcopy
 
-from .attractions import add_drive, add_field, add_roughness, add_voltage, electrostatics
+from .attractions import (
+    LOCAL,
+    add_distribution,
+    add_drive,
+    add_field,
+    add_roughness,
+    add_voltage,
+    electrostatics,
+)
 from .bodies import LAYERS, TABLE_2_WIDTH, finger, width
 from .grounds import add_both_ways, add_friction_law, surface
 from .parts import OUTLINES, PARTS, WISHES, add_outline, add_parts, add_wish
@@ -22,9 +30,8 @@ SHARE, SOLID = 0.1, 3
 def draw(seed: int, number: int) -> Tables:
     """The tables of scene `number` of a seed."""
     other = Draw(seed, number, SOLID)
-    outline = Draw(seed, number, OUTLINES)
     if other.chance(SHARE):
-        return add_outline(outline, draw_solid(other))
+        return _latest(seed, number, draw_solid(other))
     random = Draw(seed, number)
     tables: Tables = {"version": 1, "finger": finger(random)}
     charged = random.chance(0.7)
@@ -45,7 +52,13 @@ def draw(seed: int, number: int) -> Tables:
     _add_path(other, tables)
     add_parts(Draw(seed, number, PARTS), tables)
     add_wish(Draw(seed, number, WISHES), tables)
-    return deepcopy(add_outline(outline, tables))
+    return deepcopy(_latest(seed, number, tables))
+
+
+def _latest(seed: int, number: int, tables: Tables) -> Tables:
+    """What came in last, in the plane and in space, each drawn with random numbers of its own."""
+    add_distribution(Draw(seed, number, LOCAL), tables)
+    return add_outline(Draw(seed, number, OUTLINES), tables)
 
 
 def _add_path(random: Draw, tables: Tables) -> None:

@@ -11,6 +11,7 @@ from evfem import studies
 from evfem.common.pools import open_pool, processes
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
+from evfem.electrostatics.roughness import DISTRIBUTIONS
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.errors import NotConverged
 from evfem.scene.format import SIGNALS, SURFACES
@@ -63,6 +64,9 @@ def test_every_choice_of_a_scene_file_is_drawn(drawn):
         ("finger", "mesh", bodies.MESHES),
     ):
         assert seen(name, key) == {None, *choices}, key
+    rough = [one["electrostatics"].get("roughness_gap") for one in drawn if "electrostatics" in one]
+    spread = {one.get("distribution") for one in rough if isinstance(one, dict)}
+    assert spread == {None, *DISTRIBUTIONS}
     signals = [one["electrostatics"].get("signal", {}) for one in drawn if "electrostatics" in one]
     assert {signal.get("kind") for signal in signals} == {None, *SIGNALS}
     materials = [law for one in drawn for law in one["finger"].get("materials", {}).values()]
