@@ -128,13 +128,16 @@ def test_fall_and_closing_are_those_of_the_law(law, surface):
     assert np.abs(closing[~free]).max() < 1e-9 * closing.max()
 
 
+@pytest.mark.parametrize("distribution", ["none", "exponential", "gaussian"])
 @pytest.mark.parametrize(("direction", "neighbours"), [("vertical", 1e-6), ("normal", 5e-3)])
-def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_axes(direction, neighbours):
+def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_axes(
+    direction, neighbours, distribution
+):
     """The change of the force on a sloped surface per contact force, by central differences, turned into
     the frames of the nodes; and what is lost with the contact force. Along the normal of the surface
     a potential also pushes the neighbours apart, which is left out.
     """
-    rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
+    rough = PowerRoughness(0.001, pressure=0.01, exponent=0.5, open_gap=0.006, distribution=distribution)
     wave = Sinusoid(terms=[[0.15, 2.0, 0.4]], y=-0.2, insulator=THIN)
     linear, model, state = made(
         wave, voltage=60.0, law=StrongTroxel(), direction=direction, roughness_gap=rough

@@ -205,6 +205,7 @@ def yielding(hold, **more):
 
 LAYERED = {"insulator": ev.Layer(0.01, 3.0)}
 ROUGH = ev.PowerRoughness(gap=0.002, pressure=0.01, exponent=0.3, open_gap=0.004)
+LOCAL = replace(ROUGH, distribution="exponential")
 CASES = {
     "own law": (lambda: block(law=Own(0.017, 0.1)), TISSUE + "bulk"),
     "indentation": (block, "motion.0.indentation"),
@@ -223,6 +224,8 @@ CASES = {
     "hand": (lambda: block(hand=ev.Hand(stiffness=0.02, damping=1e-3)), "hand.stiffness"),
     "charges": (lambda: block(drive=ev.Drive(resolved=True, gap_conductivity=1e-9)), TISSUE + "E"),
     "rough faces": (lambda: block(roughness_gap=ROUGH), "electrostatics.roughness_gap.gap"),
+    "local gaps": (lambda: block(roughness_gap=LOCAL), "electrostatics.roughness_gap.exponent"),
+    "layers below them": (lambda: block(roughness_gap=LOCAL), THICKNESS),
     "penalty": (
         lambda: block(
             solver=replace(block().solver, contact="penalty", penalty_normal=10.0, penalty_tangential=10.0)
