@@ -28,6 +28,7 @@ _NAMES = {
         "Coulomb",
         "LoadIndexFriction",
         "RateFriction",
+        "SlipMemory",
     ),
     "surface.relief": ("Relief",),
     "surface.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),

@@ -91,6 +91,7 @@ from evfem.surface.friction import AgeingFriction as AgeingFriction
 from evfem.surface.friction import Coulomb as Coulomb
 from evfem.surface.friction import LoadIndexFriction as LoadIndexFriction
 from evfem.surface.friction import RateFriction as RateFriction
+from evfem.surface.friction import SlipMemory as SlipMemory
 from evfem.surface.relief import Relief as Relief
 from evfem.surface.surfaces import Display as Display
 from evfem.surface.surfaces import Flat as Flat

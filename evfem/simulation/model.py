@@ -33,7 +33,7 @@ from evfem.surface.skin import Skin, make_skin
 from evfem.terms.attraction import ELECTROSTATIC, Attraction
 from evfem.terms.charging import NO_CHARGES, ChargeBooks, Charging, NoCharges
 from evfem.terms.foundation import Penalties, foundation_of
-from evfem.terms.friction import LawFriction
+from evfem.terms.friction import bounds_of
 from evfem.terms.hand import Drive, drive_of
 from evfem.terms.sources import GAP_COLUMNS, source_of
 from evfem.terms.traction import PadTraction
@@ -208,7 +208,7 @@ def make_interface(closing: Closing, pad: Pad | Skin, surface: Any, attraction: 
     if cored:
         interface.restored = attraction.restored
     if cored or not isinstance(scene.friction_law, Coulomb):
-        interface.bounds = LawFriction(scene.friction_law, pad.nodes.size)
+        interface.bounds = bounds_of(scene.friction_law, interface)
     return interface
 
 

@@ -12,7 +12,16 @@ law                   tau                                                       
 `AdhesiveFriction`    strength min(1, p / full) + mu p                                    adhesive
 `RateFriction`        mu p (ratio + (1 - ratio) exp(-v / speed)) (v / speed)^exponent     rate
 `AgeingFriction`      mu p (1 - (1 - fresh) exp(-t / time))                               ageing
+`SlipMemory`          follows one of these over a length of slip                          slip_memory
 ====================  ==================================================================  ===========
+
+`SlipMemory` remembers the bound :math:`S` of every node. It follows that of the law in it, its equilibrium
+:math:`S_e`, over a length L of slip, and a time T where that is finite,
+
+.. math:: \dot S = (|v|/L + 1/T)(S_e - S), \qquad S_1 = S_e + (S_0 - S_e)\,e^{-\Delta s/L - \Delta t/T},
+
+the second in a step that slips by :math:`\Delta s`, with the equilibrium of its end: exact while that stays,
+stable at any step, and the law itself where L vanishes. A node that is open has S = 0.
 
 `Linearised` is what the active set needs of a law at an iterate: per node the bound's derivative by
 the contact force, b', and what is left of it at no force, c, so that a slipping node carries
@@ -21,18 +30,21 @@ Where the tangent would be negative without a load (a law that grows faster than
 chord from there takes its place.
 
 Sources: skin on smooth glass, load and ageing: doi:10.1098/rsif.2016.0935,
-doi:10.1073/pnas.1706233114 (the real area grows to 95 % within about 20 s). Units: mm, MPa, s.
+doi:10.1073/pnas.1706233114 (the real area grows to 95 % within about 20 s). Friction under a modulated
+voltage of first order, with a cut-off of 13.8 Hz per mm/s of speed: arXiv:2505.11162; read as a length it is
+1/(2 pi 13.8) mm = 11.5 um. Units: mm, MPa, s.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Named, Values, Within, number, to_python
+from evfem.common.checks import Named, Values, Within, number, real, to_python
 from evfem.protocols import FrictionLaw
 from evfem.tensor import derivative
 
@@ -50,6 +62,10 @@ _INDEX = number("an exponent from 0.1 to 3", Within(0.1, 3.0))
 _RATIO = number("a ratio from 0 to 100", Within(0.0, 100.0))
 _EXPONENT = number("an exponent from -2 to 2", Within(-2.0, 2.0))
 _TIME = number("a time in s, larger than 0", Within(0.0, 1e6, above=True), "s")
+_SLIP = number("a length in mm, larger than 0, up to 1000", Within(0.0, 1e3, above=True), "mm")
+_COEFFICIENT = Within(0.0)
+_INNER = "a coefficient, not negative, or a law of friction without a memory"
+_AT_REST = "a time in s, larger than 0, or inf"
 
 
 class NamedFriction(Named):
@@ -163,6 +179,56 @@ class AgeingFriction(NamedFriction, kind="ageing"):
         return to_python(mu * pressure * (1.0 - (1.0 - self.fresh) * np.exp(-np.asarray(age) / self.time)))
 
 
+def _inner(key: str, value: Any) -> Any:
+    """A coefficient as a float, or a law without a memory of its own."""
+    if isinstance(value, SlipMemory) or isinstance(value, type) or not isinstance(value, FrictionLaw):
+        return real(key, value, _INNER, _COEFFICIENT)
+    return value
+
+
+def _at_rest(key: str, value: Any) -> float:
+    endless = isinstance(value, float) and value == math.inf
+    return math.inf if endless else real(key, value, _AT_REST, _TIME["test"])
+
+
+_INNER_LAW = {"allowed": _INNER, "check": _inner, "type": float | dict, "kinds": lambda: KINDS, "tag": "kind"}
+_REST = {"allowed": _AT_REST, "check": _at_rest, "test": Within(0.0, above=True), "unit": "s"}
+
+
+@dataclass(frozen=True)
+class SlipMemory(NamedFriction, kind="slip_memory"):
+    """Friction that slip renews: the bound of a node follows what `friction` gives, over a length of its
+    slip, and a time where that is finite. `bound` is the equilibrium; `Renewing` has what a step ends with.
+
+    >>> law = SlipMemory(0.5)
+    >>> law.bound(0.01, 0.3, 5.0, 0.0), law.timed
+    (0.005, False)
+    """
+
+    friction: Annotated[
+        Any,
+        _INNER_LAW,
+        "what it follows: a law, or a coefficient in the place of the surface's",
+    ]
+    length: Annotated[float, _SLIP, "of slip over which friction follows"] = 0.0115
+    time: Annotated[
+        float,
+        _REST,
+        "over which it follows at rest; inf: at rest it stays",
+    ] = math.inf
+
+    @property
+    def timed(self) -> bool:
+        """Whether it depends on speed or time."""
+        return self.time < math.inf or bool(getattr(self.friction, "timed", False))
+
+    def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
+        """Largest shear traction in MPa after a long slip."""
+        if isinstance(self.friction, float):
+            return self.friction * pressure
+        return self.friction.bound(pressure, mu, speed, age)
+
+
 KINDS = NamedFriction.kinds
 
 
@@ -198,9 +264,17 @@ class Slipping:
         p = np.maximum(self.normal, 0.0) / self.length
         return p + with_core(p, self.withheld, self.left)
 
+    @property
+    def _at(self) -> dict[str, Floats]:
+        return {"pressure": self.pressure, "mu": self.mu, "speed": self.speed, "age": self.age}
+
     def bound(self, law: FrictionLaw) -> Floats:
         """Largest shear forces (k,) in N/mm."""
-        return np.asarray(law.bound(self.pressure, self.mu, self.speed, self.age) * self.length)
+        return np.asarray(law.bound(**self._at) * self.length)
+
+    def resistance(self, law: FrictionLaw) -> Floats:
+        """The same in the mean over the slip of a step, (k,)."""
+        return self.bound(law)
 
     def linearised(self, law: FrictionLaw) -> Linearised:
         """Derivatives by contact force, speed and coefficient."""
@@ -228,10 +302,54 @@ class Slipping:
         return np.where(moving, growth / np.where(moving, self.speed, 1.0), 0.0)
 
     def _derivative(self, law: FrictionLaw, by: Literal["pressure", "mu", "speed"]) -> Floats:
-        at = {"pressure": self.pressure, "mu": self.mu, "speed": self.speed, "age": self.age}
+        at = self._at
         step = {"pressure": PRESSURE_STEP, "mu": COEFFICIENT_STEP, "speed": SPEED_STEP}[by]
         found = derivative(lambda value: law.bound(**(at | {by: value})), at[by], step)
         return np.broadcast_to(np.asarray(found, dtype=float), self.normal.shape)
+
+
+@dataclass(frozen=True)
+class Renewing(Slipping):
+    """The same of nodes under a `SlipMemory`, which began a step of so many `seconds` with the bounds
+    `before` (k,) in MPa. Without time the speed is the slip in mm over 1 s, and the law in it is at rest.
+    """
+
+    before: Floats = field(default_factory=lambda: np.zeros(0))
+    seconds: float = 0.0
+
+    @property
+    def _at(self) -> dict[str, Floats]:
+        return super()._at | ({} if self.seconds > 0.0 else {"speed": np.zeros_like(self.speed)})
+
+    @property
+    def unit(self) -> float:
+        """Seconds by which slips are divided."""
+        return self.seconds or 1.0
+
+    def _passed(self, law: Any) -> Floats:
+        """Slip over length plus time over time, (k,)."""
+        return np.asarray(self.speed * self.unit / law.length + self.seconds / law.time)
+
+    def renewed(self, law: Any) -> Floats:
+        """Bounds (k,) in MPa at the end of the step."""
+        there = law.bound(**self._at)
+        return np.asarray(there + (self.before - there) * np.exp(-self._passed(law)))
+
+    def bound(self, law: Any) -> Floats:
+        return np.asarray(self.renewed(law) * self.length)
+
+    def resistance(self, law: Any) -> Floats:
+        there, passed = law.bound(**self._at), self._passed(law)
+        some = passed > 0.0
+        kept = np.where(some, -np.expm1(-passed) / np.where(some, passed, 1.0), 1.0)
+        return np.asarray((there + (self.before - there) * kept) * self.length)
+
+    def _derivative(self, law: Any, by: Literal["pressure", "mu", "speed"]) -> Floats:
+        kept, found = np.exp(-self._passed(law)), super()._derivative(law, by)
+        if by != "speed":
+            return np.asarray(found * (1.0 - kept))
+        follows = (law.bound(**self._at) - self.before) * kept * self.unit / law.length
+        return np.asarray(found * (1.0 - kept) * (self.seconds > 0.0) + follows)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ Under Coulomb's law the bound of a node is :math:`\mu(x)\,\lambda_n`, which the 
 exactly. Another law (`evfem.surface.friction`) is linearised at each iterate, and has the contact time of
 each node, `contact_time` (P,) in s, as memory. With interface compliance C and slip stiffness dF/ds = K of
 the bound F(s), a node that moves by dx slips by ds = dx - C dF, and friction grows by K dx / (1 + K C): the
-tangential compliance is scaled by 1 + K C (springs in series).
+tangential compliance is scaled by 1 + K C (springs in series). A law that follows another over the slip
+(`SlipMemory`) has the bound of each node, `friction_bound` (P,) in MPa, as a further memory; its slip counts
+without time too.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from evfem.common.rooms import Room
 from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, sizes
 from evfem.protocols import FrictionLaw
-from evfem.surface.friction import Slipping
+from evfem.surface.friction import Renewing, SlipMemory, Slipping
 from evfem.tensor import derivative
 from evfem.terms.slipping import OscillatingNodes
 
@@ -90,6 +92,11 @@ class LawFriction(ProportionalFriction):
     def accept(self, old: Any, new: Any) -> dict[str, Floats]:
         return {"contact_time": self.contact_time(old)}
 
+    @property
+    def _unit(self) -> float:
+        """Seconds by which slips are divided, 0 where they do not count."""
+        return self._seconds
+
     def contact_time(self, old: State) -> Floats:
         """Contact time (P,) in s of every pad node at the end of the step from `old`."""
         return np.where(old.touching, old.memory["contact_time"] + self._seconds, 0.0)
@@ -98,7 +105,7 @@ class LawFriction(ProportionalFriction):
         self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats
     ) -> Slipping:
         """Data of the law at these pad nodes (k,), with coefficients (k,) and slips (k,)."""
-        speed = np.abs(slip) / self._seconds if self._seconds > 0.0 else np.zeros_like(slip)
+        speed = np.abs(slip) / self._unit if self._unit > 0.0 else np.zeros_like(slip)
         withheld, left = (each[nodes] for each in interface.core(state))
         length, age = interface.tributary(state)[nodes], self.contact_time(old)[nodes]
         return Slipping(state.contact_force[nodes, 0], length, mu, speed, age, withheld, left)
@@ -114,8 +121,8 @@ class LawFriction(ProportionalFriction):
         ):  # a slip that speeds up may turn: what falls with the speed goes by the iterate's
             found = replace(found, by_speed=np.maximum(found.by_speed, 0.0))
         by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
-        timed = self._seconds > 0.0
-        by_slip = by_speed / self._seconds if timed else np.zeros_like(slip)
+        timed = self._unit > 0.0
+        by_slip = by_speed / self._unit if timed else np.zeros_like(slip)
         yielding = np.maximum(by_slip, 0.0) * give
         series = 1.0 / (1.0 + yielding)
         normal = np.maximum(known.force[:, 0], 0.0)
@@ -141,7 +148,7 @@ class LawFriction(ProportionalFriction):
         mu = interface.friction(old, nodes := np.arange(len(position)), position)
         nodal = self.slipping(interface, old, new, nodes, mu, slip)
         length = interface.tributary_at(ends, position)
-        return replace(nodal, normal=normal, length=length).bound(self.law)
+        return replace(nodal, normal=normal, length=length).resistance(self.law)
 
     def slopes(
         self, interface: Any, old: State, state: State, c: Ints, mu: Floats, slip: Floats
@@ -152,3 +159,45 @@ class LawFriction(ProportionalFriction):
         by_normal = derivative(lambda N: replace(nodal, normal=N).bound(law), normal, FORCE_STEP)
         by_length = derivative(lambda A: replace(nodal, length=A).bound(law), nodal.length, LENGTH_STEP)
         return BoundSlopes(nodal.bound(law), by_normal, found.by_mu, found.by_speed, by_length)
+
+
+class RenewedFriction(LawFriction):
+    """The bound of a `SlipMemory` on the pad of an `interface`."""
+
+    def __init__(self, law: SlipMemory, interface: Any) -> None:
+        super().__init__(law, interface.pad.nodes.size)
+        self.interface = interface
+
+    @property
+    def _unit(self) -> float:
+        return self._seconds or 1.0
+
+    def memory(self, state: Any) -> dict[str, Floats]:
+        return super().memory(state) | {"friction_bound": np.zeros(self.nodes)}
+
+    def slipping(
+        self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats
+    ) -> Renewing:
+        given = super().slipping(interface, old, state, nodes, mu, slip)
+        before = old.memory["friction_bound"][nodes]
+        return Renewing(**vars(given), before=before, seconds=self._seconds)
+
+    def accept(self, old: Any, new: Any) -> dict[str, Floats]:
+        nodes, place = np.arange(self.nodes), self.interface.jumps.at(self.interface.on_display(new))
+        mu = self.interface.friction(old, nodes, place)
+        nodal = self.slipping(self.interface, old, new, nodes, mu, self._slipped(old, new))
+        bound = np.where(new.touching, nodal.renewed(self.law), 0.0)
+        return super().accept(old, new) | {"friction_bound": bound}
+
+    def _slipped(self, old: State, new: State) -> Floats:
+        """Slips (P,) in mm, from its pin of a node that is pinned to a jump of friction."""
+        give = self.interface.compliance(old)[:, 1:]
+        slip = self.interface.slip(old, new) + give * (new.contact_force - old.contact_force)[:, 1:]
+        return np.where(new.status >= FORWARD, sizes(slip), 0.0)
+
+
+def bounds_of(law: FrictionLaw, interface: Any) -> LawFriction:
+    """The bounds of a law of friction on the pad of an interface."""
+    if isinstance(law, SlipMemory):
+        return RenewedFriction(law, interface)
+    return LawFriction(law, interface.pad.nodes.size)
