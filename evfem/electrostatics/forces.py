@@ -1,4 +1,5 @@
-"""Closed-form forces on flat and ellipsoidal pads (3)-(8b), (24); skin thickness from thresholds.
+"""Closed-form forces on flat and ellipsoidal pads (3)-(8b), (24); skin thickness from thresholds;
+the gain of friction that slip renews.
 
 Units: mm, N, V; permittivities relative. All arguments broadcast; scalars give a float. Equation numbers are
 those of the paper on modelling and validating electrovibration displays that the project starts from.
@@ -253,6 +254,24 @@ def _between(key: str, entered: Values, lowest: float, highest: float, allowed: 
     if np.any(value > highest):
         raise InputError(key, float(np.max(value)), allowed)
     return value
+
+
+def slip_memory_gain(frequency: Values, speed: Values, length: Values) -> Values:
+    """Share of a change of friction that skin follows under `ev.SlipMemory`, complex: 1 / (1 + 2 pi i f L/v).
+
+    The pressure changes with `frequency` (Hz) while the skin slides at `speed` (mm/s), and friction follows
+    over the `length` (mm) of slip. Half of its power is left at v/(2 pi L), 13.8 Hz per mm/s of the speed in
+    doi:10.48550/arXiv.2505.11162. Raises InputError where a frequency is negative, a speed or length not
+    above 0.
+
+    >>> gain = slip_memory_gain(276.0, 20.0, 1.0 / (2.0 * np.pi * 13.8))
+    >>> round(abs(gain), 10), round(float(np.degrees(np.angle(gain))), 6)
+    (0.7071067812, -45.0)
+    """
+    frequency = at_least("frequency", frequency, 0.0, "a frequency in Hz, not negative")
+    speed = above("speed", speed, 0.0, "a speed in mm/s above zero")
+    length = above("length", length, 0.0, "a length of slip in mm above zero")
+    return to_python(np.asarray(1.0 / (1.0 + 2.0j * np.pi * frequency * length / speed)))
 
 
 def _threshold_weights(

@@ -82,7 +82,8 @@ def check_components(scene: Scene, dim: int) -> None:
             _check_stiffness(key, law, dim)
     if _is_own(scene.surface):
         check_surface(scene)
-    if _is_own(scene.friction_law):
+    friction = scene.friction_law
+    if _is_own(friction) or _is_own(getattr(friction, "friction", friction)):  # what a memory follows
         check_friction_law(scene)
     if isinstance(scene.roughness_gap, RoughnessLaw) and _is_own(scene.roughness_gap):
         check_roughness(scene.roughness_gap)

@@ -34,7 +34,7 @@ from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space
 from evfem.scene.terms import Boundary
-from evfem.surface.friction import Coulomb
+from evfem.surface.friction import Coulomb, SlipMemory
 from evfem.terms.hand import Hand
 from evfem.terms.traction import PadTraction
 from evfem.tissue.branches import KEPT_BYTES, branches_in
@@ -273,8 +273,23 @@ def _friction(scene: Scene) -> Term:
     falling = ""
     if jumps(scene):
         falling = "; velocity weakening: without inertia the finger may jump, dynamics = inertial resolves it"
-    limit = f"shear limit of each node from its pressure{timed}"
+    limit = f"shear limit of each node from its pressure{timed}{_follows(scene)}"
     return Term("friction", True, f"{type(law).__name__}: {limit}{falling}")
+
+
+def _follows(scene: Scene) -> str:
+    """What a memory of slip follows, and whether the steps of slides see it; empty without one."""
+    law = scene.friction_law
+    if not isinstance(law, SlipMemory):
+        return ""
+    inner = law.friction
+    what = f"the coefficient {inner:g}" if isinstance(inner, float) else type(inner).__name__
+    at_rest = f" and {law.time:g} s" if law.time < np.inf else ""
+    longest = max((float(np.hypot(*one.course.travel)) / one.steps for one in scene.motion), default=0.0)
+    fine = f"steps of slides have up to {longest:.3g} mm"
+    if longest > law.length:
+        fine += f", {longest / law.length:.3g} lengths: such a step sees {what}, not how it is approached"
+    return f", which follows {what} over {law.length:g} mm of slip{at_rest}; {fine}"
 
 
 def _electricity(closing: Closing) -> Term:

@@ -45,6 +45,7 @@ from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.simulation.result import Result
 from evfem.simulation.run import Run
+from evfem.surface.friction import SlipMemory
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
 
 AXES = ("normal", "tangential")
@@ -146,6 +147,9 @@ def _checked(frequencies: Any) -> Floats:
 
 def _check(scene: Scene) -> None:
     """Raise `InputError` for scenes without a stiffness of small motions."""
+    if isinstance(scene.friction_law, SlipMemory):
+        allowed = "a law of friction without memory; steps in time show what a memory does"
+        raise InputError("scene", "a scene with friction that slip renews", allowed)
     if scene.ground.elastic is not None:
         raise InputError("scene", "a scene with an elastic surface", "a rigid surface")
     resolved = scene.drive is not None and scene.drive.resolved

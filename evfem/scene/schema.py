@@ -92,7 +92,7 @@ def _entry(key: Key) -> Entry:
     if "names" in rule:
         shape["enum"] = list(rule["names"])
     shape["description"] = key.documented
-    if not key.required and isinstance(key.default, (bool, int, float, str)):
+    if not key.required and isinstance(key.default, (bool, int, float, str)) and key.default != math.inf:
         shape["default"] = key.default
     default = "" if key.required else _toml(key.default)
     return Entry(key.name, _spoken(shape), unit, default, key.required, key.allowed, key.meaning, shape)
@@ -217,10 +217,10 @@ def schema() -> Schema:
     told = {key.name: inner[key.name] | {"description": key.meaning} for key in top.keys}
     laws = tables["finger.materials.NAME"]
     definitions = {
-        "friction": one_of["surface.friction_law"],
+        "friction": {"oneOf": [_nested(one, "friction") for one in tables["surface.friction_law"]]},
         "material": one_of["finger.materials.NAME"],
         "layer": {"anyOf": [_without_law(laws[0]), {"$ref": "#/definitions/material"}]},
-        "signal": {"oneOf": [_modulated(one) for one in tables["electrostatics.signal"]]},
+        "signal": {"oneOf": [_nested(one, "signal") for one in tables["electrostatics.signal"]]},
     }
     return {"$schema": DRAFT, "title": "evfem scene", **top.schema(**told), "definitions": definitions}
 
@@ -232,11 +232,15 @@ def _without_law(neo_hookean: Section) -> Schema:
     return found | {"title": "moduli", "required": []}
 
 
-def _modulated(signal: Section) -> Schema:
-    """The envelope of a carrier is a signal too, and so is a charge over time."""
-    found = signal.schema()
-    for name in {"envelope", "charge"} & {*found["properties"]}:
+#: keys of a definition's tables that are a number or that definition again: the envelope of a carrier, a
+#: charge over time, the friction that a memory follows
+NESTED = {"signal": {"envelope", "charge"}, "friction": {"friction"}}
+
+
+def _nested(one: Section, definition: str) -> Schema:
+    found = one.schema()
+    for name in NESTED[definition] & {*found["properties"]}:
         text = found["properties"][name]["description"]
-        options = [{"type": "number"}, {"$ref": "#/definitions/signal"}]
+        options = [{"type": "number"}, {"$ref": f"#/definitions/{definition}"}]
         found["properties"][name] = {"anyOf": options, "description": text}
     return found

@@ -90,9 +90,8 @@ def _friction_work(substep: SubstepWork) -> float:
     length = substep.slip_length
     if not length.any():
         return 0.0
-    interface, normal = substep.model.equilibrium.interface, np.maximum(substep.new.contact_force[:, 0], 0.0)
-    ends, place = (substep.old, substep.new), substep.positions[1]
-    return float(np.sum(interface.resistance(ends, place, normal, length) * length))
+    limit = substep.model.equilibrium.interface.limit
+    return float(np.sum(limit(substep.old, substep.new, substep.positions[1], length) * length))
 
 
 def _contact_work(substep: SubstepWork) -> Floats:

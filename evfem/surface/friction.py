@@ -53,6 +53,9 @@ from evfem.tensor import derivative
 LOWEST = 0.01
 #: contact pressure from which on all that a core withholds counts, as a share of the core's own traction
 FULL = 0.05
+#: largest shear traction over the pressure of a node whose bound lags: one that opens would else be pulled
+#: along by a shear that neither an open nor a closed node has
+STEEPEST = 20.0
 #: steps of differences of a law that drops imaginary parts: in MPa, of a coefficient, in mm/s
 PRESSURE_STEP, COEFFICIENT_STEP, SPEED_STEP = 1e-7, 1e-6, 1e-5
 _PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "MPa")
@@ -335,21 +338,28 @@ class Renewing(Slipping):
         there = law.bound(**self._at)
         return np.asarray(there + (self.before - there) * np.exp(-self._passed(law)))
 
+    def _borne(self, bound: Floats) -> Floats:
+        """What nodes resist with of a bound (k,) in MPa: where the pressure has almost gone, less."""
+        most = STEEPEST * self.pressure
+        return np.asarray(np.where(np.real(bound) < np.real(most), bound, most) * self.length)
+
     def bound(self, law: Any) -> Floats:
-        return np.asarray(self.renewed(law) * self.length)
+        return self._borne(self.renewed(law))
 
     def resistance(self, law: Any) -> Floats:
         there, passed = law.bound(**self._at), self._passed(law)
         some = passed > 0.0
         kept = np.where(some, -np.expm1(-passed) / np.where(some, passed, 1.0), 1.0)
-        return np.asarray((there + (self.before - there) * kept) * self.length)
+        return self._borne(there + (self.before - there) * kept)
 
     def _derivative(self, law: Any, by: Literal["pressure", "mu", "speed"]) -> Floats:
         kept, found = np.exp(-self._passed(law)), super()._derivative(law, by)
-        if by != "speed":
-            return np.asarray(found * (1.0 - kept))
-        follows = (law.bound(**self._at) - self.before) * kept * self.unit / law.length
-        return np.asarray(found * (1.0 - kept) * (self.seconds > 0.0) + follows)
+        found = found * (1.0 - kept)
+        if by == "speed":
+            follows = (law.bound(**self._at) - self.before) * kept * self.unit / law.length
+            found = found * (self.seconds > 0.0) + follows
+        less = self.renewed(law) < STEEPEST * self.pressure
+        return np.asarray(np.where(less, found, STEEPEST if by == "pressure" else 0.0))
 
 
 @dataclass(frozen=True)

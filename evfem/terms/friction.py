@@ -197,7 +197,9 @@ class RenewedFriction(LawFriction):
 
 
 def bounds_of(law: FrictionLaw, interface: Any) -> LawFriction:
-    """The bounds of a law of friction on the pad of an interface."""
-    if isinstance(law, SlipMemory):
+    """The bounds of a law of friction on the pad of an interface. A length of slip that is shorter than slips
+    are known to is none: the law is its equilibrium.
+    """
+    if isinstance(law, SlipMemory) and law.length > interface.tolerance * interface.length:
         return RenewedFriction(law, interface)
     return LawFriction(law, interface.pad.nodes.size)
