@@ -91,6 +91,7 @@ def page(found: list[Section], pictures: str = "") -> str:
             f"![{_alternative(section)}]({pictures}{section.name}.png)",
             "\n".join(markdown(HEAD, _cells(section))),
         ]
+        blocks += ["\n".join(markdown(head, cells)) for head, cells in _computed_otherwise(section)]
         lines = [_filled(f"{i}. {_sentence(why)}", "   ") for why, i in reasons(section.rows).items()]
         blocks += ["\n".join(line for item in lines for line in item)] if lines else []
         blocks.append("\n".join(_filled(section.how)))
@@ -106,6 +107,9 @@ def html(found: list[Section]) -> str:
         parts.append(f'<p><img src="{section.name}.png" alt="{escape(_alternative(section))}"></p>')
         rows = [_row(HEAD, "th"), *(_row(row, "td") for row in _cells(section))]
         parts.append("<table>\n" + "\n".join(rows) + "\n</table>")
+        for heads, cells in _computed_otherwise(section):
+            more = [_row(heads, "th"), *(_row(row, "td") for row in cells)]
+            parts.append("<table>\n" + "\n".join(more) + "\n</table>")
         items = [f"<li>{escape(_sentence(why))}</li>" for why in reasons(section.rows)]
         parts.append("<ol>" + "\n".join(items) + "</ol>" if items else "")
         parts.append(f"<p>{escape(section.how)}</p>")
@@ -120,6 +124,14 @@ def _cells(section: Section) -> list[list[str]]:
         [row.what, row.place, row.printed, row.here, row.difference, str(numbers.get(row.why, ""))]
         for row in section.rows
     ]
+
+
+def _computed_otherwise(section: Section) -> list[tuple[list[str], list[list[str]]]]:
+    """A second table, if there is one: printed numbers beside the same computed in other ways."""
+    rows = [row for row in section.rows if row.others]
+    heads = list(dict.fromkeys(head for row in rows for head in row.others))
+    cells = [[row.what, row.printed, row.here, *(row.others.get(head, "") for head in heads)] for row in rows]
+    return [(["what", "paper", "here", *heads], cells)] if rows else []
 
 
 def _row(cells: Iterable[str], tag: str) -> str:

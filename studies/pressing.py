@@ -28,12 +28,14 @@ class Pad:
     resolution: str = "medium"
     stiffness: float = 1.0
     stratum_corneum_E: float = TABLE_2["stratum_corneum"][0]
+    outline: float = 2.0
 
     def finger(self) -> ev.FingerPad:
         """The pad with these values, else Table 2."""
         soft = tissue(self.stiffness, stratum_corneum=self.stratum_corneum_E)
         shape = {name: getattr(self, name) for name in ("phase", "exponent", "crest", "groove")}
         ridge = {f"ridge_{name}": value for name, value in shape.items()}
+        ridge |= {"outline": self.outline}
         return ev.FingerPad(ridges=self.ridges, resolution=self.resolution, materials=soft, **ridge)
 
 

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 #: as far as both agree
@@ -15,7 +15,8 @@ CUT = "the digits behind the last one are cut off in the paper, not rounded"
 @dataclass(frozen=True)
 class Printed:
     """A number of the paper: its digits or range ("2.74", "8 to 10"), what it is, its unit, the place
-    where the paper prints it, and why a computed one differs.
+    where the paper prints it, and why a computed one differs; `also`: keys of the same number computed
+    otherwise, by what they say in the head of a column.
 
     >>> Printed("2.74", "effective thickness", "um").value
     2.74
@@ -26,6 +27,7 @@ class Printed:
     unit: str = ""
     place: str = ""
     why: str = ""
+    also: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def ends(self) -> tuple[float, ...]:
@@ -37,11 +39,13 @@ class Printed:
         """The number, of a range its first end."""
         return self.ends[0]
 
-    def described(self) -> dict[str, str]:
+    def described(self) -> dict[str, Any]:
         """All of it for the file of a study."""
-        return {"printed": self.digits} | {
-            name: getattr(self, name) for name in ("what", "unit", "place", "why")
-        }
+        return (
+            {"printed": self.digits}
+            | {name: getattr(self, name) for name in ("what", "unit", "place", "why")}
+            | ({"also": dict(self.also)} if self.also else {})
+        )
 
 
 def numbers_of(paper: Mapping[str, Printed]) -> dict[str, float]:
@@ -51,7 +55,9 @@ def numbers_of(paper: Mapping[str, Printed]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Row:
-    """A printed number beside the computed one: texts, and the reason where they differ."""
+    """A printed number beside the computed one: texts, and the reason where they differ; `others` are the
+    number computed otherwise, by the head of their column.
+    """
 
     what: str
     place: str
@@ -59,26 +65,28 @@ class Row:
     here: str
     difference: str
     why: str
+    others: Mapping[str, str] = field(default_factory=dict)
 
 
 def rows_of(result: Mapping[str, Any]) -> list[Row]:
     """A row for each printed number of a study's dictionary, in its order."""
     printed = result["assumptions"].get("printed", {})
-    return [
-        _row(Printed(said.pop("printed"), **said), result["numbers"][key]) for key, said in _copies(printed)
-    ]
+    numbers = result.get("numbers", {})
+    return [_row(Printed(said.pop("printed"), **said), key, numbers) for key, said in _copies(printed)]
 
 
-def _copies(printed: Mapping[str, Mapping[str, str]]) -> list[tuple[str, dict[str, str]]]:
+def _copies(printed: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
     return [(key, dict(said)) for key, said in printed.items()]
 
 
-def _row(paper: Printed, here: float) -> Row:
+def _row(paper: Printed, key: str, numbers: Mapping[str, float]) -> Row:
+    here = numbers[key]
     difference = difference_of(paper, here)
     agrees = difference.startswith((AGREES, INSIDE))
     why = "" if agrees else paper.why or NO_REASON
     unit = f" {paper.unit}" if paper.unit else ""
-    return Row(paper.what, paper.place, paper.digits + unit, _shown(paper, here), difference, why)
+    others = {head: _shown(paper, numbers[other]) for head, other in paper.also.items() if other in numbers}
+    return Row(paper.what, paper.place, paper.digits + unit, _shown(paper, here), difference, why, others)
 
 
 def decimals(digits: str) -> int:

@@ -54,6 +54,19 @@ def test_a_reason_stands_where_the_numbers_differ_and_once():
     assert "never told" not in told(rows)
 
 
+def test_a_number_computed_otherwise_stands_in_a_second_table(tmp_path):
+    """And only there where the run has it: a quick one has no variants."""
+    other = {"by (2)": "b", "by (3)": "gone"}
+    known = {"a": Printed("1.0", "first", "mm", "caption", "other", other), "c": Printed("3.0", "third")}
+    result = result_of(known, {"a": 1.2, "b": 1.01, "c": 3.0})
+    (tmp_path / "fig09.json").write_text(json.dumps(result), encoding="utf-8")
+    text = paper.page(paper.sections(tmp_path))
+    assert "| what | paper | here | by (2) |\n" in text
+    assert "| first | 1.0 mm | 1.20 | 1.01 |\n" in text
+    assert "| third | 3.0 |" not in text
+    assert "<td>1.01</td>" in paper.html(paper.sections(tmp_path))
+
+
 def test_ranges_are_no_numbers_of_the_file():
     known = {"a": Printed("8 to 10", "width", "mm"), "b": Printed("1,000", "nodes")}
     result = result_of(known, {"a": 9.0, "b": 1000.0})
