@@ -107,9 +107,11 @@ Named = Mapping[str, int | str | Mapping[str, Any]] | None
 class FingerPad(LayeredFinger):
     """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail above.
 
-    **Outline.** On the lower side fingerprint ridges, whose crests lie on the ellipse at x = (k +
+    **Outline.** abs(x/a)**n + abs(y/b)**n = 1 with n = `outline`, by default 2, or the curve through the
+    points of a measured cross-section (`evfem.finger.crosssection`), whose width and height the finger has.
+    On its lower side fingerprint ridges, whose crests lie on that smooth outline at x = (k +
     `ridge_phase`) `ridge_width`. With t = abs(x - crest) / (`ridge_width`/2), x the abscissa of the point of
-    the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep, along the ellipse's normal; with
+    the outline, a groove is `ridge_height` t**`ridge_exponent` deep, along the outline's normal; with
     `ridge_crest` > 0 crest and groove are flat instead, with cosine-shaped walls. Ridges fade out between
     0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape that meets the ratio of
     ridge to gross contact area of Adams et al. (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan`, or
@@ -117,7 +119,7 @@ class FingerPad(LayeredFinger):
     middle of the finger), replaces this profile; `ridge_width` then sets how finely the pad is
     divided.
 
-    **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the ridges: the
+    **Layers.** Interfaces are true normal offsets of the smooth outline and do not follow the ridges: the
     stratum corneum is `ridge_height` thinner in a groove. Its thickness, outline and ridges are Table 2 of
     the paper. Assumed, of the size that finger models use (for example doi:10.1115/1.1613673): epidermis and
     dermis. Below the nail everything down to the bone is dermis (the nail bed). The hypodermis fills the

@@ -82,11 +82,13 @@ class Fingertip(LayeredFinger):
     it, its tip towards +z.
 
     **Shape.** The lower half of an ellipsoid around (0, 0, 0), above it the lower half of the bone, another
-    ellipsoid. `length` is about that of the paper's fingers seen from above, 26 mm held at 30 degrees; the
-    bone's length is assumed. The cut between the two moves with the bone (`rim` "fixed", as a nail would hold
-    it) or is "free". With `rim` "nail" the upper halves are there too, and a nail of `nail_thickness` on top,
-    as wide as `nail_width` along the lines of the mesh and as long (assumed), ending 0.64 of the half length
-    from the middle; the bone alone is held.
+    ellipsoid. With the exponent `outline` above 2 it is the flatter body abs(x/a)**n + abs(y/b)**n +
+    abs(z/c)**n = 1; of a measured cross-section the lower half counts, and along the finger it keeps its
+    shape and becomes smaller as an ellipsoid does. `length` is about that of the paper's fingers seen from
+    above, 26 mm held at 30 degrees; the bone's length is assumed. The cut between the two moves with the bone
+    (`rim` "fixed", as a nail would hold it) or is "free". With `rim` "nail" the upper halves are there too,
+    and a nail of `nail_thickness` on top, as wide as `nail_width` along the lines of the mesh and as long
+    (assumed), ending 0.64 of the half length from the middle; the bone alone is held.
 
     **Ridges.** False or "none"; "along" (True: those of the cross-section, whose crests run along the
     finger), "across", "whorl", "loop" or "arch" (`evfem.finger.fingerprint`), with the profile of

@@ -250,7 +250,18 @@ def _contact(scene: Scene) -> Term:
         shape += f", the peak pressure one of {100.0 * min(peak, 1.0):.2g} %"
     elif peak:
         shape += f"; the peak pressure has an error of {100.0 * peak:.2g} %"
-    return Term("contact", True, shape + _elastic_surface(scene))
+    return Term("contact", True, shape + _outline(scene.finger) + _elastic_surface(scene))
+
+
+def _outline(finger: Any) -> str:
+    """The outline of a finger that is no ellipse, in words (numbers: docs/howto/fingertip.md)."""
+    outline = getattr(finger, "outline", 2.0)
+    if not isinstance(outline, float):
+        return f"; the outline is measured ({outline.width:.4g} x {outline.height:.4g} mm)"
+    if outline == 2.0:
+        return ""
+    flatter = "a level finger with 3 touches 1.6 times what an ellipse touches at 1 N, and hovering at "
+    return f"; the outline has the exponent {outline:g}: {flatter}0.25 mm it is attracted 2.5 to 2.8 times"
 
 
 def _elastic_surface(scene: Scene) -> str:
