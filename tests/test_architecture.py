@@ -53,7 +53,7 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy"},
-        "laws dielectrics relaxation alternating roughness localgaps forces wav timesignals drive",
+        "laws dielectrics breakdown relaxation alternating roughness localgaps forces wav timesignals drive",
     ),
     "circuit": ({"numpy", "scipy", "PIL"}, "signals encoding signalfile"),
     "field": (

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 from evfem.electrostatics.alternating import (
     alternating_pressure,
     complex_length,
+    contact_impedance,
     corner_frequencies,
     square_wave_pressure,
     step_pressure,
     step_rates,
 )
+from evfem.electrostatics.breakdown import breakdown_voltage, inception_voltage
 from evfem.electrostatics.dielectrics import SKINS, Dielectric, DielectricTable
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
 from evfem.electrostatics.localgaps import equivalent_gap
@@ -31,10 +33,13 @@ __all__ = [
     "Layers",
     "StrongTroxel",
     "alternating_pressure",
+    "breakdown_voltage",
     "complex_length",
+    "contact_impedance",
     "corner_frequencies",
     "eps_0",
     "equivalent_gap",
+    "inception_voltage",
     "rigid_field",
     "square_wave_pressure",
     "step_pressure",

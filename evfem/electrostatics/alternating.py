@@ -18,7 +18,11 @@ to be a conductor, leaks through the gap with :math:`\tau = (\varepsilon_0 / \si
 .. math:: \bar p = p_0 \Big[\frac{2}{1 + e^{-a}}\Big]^2 \frac{1 - e^{-2a}}{2a}, \qquad
           p_0 = \frac{\varepsilon_0 U^2}{2 (g + d_i/\varepsilon_i)^2} .
 
-Pressures in MPa, lengths in mm, V, Hz, s, S/m. All arguments broadcast; scalars give a number.
+The same stack is what an amplifier sees: over the area A the impedance
+
+.. math:: Z A = \frac{g + z}{i\omega\varepsilon_0\varepsilon_g^*} .
+
+Pressures in MPa, lengths in mm, V, Hz, s, S/m, ohm. All arguments broadcast; scalars give a number.
 """
 
 from __future__ import annotations
@@ -73,6 +77,35 @@ def alternating_pressure(
     voltage = finite("voltage", voltage, "a voltage in V")
     layers = _layers(frequency, Layer(skin_thickness, dielectric(skin)), insulator, gap_conductivity)
     return StrongTroxel().traction(gap, voltage, layers)
+
+
+def contact_impedance(
+    gap: Values, area: Values, frequency: Values, *, skin: Any, skin_thickness: Values,
+    insulator: Layer, gap_conductivity: Values = 0.0,
+) -> Values:  # fmt: skip
+    """Impedance in ohm, complex, of a plate with `area` (mm2) over `gap` (mm) at `frequency` (Hz).
+
+    `skin`, `skin_thickness` (mm), `insulator` and `gap_conductivity` (S/m) as in `complex_length`.
+
+    >>> from evfem import TOUCHSCREEN
+    >>> given = {"skin": "gabriel_dry", "skin_thickness": 0.3, "insulator": TOUCHSCREEN}
+    >>> Z = contact_impedance(0.001, 100.0, 1000.0, **given, gap_conductivity=1e-8)
+    >>> f"{1e-3 * abs(Z):.3f} kohm at {np.degrees(np.angle(Z)):.3f} degrees"
+    '228.973 kohm at -78.683 degrees'
+    """
+    gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
+    area = np.asarray(above("area", area, 0.0, "an area in mm2 above 0"))
+    layers = _layers(frequency, Layer(skin_thickness, dielectric(skin)), insulator, gap_conductivity)
+    return to_python(1.0 / (area * admittance(gap, frequency, layers, gap_conductivity)))
+
+
+def admittance(
+    gap: Any, frequency: Values, layers: Layers, gap_conductivity: Values = 0.0, gap_eps_r: float = 1.0
+) -> Any:
+    """Current over voltage per area, complex, in S/mm2, of a gap (mm) over `layers` at `frequency` (Hz)."""
+    omega = 2.0 * np.pi * np.asarray(frequency)
+    through = 1e-3 * (1j * omega * eps_0 * gap_eps_r + np.asarray(gap_conductivity))
+    return through / (gap + gap_eps_r * (np.asarray(layers.reduced) + 1j * np.asarray(layers.loss)))
 
 
 def _layers(frequency: Values, skin: Layer, insulator: Layer, gap_conductivity: Values) -> Layers:

@@ -104,3 +104,43 @@ def test_what_cannot_be_is_refused():
     refuses("time", step_pressure, -1.0, 0.1, RMS, **SKIN, **LEAKING)
     film = ev.Layer(0.001, ev.electrostatics.SKINS["raicu"])
     refuses("without poles", step_pressure, 1.0, 0.1, RMS, **SKIN, insulator=film, gap_conductivity=0.0)
+
+
+def test_the_impedance_of_a_plate():
+    """Values found twice elsewhere, 1 cm2 under 100 V peak; current and power of the impedance."""
+    given = {"skin": "gabriel_dry", "skin_thickness": 0.3, "insulator": ev.TOUCHSCREEN}
+    Z = ev.electrostatics.contact_impedance(0.001, 100.0, [1000.0, 75.0], **given, gap_conductivity=1e-8)
+    assert abs(Z) == pytest.approx([228.973190e3, 1301.001450e3], rel=1e-8)
+    assert np.degrees(np.angle(Z)) == pytest.approx([-78.6826, -48.2264], abs=5e-5)
+    current = 100.0 / 2**0.5 / abs(Z[0])
+    assert 1e6 * current == pytest.approx(308.8164, rel=1e-6)
+    assert 1e6 * current**2 * Z[0].real == pytest.approx(4285.2998, rel=1e-7)
+
+
+def test_an_impedance_without_losses_is_a_capacitor():
+    """Lossless layers: eps_0 A/(g + s) at any frequency, without a real part; areas and gaps broadcast."""
+    given = {"skin": 1650.0, "skin_thickness": 0.2, "insulator": ev.TOUCHSCREEN}
+    s = 0.2 / 1650.0 + 0.001 / 3.9
+    gap, area = np.array([0.0, 0.001]), np.array([[100.0], [50.0]])
+    Z = ev.electrostatics.contact_impedance(gap, area, 250.0, **given)
+    farad = 1e-3 * ev.eps_0 * area / (gap + s)
+    assert pytest.approx(1.0 / (2j * np.pi * 250.0 * farad), rel=1e-12) == Z
+    assert not Z.real.any()
+    refuses("area: given 0", ev.electrostatics.contact_impedance, 0.001, 0.0, 250.0, **given)
+
+
+def test_the_power_of_an_impedance_is_that_of_its_layers():
+    """What skin, gap and insulator dissipate, each by its own field: U^2 Re(1/Z) is their sum."""
+    gap, f, sigma = 0.003, 400.0, 2e-8
+    skin, film = ev.electrostatics.SKINS["gabriel_dry"], ev.TOUCHSCREEN
+    given = {"skin": skin, "skin_thickness": 0.3, "insulator": film, "gap_conductivity": sigma}
+    Z = ev.electrostatics.contact_impedance(gap, 100.0, f, **given)
+    omega = 2.0 * np.pi * f
+    current = 50.0 / Z / 1e-4  # A/m2
+    power = 0.0
+    for thickness, eps in (
+        (0.3, complex(skin.permittivity(f))), (gap, 1.0 + sigma / (1j * omega * ev.eps_0)), (0.001, 3.9)
+    ):  # fmt: skip
+        field = current / (1j * omega * ev.eps_0 * eps)
+        power += 1e-4 * 1e-3 * thickness * omega * ev.eps_0 * -np.imag(eps) * abs(field) ** 2
+    assert 50.0**2 * (1.0 / Z).real == pytest.approx(power, rel=1e-12)
