@@ -49,6 +49,7 @@ _NAMES = {
     "finger.scan": ("RidgeScan",),
     "loading": ("load",),
     "response.impedance": ("impedance",),
+    "response.electrical": ("electrical_impedance",),
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),

@@ -59,6 +59,7 @@ from evfem.mesh.mesh import Mesh as Mesh
 from evfem.newton.strategy import Strategy as Strategy
 from evfem.planning.plan import plan as plan
 from evfem.response.design import design as design
+from evfem.response.electrical import electrical_impedance as electrical_impedance
 from evfem.response.impedance import impedance as impedance
 from evfem.response.parameters import ShapeChange as ShapeChange
 from evfem.response.sensitivities import sensitivities as sensitivities

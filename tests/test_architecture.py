@@ -55,7 +55,7 @@ ROOMS = {
         {"numpy", "scipy"},
         "laws dielectrics breakdown relaxation alternating roughness localgaps forces wav timesignals drive",
     ),
-    "circuit": ({"numpy", "scipy", "PIL"}, "signals encoding signalfile"),
+    "circuit": ({"numpy", "scipy", "PIL"}, "signals encoding signalfile load"),
     "field": (
         {"numpy", "scipy", "skfem"},
         "outlines bounds curves fieldmesh poisson rigid columncells columns meanattraction",
@@ -94,7 +94,8 @@ ROOMS = {
     ),
     "response": (
         {"numpy", "scipy"},
-        "parameters parts tangent differences lines sensitivities file uncertainty design impedance",
+        "parameters parts tangent differences lines sensitivities file uncertainty design impedance "
+        "electrical",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (

@@ -162,6 +162,9 @@ def carrier_amplitude(effective: Values) -> Values:
 class Amplifier:
     """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
 
+    Under an alternating voltage it also has a `largest_current` (effective, A) and a `slew_rate` (V/s, of the
+    voltage of the moment) at the frequencies of its `load`, as `evfem.electrical_impedance` finds it.
+
     >>> Amplifier(voltage_max=200.0).limit(VoltageProfile([0.0, 4.0], [0.0, 400.0])).voltage.tolist()
     [0.0, 200.0, 200.0]
     >>> jump = VoltageProfile([0.0, 1.0, 1.0, 9.0], [0.0, 0.0, 100.0, 100.0])
@@ -172,16 +175,46 @@ class Amplifier:
 
     voltage_max: float
     slew: float | None = None
+    largest_current: float | None = None
+    slew_rate: float | None = None
+    load: Any = None
 
     def __post_init__(self) -> None:
         above("voltage_max", self.voltage_max, 0.0, "a voltage in V above zero")
         if self.slew is not None:
             above("slew", self.slew, 0.0, "a rate in V/s above zero, or None")
+        asked = self.largest_current, self.slew_rate
+        if asked == (None, None):
+            return
+        for key, value, unit in zip(("largest_current", "slew_rate"), asked, ("A", "V/s"), strict=True):
+            if value is not None:
+                above(key, value, 0.0, f"a number in {unit} above zero, or None")
+        allowed = "what evfem.electrical_impedance finds of a finger in space, or of one with a depth"
+        if getattr(self.load, "unit", None) != "ohm":
+            given = ABSENT if self.load is None else f"{type(self.load).__name__}, not in ohm"
+            raise InputError("load", given, allowed)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """Largest effective voltage (V) by the name of each limit."""
+        found = {"voltage_max": self.voltage_max}
+        if self.largest_current is not None:
+            found["largest_current"] = self.largest_current * float(np.abs(self.load.impedance).min())
+        if self.slew_rate is not None:
+            found["slew_rate"] = self.slew_rate / (
+                2.0 * np.pi * float(self.load.frequency.max()) * float(carrier_amplitude(1.0))
+            )
+        return found
+
+    def stops(self, profile: VoltageProfile) -> str:
+        """The name of the limit that cuts a profile off, empty if none does."""
+        name = min(self.limits, key=lambda one: self.limits[one])
+        return name if np.abs(profile.voltage).max() > self.limits[name] else ""
 
     def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
-        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s), both
-        exactly: with rows where it crosses the limit or catches up. Raises InputError for a slew without a
-        speed.
+        """The profile cut off at the smallest of its `limits`, then followed no faster than `slew` at `speed`
+        (mm/s), both exactly: with rows where it crosses the limit or catches up. Raises InputError for a slew
+        without a speed.
         """
         cut = self._clipped(profile)
         if self.slew is None:
@@ -191,7 +224,7 @@ class Amplifier:
         return _no_steeper(cut, self.slew / above("speed", speed, 0.0, "a speed in mm/s above zero"))
 
     def _clipped(self, profile: VoltageProfile) -> VoltageProfile:
-        x, u, most = profile.position, profile.voltage, self.voltage_max
+        x, u, most = profile.position, profile.voltage, min(self.limits.values())
         row = np.arange(x.size)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = (np.array([[-most], [most]]) - u[:-1]) / np.diff(u)

@@ -17,7 +17,7 @@ A room without memory, energies and columns inherits all of this.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from typing import Any
 
@@ -94,6 +94,10 @@ class Room:
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
         """Values in an accepted state of the `columns` that are no sums."""
         return {}
+
+    def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+        """A sentence for each thing that the rows of a scene's run make doubtful."""
+        yield from ()
 
     def works(self, substep: Any) -> Mapping[str, float]:
         """Contributions of a substep to the `columns` that end in _work or _dissipation (N mm)."""

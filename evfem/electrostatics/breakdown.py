@@ -126,7 +126,7 @@ class Limited:
         from the gap on.
         """
         shape = np.broadcast(gap, voltage, layers.reduced)
-        first, last = self._sparking(np.broadcast_to(voltage, shape.shape), layers)
+        first, last = self.sparking(np.broadcast_to(voltage, shape.shape), layers)
         begin = np.clip(np.asarray(gap), first, last)
         x, w = np.polynomial.legendre.leggauss(POINTS)
         lost, middle = 0.0, np.clip(LOWEST, begin, last)  # where the curve has a kink
@@ -138,7 +138,7 @@ class Limited:
                 lost = lost + weight * decades * g * missing * self.law.traction(g, voltage, layers)
         return to_python(np.asarray(self.law.potential(gap, voltage, layers)) + lost)
 
-    def _sparking(self, voltage: Any, layers: Layers) -> tuple[Floats, Floats]:
+    def sparking(self, voltage: Any, layers: Layers) -> tuple[Floats, Floats]:
         """From which gap to which (mm) the air breaks down; the same where it does not."""
         volts = self.crest * np.abs(voltage)
         worst = _weakest(self.gap_eps_r * np.hypot(layers.reduced, layers.loss)) + 0.0 * volts

@@ -139,6 +139,7 @@ class Signal:
     error_of_display: float
     error_of_amplifier: float = 0.0
     share_limited: float = 0.0
+    limited_by: str = ""
 
 
 def voltage_for(
@@ -191,6 +192,7 @@ def voltage_for(
         error_of_display=float(np.linalg.norm(felt - reference.tangential_force)) / size,
         error_of_amplifier=float(np.linalg.norm(limited - felt)) / size,
         share_limited=_share_apart(wish, profile),
+        limited_by="" if amplifier is None else amplifier.stops(wish),
     )
 
 

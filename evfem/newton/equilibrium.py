@@ -78,7 +78,7 @@ class Equilibrium:
 
     def restart(self, old: State, target: Target) -> State:
         """The accepted state where a requested step to `target` begins, whose prescribed speeds may jump."""
-        for room in self.rooms:
+        for room in (*self.rooms, self.attraction):
             old = old.remembering(room.restart(old, target))
         return old
 

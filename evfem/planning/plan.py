@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.electrostatics.breakdown import inception_voltage
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
 from evfem.electrostatics.localgaps import SpreadGaps, roughness_below
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
@@ -316,7 +317,18 @@ def _electricity(closing: Closing) -> Term:
     traction, core = touching_traction(scene), closing.found
     pull = "" if traction is None else f"; at most {traction:.2g} MPa on touching skin{_other_law(scene)}"
     cored = "" if core is None else f"; {core}"
-    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")
+    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{_breakdown(scene)}{cored}")
+
+
+def _breakdown(scene: Scene) -> str:
+    """From which voltage on air breaks down, in words; empty below it."""
+    electrics = scene.electrics
+    if not scene.may_spark or electrics.resolved:
+        return ""
+    least, gap = (float(np.min(one)) for one in inception_voltage(electrics.attraction[1]))
+    peak = electrics.crest * electrics.largest_voltage
+    held = ", where the law holds its field" if scene.breakdown == "limit" else ""
+    return f"; air breaks down from {least:.3g} V on ({1e3 * gap:.3g} um){held}" if peak > least else ""
 
 
 def _other_law(scene: Scene) -> str:

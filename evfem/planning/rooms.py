@@ -8,8 +8,10 @@ Plan and model ask it; docs, Inside, shows it. A capability of the package is a 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from evfem.circuit.load import Air, Load, Supply
+from evfem.common.rooms import Room
 from evfem.scene.scene import Scene
 from evfem.tissue.dynamics import DYNAMICS
 
@@ -17,13 +19,14 @@ from evfem.tissue.dynamics import DYNAMICS
 @dataclass(frozen=True)
 class Kind:
     """A capability: its `key` in a scene file, its `name` in a plan, the `module` of its room, and whether a
-    scene has it.
+    scene has it; `books` is a room that has columns alone.
     """
 
     key: str
     name: str
     module: str
     there: Callable[[Scene], bool]
+    books: Room = field(default=Room())
 
 
 KINDS = (
@@ -32,7 +35,13 @@ KINDS = (
     Kind("solver.contact", "penalties", "terms.foundation", lambda scene: scene.solver.contact != "exact"),
     Kind("electrostatics", "electricity", "terms.attraction", lambda scene: scene.electrics.acts),
     Kind("electrostatics.field", "full field", "terms.fullfield", lambda scene: scene.field != "local"),
-    Kind("electrostatics.drive", "charges", "terms.charging", lambda scene: scene.electrics.resolved),
+    Kind(
+        "electrostatics.drive", "charges", "terms.charging", lambda scene: scene.electrics.resolved, Supply()
+    ),
+    Kind(
+        "electrostatics.frequency", "load", "circuit.load", lambda scene: scene.electrics.alternates, Load()
+    ),
+    Kind("electrostatics.breakdown", "breakdown", "circuit.load", lambda scene: scene.may_spark, Air()),
     Kind("adhesion", "adhesion", "terms.attraction", lambda scene: scene.adhesion is not None),
     Kind("solver.dynamics", "time", "tissue.dynamics", lambda scene: bool(DYNAMICS[scene.solver.dynamics])),
     Kind("hand", "hand", "terms.hand", lambda scene: scene.hand is not None),
@@ -45,6 +54,6 @@ def rooms_of(scene: Scene) -> tuple[Kind, ...]:
     >>> from evfem import Display, FingerPad, Kaczmarek, Press
     >>> scene = Scene(FingerPad(), Display(friction=0.3), Kaczmarek(), 100.0, Press(force=0.1))
     >>> [one.name for one in rooms_of(scene)]
-    ['friction', 'electricity']
+    ['friction', 'electricity', 'breakdown']
     """
     return tuple(kind for kind in KINDS if kind.there(scene))

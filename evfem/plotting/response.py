@@ -9,6 +9,7 @@ import numpy as np
 
 from evfem.errors import InputError
 from evfem.plotting.figures import BLUE, VERMILION, Panels, axes_or_new, curves, new_panels, styled
+from evfem.response.electrical import ElectricalImpedance
 from evfem.response.impedance import Impedance
 
 if TYPE_CHECKING:
@@ -60,26 +61,31 @@ def tornado(found: Any, column: str = "tangential_force", step: int = -1, ax: Ax
     return ax
 
 
-def impedance(found: Impedance | Mapping[str, Impedance]) -> Panels:
-    """Magnitude and phase of the stiffness over the frequency, of one finger or of several by their names.
+def impedance(
+    found: Impedance | ElectricalImpedance | Mapping[str, Impedance] | Mapping[str, ElectricalImpedance],
+) -> Panels:
+    """Magnitude and phase over the frequency of a stiffness (`evfem.impedance`) or of an electrical one
+    (`evfem.electrical_impedance`), of one finger or of several by their names.
 
-    The phase is positive where the force is ahead of the displacement.
+    The phase is positive where the force is ahead of the displacement, or the voltage ahead of the current.
 
     Raises
     ------
     InputError
         Nothing to draw, or stiffnesses of different units.
     """
-    named = {"": found} if isinstance(found, Impedance) else dict(found)
+    single = isinstance(found, Impedance | ElectricalImpedance)
+    named: dict[str, Any] = {"": found} if single else dict(found)  # type: ignore[arg-type]
     units = {one.unit for one in named.values()}
     if len(units) != 1:
-        given = "no impedance" if not units else "some of the plane, some in space"
+        given = "no impedance" if not units else "impedances in " + " and ".join(sorted(units))
         raise InputError("found", given, "one impedance, or {name: impedance, ...} of one unit")
     upper, lower = new_panels(2, 6.0)
     sizes, phases = [], []
     for one, look in styled(named):
-        sizes.append((one.frequency, np.abs(one.stiffness), look))
-        phases.append((one.frequency, np.degrees(np.angle(one.stiffness)), look))
+        values = one.impedance if isinstance(one, ElectricalImpedance) else one.stiffness
+        sizes.append((one.frequency, np.abs(values), look))
+        phases.append((one.frequency, np.degrees(np.angle(values)), look))
     curves(upper, sizes, "", f"magnitude ({units.pop()})")
     curves(lower, phases, "frequency (Hz)", "phase (degrees)")
     upper.set(xscale="log", yscale="log")

@@ -128,7 +128,7 @@ def impedance(
     True
     """
     choice("axis", axis, AXES)
-    frequency = _checked(frequencies)
+    frequency = checked_frequencies(frequencies)
     _check(scene := scene_of(scene))
     state, model = _end(scene)
     system = linearised(model, state)
@@ -137,7 +137,8 @@ def impedance(
     return Impedance(frequency, found, axis, "N/mm" if model.mesh.dim == 3 else "N/mm per mm")
 
 
-def _checked(frequencies: Any) -> Floats:
+def checked_frequencies(frequencies: Any) -> Floats:
+    """One or several frequencies as an array (n,) in Hz; InputError for others."""
     allowed = "one or several frequencies in Hz, larger than 0"
     found = numbers("frequencies", [frequencies] if np.isscalar(frequencies) else frequencies, allowed)
     if not found.size or found.min() <= 0.0:

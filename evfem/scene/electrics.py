@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from evfem.circuit.signals import FollowForce, VoltageProfile
-from evfem.common.arrays import Ints
+from evfem.circuit.signals import FollowForce, VoltageProfile, carrier_amplitude
+from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Values
+from evfem.electrostatics.alternating import SINGLE
+from evfem.electrostatics.breakdown import Limited
 from evfem.electrostatics.dielectrics import seen_at
 from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
@@ -41,6 +43,7 @@ class Electrics:
     eps_r: float
     skin: Layer
     insulator: Layer
+    limited: bool = False
 
     @classmethod
     def of(cls, scene: Any) -> Electrics:
@@ -52,7 +55,8 @@ class Electrics:
         eps_r = float(getattr(electrical, "stratum_corneum_eps_r", 1650.0))
         skin = (scene.drive or Drive()).skin_layer(float(thickness), eps_r)
         ramps = tuple(found for one in scene.courses if (found := one.largest_voltage) is not None)
-        return cls(scene.law, scene.drive, scene.voltage, ramps, eps_r, skin, scene.ground.insulator)
+        limited = scene.breakdown == "limit"
+        return cls(scene.law, scene.drive, scene.voltage, ramps, eps_r, skin, scene.ground.insulator, limited)
 
     def above(self, electrical: Any, mesh: Any, nodes: Ints) -> Electrics:
         """The same above the nodes of a pad, where the skin has its given thickness or that of the mesh."""
@@ -120,12 +124,13 @@ class Electrics:
     def attraction(self) -> tuple[Any, Layers]:
         """Law and layers of the attraction: over the cycle, or, resolved, without what conducts."""
         solids = (self.skin, self.insulator)
+        law = Limited(self.law, self.crest) if self.limited else self.law
         if self.drive is None:
-            return self.law, Layers.of(*solids)
+            return law, Layers.of(*solids)
         if self.drive.resolved:
             thickness = np.asarray(self.skin.thickness) + self.insulator.thickness
             return self.law, Layers(self.sandwich.reference, thickness)
-        return mean_law(self.law, self.drive, self.frequency, solids, self.given)
+        return mean_law(law, self.drive, self.frequency, solids, self.given)
 
     @property
     def gap_eps_r(self) -> float:
@@ -143,6 +148,44 @@ class Electrics:
     def parallel(self) -> float:
         """Capacitance beside the finger over eps_0 (in space mm)."""
         return NANO * getattr(self.given, "parallel_capacitance", 0.0) / eps_0
+
+    @property
+    def alternates(self) -> bool:
+        """Whether the attraction is a mean over the cycle of an alternating voltage."""
+        return self.acts and self.drive is not None and not self.drive.resolved
+
+    @property
+    def crest(self) -> float:
+        """Peak of the scene's voltage over what a run has as voltage."""
+        drive, given = self.drive, self.given
+        if drive is None or drive.resolved:
+            return 1.0
+        if (found := powers(given)) is not None:
+            return float(given.largest / found[0])
+        if isinstance(given, Carrier):
+            return float(carrier_amplitude(1.0))
+        return float(drive.peak(1.0))
+
+    @cached_property
+    def harmonics(self) -> tuple[Floats, Floats]:
+        """Orders of an alternating voltage, and their fractions of its square; without a direct part."""
+        assert self.drive is not None
+        order, share = spectrum(self.drive, self.given)
+        return order[order > 0.0], share[order > 0.0]
+
+    @property
+    def smooth(self) -> Any:
+        """Which harmonics (H,) an amplifier with edges of its own has: of a square wave the first ones."""
+        order = self.harmonics[0]
+        assert self.drive is not None
+        ideal = self.drive.waveform == "square" and powers(self.given) is None
+        return order < 2.0 * SINGLE if ideal else np.full(order.shape, True)
+
+    def layers_at(self, frequency: float) -> Layers:
+        """The solid layers at a frequency (Hz), with the gap that conducts."""
+        leak = 0.0 if self.drive is None else self.drive.gap_conductivity
+        solids = (self.skin, self.insulator)
+        return Layers.of(*solids, frequency=frequency, gap_conductivity=leak, gap_eps_r=self.gap_eps_r)
 
     @property
     def conducts(self) -> bool:
@@ -169,8 +212,10 @@ class Electrics:
 
 
 def check_drive(scene: Any) -> None:
-    """Raise InputError where drive, law, voltage and motions do not fit together."""
+    """Raise InputError where drive, law, voltage, breakdown and motions do not fit together."""
     drive = scene.drive
+    if scene.breakdown == "limit":
+        _check_limited(scene)
     if isinstance(scene.voltage, CHARGED) and (drive is None or not drive.resolved):
         raise InputError("electrostatics.voltage", type(scene.voltage).__name__, "with a resolved drive")
     if drive is None:
@@ -181,6 +226,19 @@ def check_drive(scene: Any) -> None:
     if scene.ground.insulator is not None:  # which is refused elsewhere
         (_check_resolved if drive.resolved else _check_mean)(scene, drive)
         _ = scene.electrics.attraction  # dielectrics that need a frequency say so
+
+
+def _check_limited(scene: Any) -> None:
+    """A law whose field is held needs one voltage of each gap, of which the peak is known."""
+    drive, given = scene.drive, None
+    if scene.field != "local":
+        given = f"limit with the field {scene.field}"
+    elif drive is not None and drive.resolved:
+        given = "limit in a resolved drive"
+    elif drive is not None and spectrum(drive, scene.voltage)[0].size > 1:
+        given = "limit with a voltage of several harmonics"
+    if given is not None:
+        raise InputError("electrostatics.breakdown", given, "warn | off; or a sine, and the field local")
 
 
 def _check_mean(scene: Any, drive: Drive) -> None:

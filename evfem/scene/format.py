@@ -28,6 +28,7 @@ from evfem.scene.motion import MOTIONS, VOLTAGE
 from evfem.scene.scene import (
     DEPTH,
     AirLayer,
+    Breakdown,
     Coupling,
     Direction,
     FieldChoice,
@@ -295,6 +296,7 @@ class Electrostatics:
     ] = None
     grounded: Grounded = True
     coupling: Coupling = "monolithic"
+    breakdown: Breakdown = "warn"
     roughness_gap: RoughnessGap = 0.0
 
     def layer(self) -> Layer | list[Layer]:
@@ -323,7 +325,7 @@ class Electrostatics:
 
     def scene_keys(self, law: Any, ramped: bool) -> dict[str, Any]:
         """What it says of a scene beside its law; `ramped`: the voltage may begin without one."""
-        names = ("air_layer", "direction", "field", "grounded", "roughness_gap")
+        names = ("air_layer", "breakdown", "direction", "field", "grounded", "roughness_gap")
         own = {"law": law, "voltage": self._voltage(not ramped)}
         return own | {"drive": self._drive()} | {name: getattr(self, name) for name in names}
 

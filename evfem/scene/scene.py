@@ -27,6 +27,7 @@ from evfem.common.checks import (
 from evfem.common.digest import digest
 from evfem.common.rooms import BodyTerm, Foundation, Room, unchangeable
 from evfem.common.views import called, changed, short, table
+from evfem.electrostatics.breakdown import MODES
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import NONE, RoughnessGap, distribution_of
@@ -59,6 +60,9 @@ FieldChoice = Annotated[
     str, one_of(*FIELDS), "full: Poisson's problem, not column by column; auto: where it matters"
 ]
 Grounded = Annotated[bool, yes_or_no(), "false: the finger has no charge; with field full"]
+Breakdown = Annotated[
+    str, one_of(*MODES), "of air: warn of it; limit: the field of such gaps is held at it; off: do not look"
+]
 Adhesion = Annotated[AdhesionLaw | None, {"allowed": ADHESION, "check": adhesion_of}]
 
 
@@ -131,6 +135,7 @@ class Scene:
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: RoughnessGap = field(default=0.0, kw_only=True)
     adhesion: Adhesion = field(default=None, kw_only=True)
+    breakdown: Breakdown = field(default="warn", kw_only=True)
     friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
     hand: Hand | None = field(default=None, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
@@ -217,6 +222,11 @@ class Scene:
     def has_voltage(self) -> bool:
         """Whether there is a law for a voltage."""
         return self.law is not None
+
+    @property
+    def may_spark(self) -> bool:
+        """Whether a voltage acts on air that may break down."""
+        return self.electrics.acts and self.breakdown != "off"
 
     @property
     def is_pulled(self) -> bool:

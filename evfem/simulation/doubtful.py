@@ -16,6 +16,7 @@ from evfem.newton.control import Target
 from evfem.newton.state import FORCES, Folded, LiftedOff, State, StepFailed
 from evfem.planning.parts import COMPLEX_SAFE, lost_derivatives
 from evfem.planning.plausibility import weakens
+from evfem.planning.rooms import rooms_of
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 from evfem.simulation.model import Model
@@ -121,6 +122,7 @@ def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
         _climbed(rows),
         _missed(rows),
         _strained(scene, rows),
+        *(kind.books.doubts(scene, rows) for kind in rooms_of(scene)),
     )
     return [sentence for one in told for sentence in one] if rows else []
 

@@ -29,7 +29,7 @@ DRIFT = 0.05
 #: solved lengths (mm) and forces (N/mm, N) that differ by less are the same
 SAME = 1e-9
 #: unit per mm of depth -> unit over a depth
-WHOLE_OF = {"N/mm": "N", "N": "mJ"}
+WHOLE_OF = {"N/mm": "N", "N": "mJ", "C/mm": "C", "A/mm": "A", "W/mm": "W"}
 
 
 def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> dict[str, Any]:

@@ -79,7 +79,8 @@ class Model:
     def shown(self) -> tuple[Room, ...]:
         """Rooms with columns of their own."""
         charges = (ChargeBooks(one) for one in self.attraction.parts[:1] if one.flows)
-        every = (*self.terms, *self.attraction.parts, *charges)
+        books = (kind.books for kind in rooms_of(self.scene))
+        every = (*self.terms, *self.attraction.parts, *charges, *books)
         return tuple(room for room in every if room.columns)
 
     @property

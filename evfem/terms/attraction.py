@@ -97,12 +97,19 @@ class Attraction(PadTraction):
     def memory(self, state: Any) -> dict[str, Floats]:
         return self.charging.memory
 
+    def restart(self, old: Any, target: Any) -> dict[str, Floats]:
+        return self.charging.nothing_supplied
+
     def begin(self, old: PadState, seconds: float) -> None:
         if self.flows:
             self.charging.begin(self.charged(old), seconds)
 
     def accept(self, old: PadState, new: PadState) -> dict[str, Floats]:
-        return {"charges": self.charged(new, at_end=True).charges} if self.flows else {}
+        if not self.flows:
+            return {}
+        charged = self.charged(new, at_end=True)
+        supplied = old.memory["supplied"] + self.charging.flow(charged).supplied
+        return {"charges": charged.charges, "supplied": supplied}
 
     def charged(self, pad: PadState, *, at_end: bool = False) -> Charged:
         """The electric state of a pad: with its charges, or those `at_end` of the step."""
@@ -160,6 +167,10 @@ class Attraction(PadTraction):
     def _on(self, pad: PadState) -> Any:
         """1 of nodes that carry force, 0 of others."""
         return 1.0 if self.air_layer else pad.touching.astype(float)
+
+    def carrying(self, pad: PadState) -> Any:
+        """Tributary lengths (..., P) in mm of the nodes that carry force."""
+        return self._on(pad) * self._lengths(pad)
 
     def forces(self, pad: PadState) -> Floats:
         return self.forces_along(pad.path)[0]

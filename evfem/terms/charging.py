@@ -44,10 +44,22 @@ class Charged:
 
 @dataclass(frozen=True)
 class Flow:
-    """Energies of a step (N mm per mm of depth): from the source, and dissipated across the layers."""
+    """Energies of a step (N mm per mm of depth): from the source, and dissipated across the layers; charge
+    over eps_0 from the source (V, in space V mm), and the `seconds` of the step.
+    """
 
     source_work: float
     leakage: float
+    charge: float
+    seconds: float
+
+    @property
+    def supplied(self) -> Floats:
+        """What adds up over substeps (4,): work of the source, leakage, the mean square of the current over
+        eps_0 times the time, and the time.
+        """
+        square = self.charge**2 / self.seconds if self.seconds > 0.0 else 0.0
+        return np.array([self.source_work, self.leakage, square, self.seconds])
 
 
 class NoCharges:
@@ -58,6 +70,11 @@ class NoCharges:
     @property
     def memory(self) -> dict[str, Floats]:
         """Nothing is kept."""
+        return {}
+
+    @property
+    def nothing_supplied(self) -> dict[str, Floats]:
+        """What is kept of the source where a requested step begins."""
         return {}
 
     def effective(self, gap: Any, voltage: Any, length: Floats) -> Any:
@@ -94,7 +111,11 @@ class Charging(NoCharges):
 
     @property
     def memory(self) -> dict[str, Floats]:
-        return {"charges": self.none}
+        return {"charges": self.none, **self.nothing_supplied}
+
+    @property
+    def nothing_supplied(self) -> dict[str, Floats]:
+        return {"supplied": np.zeros(4)}
 
     @contextmanager
     def standing(self) -> Iterator[None]:
@@ -159,6 +180,11 @@ class Charging(NoCharges):
         ended = float(np.sum(at.length * self.stack.fields(at.gap, at.voltage, at.charges)[2]))
         return ended + self.parallel * at.voltage
 
+    def across(self, at: Charged) -> Floats:
+        """Voltages (P,) of the gaps."""
+        field = self.stack.fields(at.gap, at.voltage, at.charges)[1] / self.stack.gap_eps_r
+        return np.asarray(field * at.gap)
+
     def capacity(self, at: Charged) -> float:
         """Derivative of that charge by the voltage (V) at the end of the step, in which it is linear."""
         none, one = (
@@ -198,11 +224,14 @@ class Charging(NoCharges):
             stack.fields(gap, old.voltage, charges)[0]
             for gap, charges in ((old.gap, old.charges), (new.gap, start))
         )
-        source = old.voltage * np.sum(new.length * moved - old.length * before)
+        charge = float(np.sum(new.length * moved - old.length * before))
+        source = old.voltage * charge
+        charge += self.parallel * (new.voltage - old.voltage)
         if seconds == 0.0:
             jumped = stack.fields(new.gap, new.voltage, start)[0]
-            source += 0.5 * (old.voltage + new.voltage) * np.sum(new.length * (jumped - moved))
-            return Flow(float(eps_0 * source) + beside, 0.0)
+            more = np.sum(new.length * (jumped - moved))
+            source += 0.5 * (old.voltage + new.voltage) * more
+            return Flow(float(eps_0 * source) + beside, 0.0, charge + float(more), 0.0)
         time, weight = self._times()
         volts = old.voltage + (new.voltage - old.voltage) * (time / seconds)
         charges = stack.after(new.gap, start[:, None], old.voltage, volts[:, None], time[:, None])
@@ -212,10 +241,10 @@ class Charging(NoCharges):
         last = stack.fields(new.gap, new.voltage, new.charges)[0]
         rise = (new.voltage - old.voltage) / seconds
         source += np.sum(new.length * (new.voltage * last - old.voltage * moved))
-        source += np.sum(
-            weight @ ((volts[:, None] * stack.crossing(*at) - rise * stack.fields(*at)[0]) * new.length)
-        )
-        return Flow(float(eps_0 * source) + beside, float(eps_0 * leaked))
+        crossing = stack.crossing(*at)
+        source += np.sum(weight @ ((volts[:, None] * crossing - rise * stack.fields(*at)[0]) * new.length))
+        charge += float(np.sum(new.length * (last - moved)) + np.sum(weight @ (crossing * new.length)))
+        return Flow(float(eps_0 * source) + beside, float(eps_0 * leaked), charge, seconds)
 
     def _times(self) -> tuple[Floats, Floats]:
         """Quadrature nodes (s) and weights (s) of the step, dense where the fastest charge moves."""
@@ -269,9 +298,9 @@ class ChargeBooks(Room):
     def _flow(self, substep: Any) -> tuple[float, float]:
         """Work of the source and leakage; the first voltage is raised before anything moves."""
         charging = self.attraction.charging
-        flow = charging.flow(self.attraction.charged(substep.pads[1]))
+        source, leaked = (substep.new.memory["supplied"] - substep.old.memory["supplied"])[:2].tolist()
         raised = substep.old.voltage != charging.old.voltage
-        return flow.source_work + (charging.field_energy(charging.old) if raised else 0.0), flow.leakage
+        return source + (charging.field_energy(charging.old) if raised else 0.0), leaked
 
     def _stretching(self, substep: Any) -> float:
         """Work of the field on the tributary lengths on the path of the charged pad."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.circuit.load import Air, Load
 from evfem.common.arrays import Floats
 from evfem.terms.charging import ChargeBooks
 from evfem.terms.foundation import ElasticFoundation
@@ -19,6 +20,8 @@ COLUMNS = {
         *force_columns("adhesive", "adhesion"),
         *ElasticFoundation.columns,
         *ChargeBooks.columns,
+        *Load.columns,
+        *Air.columns,
         *ForceSource.columns,
         *GAP_COLUMNS,
     )
@@ -46,5 +49,9 @@ class OfRooms:
     leakage_dissipation = _of_room("leakage_dissipation")
     stretch_work = _of_room("stretch_work")
     field_energy = _of_room("field_energy")
+    charge = _of_room("charge")
+    current_rms = _of_room("current_rms")
+    power = _of_room("power")
+    breakdown = _of_room("breakdown")
     missed_force = _of_room("missed_force")
     missed_gap = _of_room("missed_gap")

@@ -97,6 +97,9 @@ class Tractions(PadTraction):
             found |= begun(part, found, part.memory(state))
         return found
 
+    def restart(self, old: Any, target: Any) -> dict[str, Floats]:
+        return {name: kept for part in self.parts for name, kept in part.restart(old, target).items()}
+
     def begin(self, old: PadState, seconds: float) -> None:
         for part in self.parts:
             part.begin(old, seconds)

@@ -33,6 +33,7 @@ OF_PAGES = {
     "pictures-stress.png": ("howto/pictures.md", "stress.png"),
     "pictures-beside.png": ("howto/pictures.md", "beside.png"),
     "pictures-slide.gif": ("howto/pictures.md", "slide.gif"),
+    "amplifier.png": ("howto/amplifier.md", "amplifier.png"),
     "probes-marks.png": ("howto/probes.md", "marks.png"),
     "probes-history.png": ("howto/probes.md", "probes.png"),
 }

@@ -1,5 +1,7 @@
 """Voltage profiles: interpolation with jumps, effective value, amplifier limit, files."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tools.refusals import refuses
@@ -111,3 +113,31 @@ def test_a_jump_is_climbed_and_a_slew_needs_a_speed():
     np.testing.assert_allclose(slow([2.0, 2.5, meets, 4.0]), [10.0, 55.0, 10.0 + 90.0 * (meets - 2.0), 50.0])
     refuses("needed with a slew", Amplifier(1000.0, slew=90.0).limit, JUMP)
     refuses("slew", Amplifier, 1000.0, slew=0.0)
+
+
+FINGER = SimpleNamespace(
+    frequency=np.array([1e3, 1e4]), impedance=np.array([-2e5j, 1e4 - 2e4j]), unit="ohm"
+)  # as of `ev.electrical_impedance`
+
+
+def test_current_and_slew_rate_limit_an_alternating_voltage_by_its_load():
+    """By hand: 1 mA through |10 - 20i| kohm are 22.4 V; a sine of 30 V rises by 2 pi f 30 sqrt(2)."""
+    wish = VoltageProfile([0.0, 10.0], [0.0, 100.0])
+    current = Amplifier(80.0, largest_current=1e-3, load=FINGER)
+    assert current.limit(wish).voltage.max() == pytest.approx(1e-3 * 1e4 * 5**0.5, rel=1e-12)
+    rate = 2.0 * np.pi * 1e4 * 30.0 * 2**0.5
+    both = Amplifier(80.0, largest_current=1e-2, slew_rate=rate, load=FINGER)
+    assert both.limit(wish).voltage.max() == pytest.approx(30.0, rel=1e-12)
+    assert [one.stops(wish) for one in (current, both, Amplifier(80.0), Amplifier(200.0))] == [
+        "largest_current",
+        "slew_rate",
+        "voltage_max",
+        "",
+    ]
+
+
+def test_a_current_without_a_load_is_refused():
+    refuses("load: missing", Amplifier, 80.0, largest_current=1e-3)
+    plane = SimpleNamespace(unit="ohm mm")
+    refuses("load: given SimpleNamespace, not in ohm", Amplifier, 80.0, slew_rate=1e5, load=plane)
+    refuses("largest_current: given 0", Amplifier, 80.0, largest_current=0.0, load=FINGER)

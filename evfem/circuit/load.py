@@ -1,0 +1,119 @@
+"""What an amplifier sees of a finger, and whether the air holds, as columns of the history.
+
+Under a drive by its mean the load is a sum of admittances (`evfem.electrostatics.alternating`), one of
+each node of the pad with its own gap and tributary area, over the harmonics of the voltage. Of a bias
+there is no current, and of a square wave the harmonics up to the 31st count: an ideal edge has an infinite
+current. Resolved in time all three are those of the charges, `current_rms` and `power` over the step.
+
+The air between two faces holds up to Paschen's voltage (`evfem.electrostatics.breakdown`), which the peak
+of the voltage across a gap must not reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.rooms import Column, Room
+from evfem.electrostatics.alternating import admittance
+from evfem.electrostatics.breakdown import Limited, across_gap, breakdown_voltage
+from evfem.electrostatics.laws import eps_0
+
+#: of lengths in mm: C/mm2 per V/mm, and W per N mm/s
+PER_MM, MILLI = 1e-3 * eps_0, 1e-3
+COLUMNS = (
+    Column("charge", "C/mm", "of the electrode, effective; of the moment where it is resolved in time"),
+    Column("current_rms", "A/mm", "into the electrode, effective, from the amplifier"),
+    Column("power", "W/mm", "mean, from the amplifier"),
+)
+
+
+def nodal_admittances(attraction: Any, pad: Any, electrics: Any, frequency: float) -> Any:
+    """Current over voltage (P,), complex, in S (in the plane S/mm), of the nodes of a pad."""
+    conductivity = 0.0 if electrics.drive is None else electrics.drive.gap_conductivity
+    layers = electrics.layers_at(frequency)
+    density = admittance(attraction.gaps(pad), frequency, layers, conductivity, electrics.gap_eps_r)
+    return attraction.carrying(pad) * density
+
+
+class Load(Room):
+    """Charge, current and power of a drive by its mean over the cycle."""
+
+    columns = COLUMNS
+
+    def values(self, model: Any, state: Any) -> Mapping[str, float]:
+        pad, electrics = model.equilibrium.pad_state(state), model.closing.electrics
+        order, share = electrics.harmonics
+        order, share = order[electrics.smooth], share[electrics.smooth]
+        frequency = electrics.frequency * order
+        each = [nodal_admittances(model.attraction.parts[0], pad, electrics, one) for one in frequency]
+        found = np.array([one.sum() for one in each])
+        volts = abs(state.voltage)
+        square = share * np.abs(found) ** 2
+        return {
+            "charge": volts * float(np.sqrt(np.sum(square / (2.0 * np.pi * frequency) ** 2))),
+            "current_rms": volts * float(np.sqrt(np.sum(square))),
+            "power": volts**2 * float(np.sum(share * found.real)),
+        }
+
+
+class Supply(Room):
+    """Charge, current and power of a voltage that is resolved in time."""
+
+    columns = COLUMNS
+
+    def values(self, model: Any, state: Any) -> Mapping[str, float]:
+        attraction = model.attraction.parts[0]
+        charged = attraction.charged(model.equilibrium.pad_state(state))
+        work, _, square, seconds = state.memory["supplied"].tolist()
+        time = seconds if seconds > 0.0 else np.inf
+        return {
+            "charge": PER_MM * attraction.charging.electrode_charge(charged),
+            "current_rms": PER_MM * float(np.sqrt(square / time)),
+            "power": MILLI * work / time,
+        }
+
+
+class Air(Room):
+    """How near the air is to breakdown: the largest voltage of a gap over Paschen's."""
+
+    columns = (Column("breakdown", "", "largest peak voltage of a gap over that at which air breaks down"),)
+
+    def values(self, model: Any, state: Any) -> Mapping[str, float]:
+        pad, attraction = model.equilibrium.pad_state(state), model.attraction.parts[0]
+        gap = attraction.gaps(pad)
+        over = self._voltages(model, pad, gap) / np.asarray(breakdown_voltage(gap))
+        return {"breakdown": float(np.max(np.where(attraction.carrying(pad) > 0.0, over, 0.0)))}
+
+    def _voltages(self, model: Any, pad: Any, gap: Floats) -> Any:
+        """Peak voltages of the gaps (P,)."""
+        attraction, electrics = model.attraction.parts[0], model.closing.electrics
+        if electrics.resolved:
+            return np.abs(attraction.charging.across(attraction.charged(pad)))
+        peak = electrics.crest * abs(pad.voltage)
+        return peak * across_gap(gap, attraction.layers, electrics.gap_eps_r)
+
+    def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+        over = np.array([row.get("breakdown", 0.0) for row in rows])
+        worst = int(over.argmax())
+        if over[worst] <= 1.0:
+            return
+        what = "is held there by the law" if scene.breakdown == "limit" else "the attraction does not know it"
+        yield (
+            f"air breaks down{self._where(scene)}: in step {rows[worst]['step']} a gap has {over[worst]:.3g} "
+            f"times the voltage of Paschen's law, and {what}"
+        )
+
+    def _where(self, scene: Any) -> str:
+        """Gaps that break down at the largest voltage, in words."""
+        electrics = scene.electrics
+        if electrics.resolved:
+            return ""
+        layers, volts = electrics.attraction[1], np.asarray(electrics.largest_voltage)
+        if np.ndim(layers.reduced):
+            return ""
+        first, last = Limited(scene.law, electrics.crest).sparking(volts, layers)
+        return f" in gaps of {1e3 * float(first):.3g} to {1e3 * float(last):.3g} um"

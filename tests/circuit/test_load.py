@@ -1,0 +1,204 @@
+"""What an amplifier sees of a finger: columns and impedance against plates, capacitors, the source's work."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.domes import dome_scene
+from tools.refusals import refuses
+
+import evfem as ev
+from evfem.circuit.load import Air
+from evfem.simulation.run import Run
+
+PAD = ev.FingerPad(ridges=False, resolution="coarse")
+SCREEN = ev.Display(insulator=ev.TOUCHSCREEN, friction=0.3)
+DRY = ev.Drive(frequency=1000.0, skin="gabriel_dry", gap_conductivity=1e-8)
+PRESS = ev.Press(force=0.05, steps=1)
+ROUGH = 0.003
+
+
+def scene(drive=DRY, voltage=50.0, motion=PRESS, finger=PAD, surface=SCREEN, **more):
+    law = more.pop("law", ev.StrongTroxel())
+    return ev.Scene(finger, surface, law, voltage, motion, drive=drive, **more)
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    return ev.simulate(scene(roughness_gap=ROUGH, depth=10.0))
+
+
+def plates(result, frequency, finger=PAD):
+    """Admittance (S/mm, in space S) of plates that the end of a run is cut into: positions from its frame."""
+    run = Run(result.scene, None)
+    for request in run.requests():
+        run.advance(request)
+    model = run.model
+    position = model.equilibrium.interface.positions(run.state.u)
+    gap = np.maximum(position[:, 1] - model.surface.y, 0.0) + ROUGH
+    skin = model.closing.electrics.skin.thickness
+    area = model.pad.tributary(position)
+    each = [
+        0.0 if size == 0.0 else 1.0 / ev.electrostatics.contact_impedance(
+            g, size, frequency, skin="gabriel_dry", skin_thickness=d, insulator=ev.TOUCHSCREEN,
+            gap_conductivity=1e-8,
+        )
+        for g, size, d in zip(gap, area, np.broadcast_to(skin, gap.shape), strict=True)
+    ]  # fmt: skip
+    return sum(each)
+
+
+def test_columns_are_those_of_plates_in_parallel(pressed):
+    admittance = plates(pressed, 1000.0)
+    assert pressed.current_rms[-1] == pytest.approx(50.0 * abs(admittance), rel=1e-10)
+    assert pressed.power[-1] == pytest.approx(50.0**2 * admittance.real, rel=1e-10)
+    assert pressed.charge[-1] == pytest.approx(50.0 * abs(admittance) / (2e3 * np.pi), rel=1e-10)
+    assert pressed.total["current_rms"][-1] == pytest.approx(10.0 * pressed.current_rms[-1], rel=1e-14)
+
+
+def test_the_impedance_is_that_of_the_columns(pressed):
+    for given in (pressed, pressed.scene):
+        found = ev.electrical_impedance(given, [75.0, 1000.0])
+        assert found.unit == "ohm"
+        assert found.current_rms(50.0)[1] == pytest.approx(10.0 * pressed.current_rms[-1], rel=1e-10)
+        assert found.power(50.0)[1] == pytest.approx(10.0 * pressed.power[-1], rel=1e-10)
+    assert 0.1 / found.impedance[0] == pytest.approx(plates(pressed, 75.0), rel=1e-10)
+    plane = ev.electrical_impedance(scene(roughness_gap=ROUGH), 1000.0)
+    assert (plane.unit, plane.impedance) == ("ohm mm", pytest.approx(10.0 * found.impedance[1:], rel=1e-12))
+
+
+def test_in_space_areas_are_areas():
+    press = ev.Press(indentation=0.2, steps=1)
+    tip = dome_scene(
+        press, law=ev.StrongTroxel(), voltage=50.0, surface=SCREEN, drive=DRY, roughness_gap=ROUGH
+    )
+    result = ev.simulate(tip)
+    admittance = plates(result, 1000.0)
+    assert result.current_rms[-1] == pytest.approx(50.0 * abs(admittance), rel=1e-10)
+    found = ev.electrical_impedance(result, 1000.0)
+    assert (found.unit, found.impedance[0]) == ("ohm", pytest.approx(1.0 / admittance, rel=1e-10))
+    assert 0.0 < result.breakdown[-1] < 1.0
+
+
+def test_without_losses_it_is_a_capacitor():
+    lossless = ev.electrical_impedance(scene(drive=None, voltage=0.0, roughness_gap=ROUGH), [10.0, 1e5])
+    assert not np.real(1.0 / lossless.impedance).any()
+    farad = np.imag(1.0 / lossless.impedance) / (2.0 * np.pi * lossless.frequency)
+    assert farad[0] == pytest.approx(farad[1], rel=1e-12)
+    driven = ev.simulate(scene(drive=ev.Drive(frequency=500.0), roughness_gap=ROUGH))
+    assert driven.power[-1] == 0.0
+    assert driven.charge[-1] == pytest.approx(driven.current_rms[-1] / (1e3 * np.pi), rel=1e-12)
+
+
+def test_a_square_wave_is_the_sum_of_its_first_sines():
+    drive = ev.Drive(frequency=200.0, waveform="square", skin="gabriel_dry")
+    square = ev.simulate(scene(drive=drive, roughness_gap=ROUGH))
+    order = np.arange(1.0, 32.0, 2.0)
+    admittance = 1.0 / ev.electrical_impedance(square, 200.0 * order).impedance
+    volts = 50.0**2 * 8.0 / (np.pi * order) ** 2
+    assert square.power[-1] == pytest.approx((volts * admittance.real).sum(), rel=1e-10)
+    assert square.current_rms[-1] == pytest.approx(np.sqrt((volts * abs(admittance) ** 2).sum()), rel=1e-10)
+
+
+RESOLVED = ev.Drive(skin="gabriel_dry", gap_conductivity=1e-8, resolved=True)
+CYCLES = (ev.Press(indentation=0.3, steps=1), ev.Wait(duration=2e-3, steps=80))
+
+
+@pytest.fixture(scope="module")
+def swinging():
+    return ev.simulate(
+        scene(drive=RESOLVED, voltage=ev.Sine(1000.0, 50.0 * 2**0.5), motion=CYCLES, roughness_gap=ROUGH)
+    )
+
+
+def test_power_and_current_of_a_resolved_drive_are_those_of_its_source(swinging):
+    last = slice(-40, None)
+    work = 1e-3 * (swinging.source_work[-1] - swinging.source_work[-41])
+    assert swinging.power[last].mean() == pytest.approx(work / 1e-3, rel=1e-12)
+    # the insulator does not conduct: the current is the rate of the electrode's charge
+    rate = np.diff(swinging.charge[-41:]) / 2.5e-5
+    assert swinging.current_rms[last] == pytest.approx(np.abs(rate), rel=1e-9, abs=1e-12)
+    # with the mean over the cycle: 40 steps of a period, and the start has decayed to a part
+    mean = ev.simulate(scene(drive=DRY, motion=ev.Press(indentation=0.3, steps=1), roughness_gap=ROUGH))
+    rms = np.sqrt((swinging.current_rms[last] ** 2).mean())
+    assert rms == pytest.approx(mean.current_rms[-1], rel=5e-3)
+    assert swinging.power[last].mean() == pytest.approx(mean.power[-1], rel=2e-2)
+    assert swinging.breakdown[last].max() == pytest.approx(mean.breakdown[-1], rel=1e-2)
+
+
+def test_a_step_in_several_substeps_has_the_power_of_all(swinging):
+    run = Run(swinging.scene, None)
+    for request, _ in zip(run.requests(), range(12), strict=False):
+        run.advance(replace(request, turns=[0.3, 0.45]))
+    result = run.result()
+    assert result.substeps[-1] == 3
+    work = 1e-3 * np.diff(result.source_work)
+    assert result.power[-10:] == pytest.approx(work[-10:] / 2.5e-5, rel=1e-12)
+    assert result.current_rms[-1] == pytest.approx(swinging.current_rms[11], rel=0.1)
+
+
+def test_breakdown_is_the_largest_ratio_of_all_gaps():
+    """A round pad has every gap, and with it nearly the worst one of the curve."""
+    film = scene(drive=None, voltage=1000.0, surface=ev.Display(friction=0.3))
+    result = ev.simulate(film)
+    worst = 1000.0 / ev.electrostatics.inception_voltage(film.electrics.attraction[1])[0]
+    assert 0.9 * worst < result.breakdown[-1] <= worst * (1.0 + 1e-12)
+    (said,) = (one for one in result.warnings if "breaks down" in one)
+    assert said.startswith("air breaks down in gaps of 12 to 80.8 um: in step 1 a gap has 1.2")
+    assert "air breaks down from 790 V on (28.5 um)" in " ".join(str(ev.plan(film)).split())
+    quiet = ev.simulate(scene(drive=None, voltage=700.0, surface=ev.Display(friction=0.3)))
+    assert quiet.breakdown[-1] < 1.0
+    assert not [one for one in quiet.warnings if "breaks down" in one]
+    assert "breaks down" not in str(ev.plan(quiet.scene))
+    # the peak of a sine is what counts
+    sine = ev.simulate(scene(drive=ev.Drive(frequency=1e3), voltage=700.0, surface=ev.Display(friction=0.3)))
+    assert sine.breakdown[-1] == pytest.approx(2**0.5 * quiet.breakdown[-1], rel=1e-6)
+
+
+def test_a_scene_pays_only_for_what_is_in_it():
+    names = ("charge", "current_rms", "power", "breakdown")
+    without = ev.simulate(scene(law=None, voltage=0.0, drive=None))
+    assert not set(names) & set(without.columns)
+    assert not without.breakdown.any()
+    direct = ev.simulate(scene(drive=None, roughness_gap=ROUGH))
+    assert [name for name in names if name in direct.columns] == ["breakdown"]
+    off = ev.simulate(scene(drive=None, roughness_gap=ROUGH, breakdown="off"))
+    assert not set(names) & set(off.columns)
+    assert off.applied_force[-1] == direct.applied_force[-1]
+
+
+@pytest.mark.parametrize("direction", ["vertical", "normal"])
+def test_a_limited_law_pulls_less_and_closes_the_balance(direction):
+    film = {"drive": None, "voltage": 1777.0, "surface": ev.Display(friction=0.3), "direction": direction}
+    motion = ev.Press(indentation=0.2, steps=3)
+    free, held = (ev.simulate(scene(**film, motion=motion, breakdown=one)) for one in ("warn", "limit"))
+    assert 0.7 < held.electrostatic_force[-1] / free.electrostatic_force[-1] < 0.99
+    assert held.breakdown[-1] > 1.0
+    assert [one for one in held.warnings if "held there by the law" in one]
+    lost = [abs(one.integrator_dissipation[-1]) / one.external_work[-1] for one in (free, held)]
+    assert lost[1] < 1.2 * lost[0]
+    low = {**film, "voltage": 700.0}
+    free, held = (ev.simulate(scene(**low, motion=motion, breakdown=one)) for one in ("warn", "limit"))
+    assert held.electrostatic_force == pytest.approx(free.electrostatic_force, rel=1e-9)
+
+
+def test_files_know_breakdown_and_refuse_what_has_no_limit(tmp_path):
+    limited = scene(drive=None, voltage=900.0, surface=ev.Display(friction=0.3), breakdown="limit")
+    text = ev.scenefile.dump(limited)
+    assert 'breakdown = "limit"' in text
+    assert ev.scenefile.loads(text) == limited
+    assert "breakdown" not in ev.scenefile.dump(scene())
+    refuses('electrostatics.breakdown: given "sparks"', scene, breakdown="sparks")
+    refuses("electrostatics.breakdown: given limit in a resolved drive", scene, RESOLVED, breakdown="limit")
+    square = ev.Drive(frequency=100.0, waveform="square")
+    refuses("electrostatics.breakdown: given limit with a voltage of s", scene, square, breakdown="limit")
+    refuses("scene: given no electrostatic law", ev.electrical_impedance, scene(None, 0.0, law=None), 1.0)
+    refuses("frequencies: given 0", ev.electrical_impedance, scene(), 0.0)
+    ev.electrical_impedance(scene(roughness_gap=ROUGH), [75.0, 1e3]).to_csv(tmp_path / "found.csv")
+    rows = (tmp_path / "found.csv").read_text().splitlines()
+    assert rows[0] == "frequency (Hz),impedance real (ohm mm),impedance imaginary (ohm mm)"
+    assert len(rows) == 3
+
+
+def test_no_doubt_below_breakdown():
+    assert not list(Air().doubts(scene(), [{"step": 1, "breakdown": 0.99}]))
