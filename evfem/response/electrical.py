@@ -97,7 +97,7 @@ def electrical_impedance(
     >>> scene = ev.Scene(finger, ev.Display(insulator=ev.TOUCHSCREEN), ev.StrongTroxel(), depth=10.0,
     ...                  motion=ev.Press(force=0.05, steps=1), roughness_gap=0.002)
     >>> found = ev.electrical_impedance(scene, [100.0, 1000.0])
-    >>> round(abs(found.impedance[0] / found.impedance[1]), 6)          # a capacitor
+    >>> print(round(abs(found.impedance[0] / found.impedance[1]), 6))          # a capacitor
     10.0
     """
     frequency, scene = checked_frequencies(frequencies), scene_of(scene)
