@@ -18,6 +18,7 @@ def fringe(found: Found) -> str:
         for field in ("full", "local")
     )
     over = [n[f"participants.full_over_measured.{case}"] for case in cases]
+    held = [n[f"participants.tilted_full_median_over_measured.{case}"] for case in cases]
     gain = max(abs(n[f"participants.gain_median.{case}"] - 1.0) for case in cases)
     flat, filling = n["spreading.smooth"], n["spreading.filled.smooth"]
     rough = [n[f"spreading.{kind}5um"] - 1.0 for kind in ("", "filled.")]
@@ -28,7 +29,8 @@ def fringe(found: Found) -> str:
         f"as by columns, {filling:.1f} times if its layer fills the ridges, and {percent(min(rough))} to "
         f"{percent(max(rough))} harder between rough faces 5 um apart.",
         f"At Table 1's fingers ridges change the medians of (8a) by {percent(gain)} at most, which remain "
-        f"{min(over):.1f} to {max(over):.1f} times the measured ones.",
+        f"{min(over):.1f} to {max(over):.1f} times the measured ones; held at 30 degrees they are "
+        f"{min(held):.2f} to {max(held):.2f} times these.",
     )
 
 
@@ -37,6 +39,9 @@ def fingertip(found: Found) -> str:
     n = found["numbers"]
     areas = [rf"verdict\.{one}_over_adams" for one in (r"smooth\.gross", r"ridged\.ridge")]
     laws = [rf"verdict\.ridged\.{law}\.median_over_measured" for law in ("kaczmarek", "strong_troxel")]
+    tilted = [
+        spread(n, rf"verdict\.held\.{law}\.median_over_measured") for law in ("kaczmarek", "strong_troxel")
+    ]
     gross, ridge, kaczmarek, troxel, width = (spread(n, key) for key in (*areas, *laws, r"width_mm\."))
     gains = {
         key: n[key] / n["variant.smooth.area_mm2"] - 1.0 for key in n if re.match(r"variant\..+area", key)
@@ -49,7 +54,7 @@ def fingertip(found: Found) -> str:
         f"single change more than {percent(other)}.",
         f"A cross-section has the same force over {width} mm.",
         f"Hovering ridged pads have {kaczmarek} of the measured medians by Kaczmarek's law and {troxel} by "
-        "Strong and Troxel's.",
+        f"Strong and Troxel's; smooth ones held at 30 degrees, as the fingers were, {tilted[0]} and {tilted[1]}.",
     )
 
 
