@@ -39,9 +39,9 @@ def fingertip(found: Found) -> str:
     n = found["numbers"]
     areas = [rf"verdict\.{one}_over_adams" for one in (r"smooth\.gross", r"ridged\.ridge")]
     laws = [rf"verdict\.ridged\.{law}\.median_over_measured" for law in ("kaczmarek", "strong_troxel")]
-    tilted = [
+    held, troxel_held = (
         spread(n, rf"verdict\.held\.{law}\.median_over_measured") for law in ("kaczmarek", "strong_troxel")
-    ]
+    )
     gross, ridge, kaczmarek, troxel, width = (spread(n, key) for key in (*areas, *laws, r"width_mm\."))
     gains = {
         key: n[key] / n["variant.smooth.area_mm2"] - 1.0 for key in n if re.match(r"variant\..+area", key)
@@ -54,7 +54,7 @@ def fingertip(found: Found) -> str:
         f"single change more than {percent(other)}.",
         f"A cross-section has the same force over {width} mm.",
         f"Hovering ridged pads have {kaczmarek} of the measured medians by Kaczmarek's law and {troxel} by "
-        f"Strong and Troxel's; smooth ones held at 30 degrees, as the fingers were, {tilted[0]} and {tilted[1]}.",
+        f"Strong and Troxel's; smooth ones held at 30 degrees, as the fingers were, {held} and {troxel_held}.",
     )
 
 
