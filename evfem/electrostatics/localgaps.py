@@ -11,6 +11,7 @@ and with :math:`x = \sigma / U`
 
 - ``exponential`` gaps have :math:`\langle (u + \sigma)^{-2} \rangle = e^x E_2(x) / (x U^2) = [1/\sigma - e^x
   E_1(x) / U] / U` (NIST Digital Library of Mathematical Functions, 8.19);
+  elastic contacts have them under load (Prodanov et al. 2014, doi:10.1007/s11249-013-0282-z);
 - ``gaussian`` gaps are those of faces whose rms height is U/3. The tail u < 0, 0.13 % of the area that would
   overlap, is cut off and attracts nothing: over thick layers 0.13 % of the force are missing.
 

@@ -155,7 +155,7 @@ def roughness_of(given: Any, key: str = "roughness_gap") -> RoughnessLaw | None:
     """The law of a scene: a length (mm) is that of constant roughness, 0 none at all.
 
     >>> roughness_of(0.0), roughness_of(0.001)
-    (None, ConstantRoughness(gap=0.001))
+    (None, ConstantRoughness(gap=0.001, distribution='none'))
     """
     if isinstance(given, type) and hasattr(given, "separation"):
         raise InputError(key, f"the class {given.__name__}", "an object of it")
