@@ -52,7 +52,7 @@ APART = 3.0
 #: where the exponential integral is a series of so many terms
 LARGE, TERMS = 50.0, 20
 #: steps for an equivalent gap, of which Strong and Troxel's law needs one
-STEPS = 8
+STEPS = 4
 
 
 def local_gaps(distribution: str, apart: Values = APART) -> tuple[Floats, Floats]:

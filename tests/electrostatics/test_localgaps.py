@@ -125,9 +125,10 @@ def test_any_law_attracts_at_the_equivalent_gap_with_its_own_mean(name, distribu
     for pressure in (0.0, 0.03):
         mean = averaged(lambda u: law.traction(u, 100.0, layers), POWER.separation(pressure), distribution)
         assert law.traction(faces.separation(pressure), 100.0, layers) == pytest.approx(mean, rel=1e-8)
-    if name != "square":
-        rows = faces.separation(np.array([[0.0, 0.03], [0.01, 0.02]]))
-        assert rows[0, 1] == pytest.approx(faces.separation(0.03), rel=1e-12)
+    columns = [np.asarray(one)[..., None] * np.ones(2) for one in (layers.reduced, layers.loss)]
+    nodes = ev.Layers(columns[0], layers.thickness, columns[1])
+    rows = replace(faces, layers=nodes).separation(np.array([[0.0, 0.03], [0.01, 0.02], [0.03, 0.0]]))
+    assert rows[:, 0].tolist() == pytest.approx([*map(faces.separation, (0.0, 0.01, 0.03))], rel=1e-12)
 
 
 @DISTRIBUTIONS
