@@ -54,7 +54,7 @@ def fingertip(found: Found) -> str:
         f"single change more than {percent(other)}.",
         f"A cross-section has the same force over {width} mm.",
         f"Hovering ridged pads have {kaczmarek} of the measured medians by Kaczmarek's law and {troxel} by "
-        f"Strong and Troxel's; smooth ones held at 30 degrees, as the fingers were, {held} and {troxel_held}.",
+        f"Strong and Troxel's; smooth ones held at 30 degrees, as they were, {held} and {troxel_held}.",
     )
 
 

@@ -13,8 +13,8 @@ from evfem.errors import InputError, describe_value
 #: every study, in the order in which "all" runs them; it leaves out `APART`
 NAMED = """
 section321 laws fringe fingertip fingerprint fig03 fig05 fig06 fig07 fig08 fig09 fig10 fig11 fig12 fig13
-participants uncertainty frequency hypotheses friction_spectrum stick_slip relaxation impedance sensitivities
-soft_display moisture stability work_precision peers campaign
+participants uncertainty frequency hypotheses friction_spectrum stick_slip bandwidth relaxation impedance
+sensitivities soft_display moisture stability work_precision peers campaign
 """
 NAMES = tuple(NAMED.split())
 #: studies that "all" leaves out: one needs packages of others, one takes hours

@@ -261,7 +261,7 @@ def slip_memory_gain(frequency: Values, speed: Values, length: Values) -> Values
 
     The pressure changes with `frequency` (Hz) while the skin slides at `speed` (mm/s), and friction follows
     over the `length` (mm) of slip. Half of its power is left at v/(2 pi L), 13.8 Hz per mm/s of the speed in
-    doi:10.48550/arXiv.2505.11162. Raises InputError where a frequency is negative, a speed or length not
+    arXiv:2505.11162. Raises InputError where a frequency is negative, a speed or length not
     above 0.
 
     >>> gain = slip_memory_gain(276.0, 20.0, 1.0 / (2.0 * np.pi * 13.8))

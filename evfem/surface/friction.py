@@ -184,7 +184,7 @@ class AgeingFriction(NamedFriction, kind="ageing"):
 
 def _inner(key: str, value: Any) -> Any:
     """A coefficient as a float, or a law without a memory of its own."""
-    if isinstance(value, SlipMemory) or isinstance(value, type) or not isinstance(value, FrictionLaw):
+    if isinstance(value, (SlipMemory, type)) or not isinstance(value, FrictionLaw):
         return real(key, value, _INNER, _COEFFICIENT)
     return value
 
@@ -194,7 +194,7 @@ def _at_rest(key: str, value: Any) -> float:
     return math.inf if endless else real(key, value, _AT_REST, _TIME["test"])
 
 
-_INNER_LAW = {"allowed": _INNER, "check": _inner, "type": float | dict, "kinds": lambda: KINDS, "tag": "kind"}
+_INNER_LAW = {"allowed": _INNER, "check": _inner, "type": float | dict, "kinds": lambda: NamedFriction.kinds}
 _REST = {"allowed": _AT_REST, "check": _at_rest, "test": Within(0.0, above=True), "unit": "s"}
 
 

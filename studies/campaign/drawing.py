@@ -20,7 +20,7 @@ from .attractions import (
 )
 from .bodies import LAYERS, TABLE_2_WIDTH, finger, width
 from .grounds import add_both_ways, add_friction_law, surface
-from .parts import OUTLINES, PARTS, WISHES, add_outline, add_parts, add_wish
+from .parts import MEMORIES, OUTLINES, PARTS, WISHES, add_memory, add_outline, add_parts, add_wish
 from .tables import Draw, Tables, six_digits
 
 #: share of the scenes whose finger has three dimensions, and the random numbers that these are drawn with
@@ -58,6 +58,7 @@ def draw(seed: int, number: int) -> Tables:
 def _latest(seed: int, number: int, tables: Tables) -> Tables:
     """What came in last, in the plane and in space, each drawn with random numbers of its own."""
     add_distribution(Draw(seed, number, LOCAL), tables)
+    add_memory(Draw(seed, number, MEMORIES), tables)
     return add_outline(Draw(seed, number, OUTLINES), tables)
 
 

@@ -196,7 +196,8 @@ def frames(scene: ev.Scene, result: ev.Result) -> Found:
     yield worst("pull", lambda f: _relative(-f.contact_pressure, f), TOLERANCE)
     yield worst("open nodes", carried, 0.0)
     yield worst("volume", lambda f: float(-f.J.min()), 0.0)
-    if not getattr(scene.friction_law, "timed", False):  # frames do not know speeds and ages
+    law = scene.friction_law
+    if not (getattr(law, "timed", False) or isinstance(law, ev.SlipMemory)):  # a frame does not know the past
         allowed = max(TOLERANCE, 10.0 * scene.solver.tolerance)
         yield worst("nodal cone", lambda f: _beyond_the_cone(scene, result, f), allowed)
 

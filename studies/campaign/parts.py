@@ -1,5 +1,5 @@
-"""Tissue that relaxes, probes, surfaces that give way, adhesion, friction that a voltage shall make, what is
-beside a charge and flatter fingers, added to scenes that are drawn.
+"""Tissue that relaxes, probes, surfaces that give way, adhesion, friction that a voltage shall make or that
+slip renews, what is beside a charge and flatter fingers, added to scenes that are drawn.
 
 They have random numbers of their own: the rest of a scene is what it is without them.
 """
@@ -7,8 +7,9 @@ They have random numbers of their own: the rest of a scene is what it is without
 from .attractions import largest_voltage
 from .tables import Draw, Tables, six_digits
 
-#: the random numbers of these parts, of wishes and of outlines; the flattest one, which all drawn skins fit
-PARTS, WISHES, OUTLINES = 4, 5, 6
+#: the random numbers of these parts, of wishes, of outlines and of friction that remembers; the flattest
+#: outline, which all drawn skins fit
+PARTS, WISHES, OUTLINES, MEMORIES = 4, 5, 6, 7
 FLATTEST = 2.9
 
 
@@ -53,6 +54,21 @@ def add_outline(random: Draw, tables: Tables) -> Tables:
     """Perhaps a finger flatter than an ellipse."""
     if "mesh" not in tables["finger"] and random.chance(0.08):
         tables["finger"]["outline"] = random.between(2.0, FLATTEST)
+    return tables
+
+
+def add_memory(random: Draw, tables: Tables) -> Tables:
+    """The tables, perhaps with friction that follows its law, or a coefficient, over slip, and over a time
+    where that law knows of it.
+    """
+    if not random.chance(0.1):
+        return tables
+    law = tables["surface"].get("friction_law", {"kind": "coulomb"})
+    memory: Tables = {"kind": "slip_memory", "friction": law if random.chance(0.8) else 0.5}
+    memory["length"] = random.spread(1e-3, 0.3)
+    if law["kind"] in ("rate", "ageing") and random.chance(0.5):
+        memory["time"] = random.spread(0.05, 10.0)
+    tables["surface"]["friction_law"] = memory
     return tables
 
 

@@ -252,6 +252,7 @@ def test_a_run_that_is_resumed_remembers_its_friction():
     np.testing.assert_array_equal(again.tangential_force, whole.tangential_force)
 
 
+AGEING = ev.AgeingFriction(0.2)
 TEXT = """
 version = 1
 [surface]
@@ -274,7 +275,9 @@ steps = 50
 def test_a_scene_file_says_what_is_followed():
     for keys, law in {
         "friction = 0.3": ev.SlipMemory(0.3),
-        "friction = { kind = 'rate', speed = 3.0 }\ntime = 2.0": ev.SlipMemory(ev.RateFriction(3.0), time=2.0),
+        "friction = { kind = 'rate', speed = 3.0 }\ntime = 2.0": ev.SlipMemory(
+            ev.RateFriction(3.0), time=2.0
+        ),
         "friction = { kind = 'coulomb' }\nlength = 0.05\ntime = inf": ev.SlipMemory(ev.Coulomb(), 0.05),
     }.items():
         scene = loads(TEXT.format(keys))

@@ -242,8 +242,14 @@ CASES = {
         lambda: block(friction_law=ev.SlipMemory(ev.LoadIndexFriction(0.01, 0.7), 0.2)),
         "surface.friction_law.friction.index",
     ),
-    "time of a slip memory": (lambda: block(friction_law=ev.SlipMemory(0.3, 0.5, 0.5)), "surface.friction_law.time"),
-    "coefficient of a slip memory": (lambda: block(friction_law=ev.SlipMemory(0.3)), "surface.friction_law.friction"),
+    "time of a slip memory": (
+        lambda: block(friction_law=ev.SlipMemory(0.3, 0.5, 0.5)),
+        "surface.friction_law.time",
+    ),
+    "coefficient of a slip memory": (
+        lambda: block(friction_law=ev.SlipMemory(0.3)),
+        "surface.friction_law.friction",
+    ),
     "sines": (lambda: block(surface=ev.Sinusoid(terms=[[0.05, 0.5, 0.3]], **LAYERED)), "surface.terms.0.0"),
     "normal": (lambda: block(direction="normal"), "electrostatics.voltage"),
     "inertia": (lambda: block(solver=replace(block().solver, dynamics="inertial")), TISSUE + "E"),

@@ -88,6 +88,19 @@ def test_stick_slip_has_the_period_of_the_equation_of_motion(numbers_of):
     )
 
 
+def test_friction_follows_a_voltage_up_to_the_measured_cut_off(numbers_of):
+    """13.8 Hz per mm/s (arXiv:2505.11162), to what 40 steps in a period leave; at rest nothing changes."""
+    found = numbers_of("bandwidth")
+    assert found["cutoff_Hz.20_mm_s"] == pytest.approx(276.0, rel=5e-3)
+    assert found["verdict.largest_error_of_gain.20_mm_s"] < 2e-3
+    assert found["verdict.largest_error_degrees.20_mm_s"] < 0.5
+    assert abs(found["onset.change_at_rest.memory"]) < 1e-8
+    for way in (5, 20):
+        exact = found[f"reference.share_after_{way}_um"]
+        assert found[f"onset.share_after_{way}_um.memory"] == pytest.approx(exact, abs=2e-3)
+        assert found[f"onset.share_after_{way}_um.coulomb"] == pytest.approx(1.0, abs=1e-6)
+
+
 def test_a_fast_press_needs_more_and_all_end_at_rest(numbers_of):
     found = numbers_of("relaxation")
     peaks = [found[f"peak_over_rest.{speed}_mm_s"] for speed in (2, 10, 50)]
