@@ -11,7 +11,7 @@ from .tables import Draw, Tables, six_digits
 LARGEST_FIELD = 60e3  # V/mm
 LARGEST_VOLTAGE = 3000.0
 #: the random numbers that distributions of gaps are drawn with
-LOCAL = 6
+LOCAL = 8
 
 
 def electrostatics(random: Draw) -> Tables:
