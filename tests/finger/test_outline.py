@@ -123,12 +123,15 @@ def test_nodes_lie_on_the_superellipse_and_layers_keep_their_thickness(n, order)
 @pytest.mark.parametrize("n", [2.5, 4.0])
 @pytest.mark.parametrize("posture", [0.0, 25.0])
 def test_nodes_lie_on_the_superellipsoid_and_layers_keep_their_thickness(n, posture):
-    tip = ev.Fingertip(**LEVEL, outline=n, posture=posture)
+    tip = ev.Fingertip(**LEVEL, outline=n, posture=posture, rim="free")
     mesh = tip.mesh()
     pad = mesh.points[mesh.node_sets["pad"]]
     c, s = np.cos(np.radians(posture)), np.sin(np.radians(posture))
     level = pad @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
     np.testing.assert_allclose(gauge(level, n), 1.0, rtol=1e-12)
+    if posture == 0.0:
+        bone = (mesh.points[mesh.node_sets["bone"]] - [0.0, 1.0, 0.0]) / [3.0, 2.5, 8.5]
+        np.testing.assert_allclose(np.linalg.norm(bone, axis=1), 1.0, rtol=1e-12)
     thick = layer_thickness(mesh, "stratum_corneum", mesh.node_sets["pad"])
     np.testing.assert_allclose(thick, 0.38, rtol=2e-2)
     if posture == 0.0:

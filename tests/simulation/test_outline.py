@@ -163,3 +163,14 @@ def test_the_plan_says_what_the_outline_does():
         scene = ev.Scene(ev.FingerPad(**LEVEL, outline=outline), ev.Flat(), motion=ev.Press(force=0.02))
         assert sentence in " ".join(str(ev.plan(scene)).split())
     assert "outline" not in str(ev.plan(ev.Scene(ev.FingerPad(**LEVEL), ev.Flat(), motion=ev.Press(0.02))))
+
+
+@pytest.mark.slow
+def test_a_fit_finds_the_exponent_that_forces_were_made_with():
+    """Of columns over |x/a|^2.6 + ..., by quadrature, at three gaps."""
+    gaps = [0.15, 0.25, 0.5]
+    forces = [columns(ev.Kaczmarek(), gap, 2.6) for gap in gaps]
+    scene = ev.Scene(ev.FingerPad(**LEVEL), GLASS, ev.Kaczmarek(), 10.0, ev.Hover(gap=0.3))
+    data = ev.MeasuredValues("electrostatic_force.last", forces, {"motion.0.gap": gaps})
+    found = ev.fit(scene, data, {"finger.outline": (2.0, 4.0)}, workers=1)
+    assert found.values["finger.outline"] == pytest.approx(2.6, abs=0.003)
