@@ -178,25 +178,34 @@ def _check_size(width: float, height: float, half: bool) -> None:
 def _fitted(unit: Floats, axes: Floats) -> tuple[float, ...]:
     """The series of points (N, 2) in lengths of the `axes` (mm)."""
     theta, rho = np.arctan2(unit[:, 1], unit[:, 0]), np.hypot(unit[:, 0], unit[:, 1])
-    steps = np.diff(theta, append=theta[:1])
-    steps = (steps + np.pi) % (2.0 * np.pi) - np.pi
-    steps *= np.sign(steps.sum())
-    if (back := int(steps.argmin())) >= 0 and not steps[back] > 0.0:
-        given = f"points {back + 1} and {(back + 1) % len(unit) + 1}, which go back, seen from the middle"
-        raise InputError(KEY, given, "points in their order along an outline that does not cross itself")
-    if (gap := float(np.degrees(steps.max()))) > WIDEST:
-        given = f"neighbours {gap:.3g} degrees apart, seen from the middle"
-        raise InputError(KEY, given, f"at most {WIDEST:g} degrees all around, or from side to side")
-    k = np.arange(1, min(HARMONICS, int(360.0 / gap / POINTS_EACH)) + 1)
+    steps = _steps(theta)
+    k = np.arange(1, min(HARMONICS, int(2.0 * np.pi / steps.max() / POINTS_EACH)) + 1)
     waves = np.stack([np.cos(np.outer(theta, k)), np.sin(np.outer(theta, k))], axis=2)
     matrix = np.column_stack([np.ones(len(unit)), waves.reshape(len(unit), -1)])
-    weight = np.sqrt(0.5 * (steps + np.roll(steps, 1)))[:, None]
-    series = np.linalg.lstsq(weight * matrix, weight[:, 0] * rho, rcond=None)[0]
+    weight = np.sqrt(0.5 * (steps + np.roll(steps, 1)))
+    series = np.linalg.lstsq(weight[:, None] * matrix, weight * rho, rcond=None)[0]
     missed = np.abs(matrix @ series / rho - 1.0) * np.hypot(*(unit * axes).T)
-    if (worst := int(missed.argmax())) >= 0 and missed[worst] > MISSED:
+    worst = int(missed.argmax())
+    if missed[worst] > MISSED:
         given = f"an outline from whose smooth course point {worst + 1} is {missed[worst]:.2g} mm away"
         raise InputError(KEY, given, f"at most {MISSED:g} mm: a smoother one, or one with more points")
     return tuple(series.tolist())
+
+
+def _steps(theta: Floats) -> Floats:
+    """Angles (N,) from point to point, all positive; InputError where the outline goes back, or has a gap."""
+    steps = np.diff(theta, append=theta[:1])
+    steps = (steps + np.pi) % (2.0 * np.pi) - np.pi
+    steps *= np.sign(steps.sum())
+    back = int(steps.argmin())
+    if not steps[back] > 0.0:
+        given = f"points {back + 1} and {(back + 1) % len(theta) + 1}, which go back, seen from the middle"
+        raise InputError(KEY, given, "points in their order along an outline that does not cross itself")
+    gap = float(np.degrees(steps.max()))
+    if gap > WIDEST:
+        given = f"neighbours {gap:.3g} degrees apart, seen from the middle"
+        raise InputError(KEY, given, f"at most {WIDEST:g} degrees all around, or from side to side")
+    return steps
 
 
 def _check_folds(curve: SeriesOutline) -> None:

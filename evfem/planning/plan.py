@@ -261,8 +261,8 @@ def _outline(finger: Any) -> str:
         return f"; the outline is measured ({outline.width:.4g} x {outline.height:.4g} mm)"
     if outline == 2.0:
         return ""
-    flatter = "a level finger with 3 touches 1.6 times what an ellipse touches at 1 N, and hovering at "
-    return f"; the outline has the exponent {outline:g}: {flatter}0.25 mm it is attracted 2.5 to 2.8 times"
+    flatter = "with 3 a level fingertip touches 1.6 times an ellipsoid's area at 1 N, and at 0.25 mm it is"
+    return f"; the outline has the exponent {outline:g}: {flatter} attracted 2.5 to 2.8 times as much"
 
 
 def _elastic_surface(scene: Scene) -> str:

@@ -157,7 +157,7 @@ def test_a_flat_finger_hovers_and_snaps():
 
 def test_the_plan_says_what_the_outline_does():
     for outline, sentence in (
-        (3.0, "the outline has the exponent 3: a level finger with 3 touches 1.6 times"),
+        (3.0, "the outline has the exponent 3: with 3 a level fingertip touches 1.6 times"),
         (np.array([[8.0, 6.0]]) * CIRCLE, "the outline is measured (16 x 12 mm)"),
     ):
         scene = ev.Scene(ev.FingerPad(**LEVEL, outline=outline), ev.Flat(), motion=ev.Press(force=0.02))
