@@ -103,6 +103,8 @@ def _exponential_gap(x: Floats) -> Floats:
 
     few, many = np.minimum(x, LARGE), np.maximum(x, LARGE)
     near = few * ((few * np.exp(few) * expn(2, few)) ** -0.5 - 1.0)
+    if (x < LARGE).all():
+        return np.asarray(near)
     terms = np.cumprod([-(k + 1) / many for k in range(1, TERMS)], axis=0)
     return np.where(x < LARGE, near, many * np.expm1(-0.5 * np.log1p(terms.sum(axis=0))))
 
