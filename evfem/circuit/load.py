@@ -35,8 +35,8 @@ def nodal_admittances(attraction: Any, pad: Any, electrics: Any, frequency: floa
     """Current over voltage (P,), complex, in S (in the plane S/mm), of the nodes of a pad."""
     conductivity = 0.0 if electrics.drive is None else electrics.drive.gap_conductivity
     layers = electrics.layers_at(frequency)
-    density = admittance(attraction.gaps(pad), frequency, layers, conductivity, electrics.gap_eps_r)
-    return attraction.carrying(pad) * density
+    stack = frequency, layers, conductivity, electrics.gap_eps_r
+    return attraction.carrying(pad) * attraction.over_gaps(pad, lambda gap: admittance(gap, *stack))
 
 
 class Load(Room):
@@ -84,7 +84,7 @@ class Air(Room):
 
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
         pad, attraction = model.equilibrium.pad_state(state), model.attraction.parts[0]
-        gap = attraction.gaps(pad)
+        gap = attraction.over_gaps(pad, lambda gap: gap)
         over = self._voltages(model, pad, gap) / np.asarray(breakdown_voltage(gap))
         return {"breakdown": float(np.max(np.where(attraction.carrying(pad) > 0.0, over, 0.0)))}
 

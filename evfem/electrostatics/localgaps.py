@@ -137,6 +137,11 @@ class SpreadGaps:
         rate = self._sum(lambda x: x * self._slope(U * x)) / np.where(slope != 0.0, slope, 1.0)
         return to_python(rate * separation_derivative(self.roughness, pressure))
 
+    def mean(self, of: Any, gap: Values, pressure: Values) -> Any:
+        """Mean of a quantity of the gap, each local gap wider by `gap` (mm)."""
+        U = np.asarray(self.roughness.separation(pressure))
+        return self._sum(lambda x: np.asarray(of(gap + U * x)))
+
     def _equivalent(self, U: Floats) -> Floats:
         if type(self.law) is StrongTroxel and not np.any(self.layers.loss):
             return np.asarray(equivalent_gap(U, self.law.gap_eps_r * self.layers.reduced, self.distribution))
@@ -159,6 +164,15 @@ class SpreadGaps:
 
     def _slope(self, gap: Floats) -> Any:
         return np.asarray(traction_derivative(self.law, gap, 1.0, self.layers))
+
+
+def over_gaps(rough: RoughnessLaw | None, of: Any, gap: Values, pressure: Values) -> Any:
+    """Mean of a quantity of the gap over the local gaps of rough faces that are `gap` (mm) beyond the
+    separation at a pressure (MPa): what is no attraction has another mean than at the equivalent gap.
+    """
+    if isinstance(rough, SpreadGaps):
+        return rough.mean(of, gap, pressure)
+    return of(gap if rough is None else gap + rough.separation(pressure))
 
 
 def roughness_below(law: ForceLaw, layers: Any, given: Any) -> RoughnessLaw | None:

@@ -237,8 +237,12 @@ def _check_limited(scene: Any) -> None:
         given = "limit in a resolved drive"
     elif drive is not None and spectrum(drive, scene.voltage)[0].size > 1:
         given = "limit with a voltage of several harmonics"
+    elif distribution_of(scene.roughness_gap) != NONE:
+        given = "limit with a distribution of local gaps"
     if given is not None:
-        raise InputError("electrostatics.breakdown", given, "warn | off; or a sine, and the field local")
+        raise InputError(
+            "electrostatics.breakdown", given, "warn | off; or a sine, the field local, and even gaps"
+        )
 
 
 def _check_mean(scene: Any, drive: Drive) -> None:

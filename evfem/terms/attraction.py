@@ -26,6 +26,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
+from evfem.electrostatics.localgaps import over_gaps
 from evfem.electrostatics.roughness import separation_derivative
 from evfem.surface.pad import Pad
 from evfem.surface.skin import Skin
@@ -155,6 +156,10 @@ class Attraction(PadTraction):
     def gaps(self, pad: PadState) -> Any:
         """Gaps (..., P) in mm that the law sees, with the separation of rough faces."""
         return pad.gap + self._separation(pad)
+
+    def over_gaps(self, pad: PadState, of: Any) -> Any:
+        """Mean (P,) of a quantity of the gap over the local gaps of each node."""
+        return over_gaps(self.roughness, of, pad.gap, self._contact_pressure(pad))
 
     def _voltages(self, gap: Any, pad: PadState) -> Any:
         """Effective voltage at gaps (P,), with that of the charges."""

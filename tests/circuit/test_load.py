@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import exp1
 from tools.domes import dome_scene
 from tools.refusals import refuses
 
 import evfem as ev
-from evfem.circuit.load import Air
+from evfem.circuit.load import Air, nodal_admittances
+from evfem.simulation.model import make_model
 from evfem.simulation.run import Run
 
 PAD = ev.FingerPad(ridges=False, resolution="coarse")
@@ -202,3 +204,26 @@ def test_files_know_breakdown_and_refuse_what_has_no_limit(tmp_path):
 
 def test_no_doubt_below_breakdown():
     assert not list(Air().doubts(scene(), [{"step": 1, "breakdown": 0.99}]))
+
+
+def test_between_rough_faces_local_gaps_are_in_parallel():
+    """Exponential gaps: <1/(g + u + s)> = exp((g + s)/U) E1((g + s)/U) / U, of each node with its own g."""
+    volts, U = 50.0, 0.003
+    even = scene(None, volts, roughness_gap=ev.ConstantRoughness(U))
+    rough = replace(even, roughness_gap=ev.ConstantRoughness(U, "exponential"))
+    found = []
+    for one in (even, rough):
+        model = make_model(one)
+        pad = model.equilibrium.pad_state(model.equilibrium.rest(np.zeros(2), volts))
+        of = model.attraction.parts[0], pad, model.closing.electrics, 1000.0
+        found.append(nodal_admittances(*of))
+    stack = pad.gap + model.closing.electrics.attraction[1].reduced
+    facing = np.abs(found[0]) > 0.0
+    expected = np.exp(stack / U) * exp1(stack / U) / U * (stack + U)
+    assert expected[facing].max() > 1.5
+    np.testing.assert_allclose((found[1] / found[0]).real[facing], expected[facing], rtol=1e-9)
+
+
+def test_a_field_that_is_held_has_no_mean_over_local_gaps():
+    rough = ev.ConstantRoughness(0.003, "gaussian")
+    refuses("limit with a distribution of local gaps", scene, roughness_gap=rough, breakdown="limit")
