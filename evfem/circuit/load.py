@@ -99,20 +99,21 @@ class Air(Room):
     def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         over = np.array([row.get("breakdown", 0.0) for row in rows])
         worst = int(over.argmax())
+        row = rows[worst]
         if over[worst] <= 1.0:
             return
         what = "is held there by the law" if scene.breakdown == "limit" else "the attraction does not know it"
         yield (
-            f"air breaks down{self._where(scene)}: in step {rows[worst]['step']} a gap has {over[worst]:.3g} "
+            f"air breaks down{self._where(scene, row)}: in step {row['step']} a gap has {over[worst]:.3g} "
             f"times the voltage of Paschen's law, and {what}"
         )
 
-    def _where(self, scene: Any) -> str:
-        """Gaps that break down at the largest voltage, in words."""
+    def _where(self, scene: Any, row: Mapping[str, Any]) -> str:
+        """Gaps that break down at the voltage of a row, in words."""
         electrics = scene.electrics
         if electrics.resolved:
             return ""
-        layers, volts = electrics.attraction[1], np.asarray(electrics.largest_voltage)
+        layers, volts = electrics.attraction[1], np.asarray(row["voltage"])
         if np.ndim(layers.reduced):
             return ""
         first, last = Limited(scene.law, electrics.crest).sparking(volts, layers)

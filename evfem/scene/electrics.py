@@ -233,6 +233,8 @@ def _check_limited(scene: Any) -> None:
     drive, given = scene.drive, None
     if scene.field != "local":
         given = f"limit with the field {scene.field}"
+    elif isinstance(scene.voltage, FollowForce) or any(one.gap is not None for one in scene.courses):
+        given = "limit with a voltage that is found, which needs forces that go with its square"
     elif drive is not None and drive.resolved:
         given = "limit in a resolved drive"
     elif drive is not None and spectrum(drive, scene.voltage)[0].size > 1:
@@ -241,7 +243,9 @@ def _check_limited(scene: Any) -> None:
         given = "limit with a distribution of local gaps"
     if given is not None:
         raise InputError(
-            "electrostatics.breakdown", given, "warn | off; or a sine, the field local, and even gaps"
+            "electrostatics.breakdown",
+            given,
+            "warn | off; or a given voltage, direct or a sine, the field local, and even gaps",
         )
 
 

@@ -12,6 +12,8 @@ LARGEST_FIELD = 60e3  # V/mm
 LARGEST_VOLTAGE = 3000.0
 #: the random numbers that distributions of gaps are drawn with
 LOCAL = 8
+#: those of what breakdown does
+SPARKS = 9
 
 
 def electrostatics(random: Draw) -> Tables:
@@ -55,6 +57,18 @@ def add_distribution(random: Draw, tables: Tables) -> None:
     rough = table.get("roughness_gap")
     if isinstance(rough, dict) and table.get("drive") != "resolved" and random.chance(0.5):
         rough["distribution"] = random.one_of(*DISTRIBUTIONS)
+
+
+def add_breakdown(random: Draw, tables: Tables) -> None:
+    """Perhaps air that is not looked at, or whose field is held where nothing alternates."""
+    table = tables.get("electrostatics", {})
+    if not table or not random.chance(0.3):
+        return
+    rough = table.get("roughness_gap")
+    found = isinstance(table.get("voltage"), dict) or any("gap" in one for one in tables["motion"])
+    spread = isinstance(rough, dict) and "distribution" in rough
+    held = not (found or spread or {"drive", "frequency", "skin", "field"} & set(table))
+    table["breakdown"] = random.one_of("limit", "warn", "off") if held else random.one_of("warn", "off")
 
 
 def add_drive(random: Draw, tables: Tables) -> None:

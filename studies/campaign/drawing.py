@@ -11,6 +11,8 @@ from copy import deepcopy
 
 from .attractions import (
     LOCAL,
+    SPARKS,
+    add_breakdown,
     add_distribution,
     add_drive,
     add_field,
@@ -59,6 +61,7 @@ def _latest(seed: int, number: int, tables: Tables) -> Tables:
     """What came in last, in the plane and in space, each drawn with random numbers of its own."""
     add_distribution(Draw(seed, number, LOCAL), tables)
     add_memory(Draw(seed, number, MEMORIES), tables)
+    add_breakdown(Draw(seed, number, SPARKS), tables)
     return add_outline(Draw(seed, number, OUTLINES), tables)
 
 

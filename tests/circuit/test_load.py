@@ -194,6 +194,10 @@ def test_files_know_breakdown_and_refuse_what_has_no_limit(tmp_path):
     refuses("electrostatics.breakdown: given limit in a resolved drive", scene, RESOLVED, breakdown="limit")
     square = ev.Drive(frequency=100.0, waveform="square")
     refuses("electrostatics.breakdown: given limit with a voltage of s", scene, square, breakdown="limit")
+    wish = ev.FollowForce([0.0, 1.0], [0.0, 0.01])
+    refuses(
+        "electrostatics.breakdown: given limit with a voltage that is f", scene, None, wish, breakdown="limit"
+    )
     refuses("scene: given no electrostatic law", ev.electrical_impedance, scene(None, 0.0, law=None), 1.0)
     refuses("frequencies: given 0", ev.electrical_impedance, scene(), 0.0)
     ev.electrical_impedance(scene(roughness_gap=ROUGH), [75.0, 1e3]).to_csv(tmp_path / "found.csv")

@@ -9,6 +9,7 @@ import pytest
 
 from evfem import studies
 from evfem.common.pools import open_pool, processes
+from evfem.electrostatics.breakdown import MODES
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 from evfem.electrostatics.roughness import DISTRIBUTIONS
@@ -61,6 +62,7 @@ def test_every_choice_of_a_scene_file_is_drawn(drawn):
         ("electrostatics", "waveform", ("sine", "square")),
         ("electrostatics", "skin", SKINS),
         ("electrostatics", "insulator", INSULATORS),
+        ("electrostatics", "breakdown", MODES),
         ("finger", "mesh", bodies.MESHES),
     ):
         assert seen(name, key) == {None, *choices}, key
