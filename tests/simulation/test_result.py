@@ -27,10 +27,11 @@ CONTRACT = (
     "kinetic_energy, integrator_dissipation, snap_dissipation, "
     "substeps, newton_iterations, relaxations, jumps, seconds"
 )
-#: those that follow where the scene has adhesion, an elastic surface, a voltage resolved in time or found
+#: those that follow where the scene has adhesion, an elastic surface, a drive, a voltage, one that is found
 OF_ROOMS = (
     "adhesive_force, adhesive_force_x, adhesive_force_z, adhesive_work, surface_sink, source_work, "
-    "leakage_dissipation, stretch_work, field_energy, missed_force, missed_gap"
+    "leakage_dissipation, stretch_work, field_energy, charge, current_rms, power, breakdown, "
+    "missed_force, missed_gap"
 )
 PLANE_ROOMS = tuple(name for name in ROOM_COLUMNS if not name.endswith("_z"))
 
@@ -42,6 +43,7 @@ def test_columns_are_those_of_the_contract_in_its_order():
 
 MOIST = ev.Dugdale(stress=0.002, reach=0.02)
 SOLVED = ev.Drive(resolved=True)
+LOAD = ("charge", "current_rms", "power")
 SOFT = ev.Display(elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
 
 
@@ -53,10 +55,12 @@ SOFT = ev.Display(elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
         ({"surface": SOFT}, ("surface_sink",)),
         (
             {"law": ev.StrongTroxel(), "voltage": ev.Sine(50.0, 9.0), "drive": SOLVED},
-            ("source_work", "leakage_dissipation", "stretch_work", "field_energy"),
+            ("source_work", "leakage_dissipation", "stretch_work", "field_energy", *LOAD, "breakdown"),
         ),
+        ({"law": ev.StrongTroxel(), "voltage": 9.0}, ("breakdown",)),
+        ({"law": ev.StrongTroxel(), "voltage": 9.0, "drive": ev.Drive(50.0)}, (*LOAD, "breakdown")),
     ],
-    ids=["base", "adhesion", "elastic surface", "charges"],
+    ids=["base", "adhesion", "elastic surface", "charges", "voltage", "drive"],
 )
 def test_a_run_has_the_columns_of_the_rooms_of_its_scene(given, further):
     """The others are 0 where they are asked for, but are no columns."""
@@ -211,7 +215,7 @@ def test_the_table_has_every_column_without_pandas_and_with_it(monkeypatch):
 
 
 def test_every_column_has_a_unit_and_a_meaning():
-    units = {"", "s", "mm", "V", "N/mm", "N", "MPa"}
+    units = {"", "s", "mm", "V", "N/mm", "N", "MPa", "C/mm", "A/mm", "W/mm"}
     every = (*COLUMNS, *ROOM_COLUMNS)
     assert tuple(UNITS) == tuple(MEANINGS) == every
     assert set(UNITS.values()) == units
@@ -233,6 +237,9 @@ def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
     assert (summary["nodes"], summary["cells"], summary["kind"]) == (9, 4, "quad")
 
 
+PER_MM = ("C/mm", "A/mm", "W/mm")
+
+
 def with_depth(depth=10.0):
     scene = {"name": "fake", "total_steps": 4, "depth": depth}
     return fake_result(provenance={"scene": scene}, rooms=PLANE_ROOMS)
@@ -243,13 +250,18 @@ def test_a_total_has_the_same_names_over_the_depth(tmp_path):
     total = result.total
     per_depth = {name for name in result.columns if name.endswith(("_force", "_force_x", "_width"))}
     per_depth |= {name for name in result.columns if name.endswith(("_work", "_energy", "_dissipation"))}
-    assert len(per_depth) == 24
+    per_depth |= {"charge", "current_rms", "power"}
+    assert len(per_depth) == 27
     for name in result.columns:
         factor = 8.0 if name in per_depth else 1.0
         assert total.rows[2][name] == (
             factor * result.rows[2][name] if factor != 1.0 else result.rows[2][name]
         )
-        units = {"N/mm": "N", "N": "mJ", "mm": "mm2"} if name in per_depth else {}
+        units = (
+            {"N/mm": "N", "N": "mJ", "mm": "mm2", **dict(zip(PER_MM, "CAW", strict=True))}
+            if name in per_depth
+            else {}
+        )
         assert total.units[name] == units.get(result.units[name], result.units[name])
     assert total.total is total
     assert total.frames == result.frames
