@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import others
 from sentences import Found, filled, fingerprint, fingertip, fringe, moisture, parameters, short, soft
 
 from evfem.studies import NAMES, paper
@@ -294,6 +295,10 @@ BLOCKS: dict[str, tuple[Callable[..., str], list[str]]] = {
     "sensitivities": (parameters, ["sensitivities.json"]),
     "soft": (soft, ["soft_display.json"]),
     "moisture": (moisture, ["moisture.json"]),
+    "others-lead": (others.lead, ["measured.json"]),
+    "others-table": (others.table, ["measured.json"]),
+    "others-signs": (others.signs, ["measured.json"]),
+    "others-words": (others.words, ["measured.json"]),
     "when": (when, []),
 }
 READERS: dict[str, Callable[[str], Any]] = {

@@ -14,13 +14,14 @@ from evfem.errors import InputError, describe_value
 NAMED = """
 section321 laws fringe fingertip fingerprint fig03 fig05 fig06 fig07 fig08 fig09 fig10 fig11 fig12 fig13
 participants uncertainty frequency hypotheses friction_spectrum stick_slip bandwidth relaxation impedance
-sensitivities soft_display moisture stability work_precision peers campaign
+sensitivities soft_display moisture measured stability work_precision peers campaign
 """
 NAMES = tuple(NAMED.split())
 #: studies that "all" leaves out: one needs packages of others, one takes hours
 APART = ("peers", "campaign")
 #: studies that have a folder of their own, and the module in it that runs them
 MODULES = {
+    "measured": "measured.study",
     "stability": "stability.study",
     "work_precision": "precision.study",
     "peers": "peers.study",

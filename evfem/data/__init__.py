@@ -15,7 +15,7 @@ from evfem.common.tables import words_or_numbers
 from evfem.errors import InputError, describe_value
 
 #: what `load` accepts
-NAMES = ("area_laws", "meyer", "table1", "table2", "thresholds")
+NAMES = ("area_laws", "meyer", "others", "table1", "table2", "thresholds")
 
 
 @dataclass(frozen=True)

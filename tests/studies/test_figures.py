@@ -21,7 +21,7 @@ QUICK = ["section321", "laws", "fig03", "fig05", "fig06", "fig07", "fig08", "fig
 QUICK += ["frequency", "hypotheses"]
 SLOW = ["fig11", "fig12", "fig13", "participants", "uncertainty", "stability", "work_precision", "fringe"]
 SLOW += ["fingertip", "fingerprint", "friction_spectrum", "stick_slip", "relaxation", "impedance"]
-SLOW += ["sensitivities", "soft_display", "moisture", "bandwidth"]
+SLOW += ["sensitivities", "soft_display", "moisture", "bandwidth", "measured"]
 
 
 @pytest.mark.filterwarnings("ignore:motion . has steps of")
