@@ -132,11 +132,11 @@ def draw(series: list[Series], speeds: tuple[float, ...]) -> Figure:
         phase.semilogx(f, np.degrees(np.angle(exact)), color=colour, lw=0.8)
         phase.plot(one.x, kept[f"phase.{speed:g}_mm_s"].y, "o", color=colour, ms=3.5)
     size.axhline(math.sqrt(0.5), color=COLOURS["neutral"], lw=0.6)
-    size.set(xlabel="frequency of the pressure (Hz)", ylabel="friction that follows")
+    size.set(xlabel="frequency (Hz)", ylabel="friction that follows")
     size.legend(fontsize=7)
-    phase.set(xlabel="frequency of the pressure (Hz)", ylabel="phase (degrees)")
+    phase.set(xlabel="frequency (Hz)", ylabel="phase (degrees)")
     for name, colour in (("memory", FIRST[0]), ("coulomb", FIRST[1])):
         begin.plot(kept[f"onset.{name}"].x, kept[f"onset.{name}"].y, color=colour, label=name)
-    begin.set(xlabel="slip after it (um)", ylabel="friction (mN/mm)", ylim=(0.0, None))
+    begin.set(xlabel="slip (um)", ylabel="friction (mN/mm)", ylim=(0.0, None))
     begin.legend(fontsize=7)
     return figure
