@@ -102,11 +102,9 @@ class Air(Room):
         row = rows[worst]
         if over[worst] <= 1.0:
             return
-        what = "is held there by the law" if scene.breakdown == "limit" else "the attraction does not know it"
-        yield (
-            f"air breaks down{self._where(scene, row)}: in step {row['step']} a gap has {over[worst]:.3g} "
-            f"times the voltage of Paschen's law, and {what}"
-        )
+        held = ", where the law holds the field" if scene.breakdown == "limit" else ""
+        much = f"{over[worst]:.3g} times Paschen's voltage in step {row['step']}"
+        yield f"air breaks down{self._where(scene, row)}, at {much}{held}"
 
     def _where(self, scene: Any, row: Mapping[str, Any]) -> str:
         """Gaps that break down at the voltage of a row, in words."""
