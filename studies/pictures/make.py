@@ -34,6 +34,7 @@ OF_PAGES = {
     "pictures-beside.png": ("howto/pictures.md", "beside.png"),
     "pictures-slide.gif": ("howto/pictures.md", "slide.gif"),
     "amplifier.png": ("howto/amplifier.md", "amplifier.png"),
+    "touchscreen.png": ("howto/touchscreen.md", "touchscreen.png"),
     "probes-marks.png": ("howto/probes.md", "marks.png"),
     "probes-history.png": ("howto/probes.md", "probes.png"),
 }
