@@ -243,7 +243,7 @@ def _check_section(pad: FingerPad, section: Section) -> None:
         height = "ridge_scan" if isinstance(ridges, ScannedRidges) else "ridge_height"
         meaning = f"0.7 times the {outermost.spoken}'s thickness"
         check_at_most(height, ridges.height, 0.7 * thickness, meaning)
-        steeper = 1.0 / (1.0 - ridges.height * outer.sharpest(FULL * outer.a))
+        steeper = 1.0 / (1.0 - ridges.height * outer.below_ridges(FULL * outer.a))
         if isinstance(ridges, ScannedRidges):
             spacing = 0.5 * ridges.pitch / section.divisions.per_ridge
             _check_scan(ridges, ridges.steepest * steeper, spacing)

@@ -56,8 +56,8 @@ class Outline:
         """Smallest radius of curvature; inward normal offsets must be smaller."""
         return 1.0 / float(self.curvature(np.linspace(-np.pi, np.pi, SAMPLES)).max())
 
-    def sharpest(self, x: float) -> float:
-        """Largest curvature of the lower side between -x and x."""
+    def below_ridges(self, x: float) -> float:
+        """Curvature (1/mm) by which walls of ridges between -x and x count as steeper: the largest there."""
         return float(self.curvature(self.angle_at(np.linspace(-x, x, SAMPLES))).max())
 
     def foot_step(self, theta: Floats, x: Floats, y: Floats) -> Floats:
@@ -81,6 +81,10 @@ class Ellipse(Outline):
     @property
     def smallest_radius(self) -> float:
         return min(self.a**2 / self.b, self.b**2 / self.a)
+
+    def below_ridges(self, x: float) -> float:
+        """That of the apex: with it the steepest walls that can be meshed were found."""
+        return self.b / self.a**2
 
     def point(self, theta: Floats) -> Floats:
         return np.column_stack([self.a * np.cos(theta), self.centre + self.b * np.sin(theta)])

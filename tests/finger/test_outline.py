@@ -298,6 +298,12 @@ def test_sizes_beside_a_measured_outline_are_refused():
     assert replace(pad, ridge_phase=0.5).outline is pad.outline
 
 
+def test_an_ellipse_takes_the_walls_that_it_took_before_other_outlines():
+    """Slope .15 x 8 / .25 = 4.8, by the curvature of the apex 4.87 of 4.88; a flatter outline bends more."""
+    assert ev.FingerPad(ridge_exponent=8.0).mesh(2).cells.size
+    refuses("slope of 4.95", ev.FingerPad, ridge_exponent=8.0, outline=3.0)
+
+
 def test_skin_that_is_too_thick_for_the_sharpest_place_is_refused():
     thick = {"epidermis_thickness": 0.8, "dermis_thickness": 1.3}
     for finger in (ev.FingerPad, ev.Fingertip):
