@@ -251,6 +251,7 @@ def _contact(scene: Scene) -> Term:
         shape += f", the peak pressure one of {100.0 * min(peak, 1.0):.2g} %"
     elif peak:
         shape += f"; the peak pressure has an error of {100.0 * peak:.2g} %"
+    shape += getattr(scene.finger, "gap_error", "")
     return Term("contact", True, shape + _outline(scene.finger) + _elastic_surface(scene))
 
 

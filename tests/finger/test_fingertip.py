@@ -10,6 +10,7 @@ from evfem.finger import fingertip
 from evfem.finger.fingerprint import PATTERNS, HeightMap
 from evfem.finger.layers import LAYERS
 from evfem.mesh.quality import scaled_jacobian
+from evfem.surface.skin import make_skin
 from evfem.tissue.space import make_space
 
 ELEMENT = {1: "hex8", 2: "hex27p1"}
@@ -294,3 +295,20 @@ def test_the_contact_area_falls_in_slip_where_skin_stiffens_and_grows_where_it_d
         change[name] = area[-1] / area[2] - 1.0
     assert change["stiff"] < -0.02
     assert change["default"] > 0.01
+
+
+@pytest.mark.parametrize(("posture", "error"), [(10.0, 0.01), (30.0, 0.15)])
+def test_a_plan_says_what_a_posture_costs(posture, error):
+    """Columns of a rigid tip 0.25 mm above the film against those of the whole ellipsoid."""
+    layers, law = ev.Layers.of(ev.Layer(0.38, 1650.0), ev.FILM), ev.StrongTroxel()
+    tip = ev.Fingertip(ridges="none", resolution="coarse", posture=posture)
+    skin = make_skin(mesh := tip.mesh())
+    points = mesh.points[skin.nodes]
+    gap = 0.25 + points[:, 1] - points[:, 1].min()
+    found = np.sum(skin.tributary(points) * law.traction(gap, 2000.0, layers))
+    axes = tip.width, tip.height, tip.length
+    exact = ev.forces.outline_force(law, *axes, 0.25, 2000.0, layers, tilt=posture)
+    assert found / exact - 1.0 == pytest.approx(error, abs=0.015)
+    scene = ev.Scene(tip, ev.Display(), law, 100.0, [ev.Hover(gap=0.25)])
+    said = "an error of up to 26 % at 0.25 mm" in " ".join(str(ev.plan(scene)).split())
+    assert said == (posture > 20.0)
