@@ -70,7 +70,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
 HOVERED: dict[str, dict[str, Any]] = {
     "smooth": {"ridges": "none", "resolution": "coarse"},
     "ridged": {"ridges": "along", "resolution": "coarse"},
-    "held": {"ridges": "none", "resolution": "medium", "posture": POSTURE},
+    # rigid: the dermis, which in the longest does not fit, adds nothing
+    "held": {"ridges": "none", "resolution": "medium", "posture": POSTURE, "dermis_thickness": 0.6},
 }
 #: crests of the ridged pad: a flat share, and the exponent of the walls
 CRESTS: dict[str, dict[str, Any]] = {
