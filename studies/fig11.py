@@ -34,7 +34,7 @@ PADS = {"with_ridges": True, "without_ridges": False}
 SWAPPED = "the caption has the two pads the wrong way round: only this order fits the shares of the text"
 LAW = (
     "the text names (9b); with Strong-Troxel's law (9a), nothing else changed, the six numbers come nearer "
-    "and the friction into its range, with a slightly flatter outline those of the smooth pad as well "
+    "and the friction near its range, with a slightly flatter outline those of the smooth pad as well "
     "(second table). What the authors computed cannot be told; air adds more by (9b) at every load, on "
     "every mesh, with or without friction"
 )
