@@ -6,7 +6,7 @@ there is no current, and of a square wave the harmonics up to the 31st count: an
 current. Resolved in time all three are those of the charges, `current_rms` and `power` over the step.
 
 The air between two faces holds up to Paschen's voltage (`evfem.electrostatics.breakdown`), which the peak
-of the voltage across a gap must not reach.
+of the voltage across a gap must not reach, and a layer of the insulator up to the field of its `strength`.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from evfem.common.rooms import Column, Room
 from evfem.electrostatics.alternating import admittance
 from evfem.electrostatics.breakdown import Limited, across_gap, breakdown_voltage
 from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.localgaps import roughness_below
 
 #: of lengths in mm: C/mm2 per V/mm, and W per N mm/s
 PER_MM, MILLI = 1e-3 * eps_0, 1e-3
@@ -97,6 +98,10 @@ class Air(Room):
         return peak * across_gap(gap, attraction.layers, electrics.gap_eps_r)
 
     def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+        yield from self._sparks(scene, rows)
+        yield from self._fails(scene, rows)
+
+    def _sparks(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         over = np.array([row.get("breakdown", 0.0) for row in rows])
         worst = int(over.argmax())
         row = rows[worst]
@@ -105,6 +110,23 @@ class Air(Room):
         held = ", where the law holds the field" if scene.breakdown == "limit" else ""
         much = f"{over[worst]:.3g} times Paschen's voltage in step {row['step']}"
         yield f"air breaks down{self._where(scene, row)}, at {much}{held}"
+
+    def _fails(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+        """Layers of the insulator whose field exceeds their strength where the gap is smallest."""
+        electrics = scene.electrics
+        if electrics.resolved:
+            return
+        law, layers = electrics.attraction
+        rough = roughness_below(law, layers, scene.roughness_gap)
+        peaks = np.array([electrics.crest * abs(row["voltage"]) for row in rows])
+        gaps = [_smallest_gap(row, rough) for row in rows]
+        for name, film in electrics.films.items():
+            over = peaks * [electrics.field_in(film, gap) for gap in gaps] / film.strength
+            worst = int(over.argmax())
+            if over[worst] > 1.0 and film.thickness > 0.0:
+                least = f"from {peaks[worst] / over[worst]:.3g} V on"
+                much = f"{over[worst]:.3g} times its {1e-3 * film.strength:g} V/um"
+                yield f"the {name} breaks down {least}, at {much} in step {rows[worst]['step']}"
 
     def _where(self, scene: Any, row: Mapping[str, Any]) -> str:
         """Gaps that break down at the voltage of a row, in words."""
@@ -116,3 +138,9 @@ class Air(Room):
             return ""
         first, last = Limited(scene.law, electrics.crest).sparking(volts, layers)
         return f" in gaps of {1e3 * float(first):.3g} to {1e3 * float(last):.3g} um"
+
+
+def _smallest_gap(row: Mapping[str, Any], rough: Any) -> float:
+    """The smallest gap (mm) of a row, with the air that rough faces keep under the largest pressure."""
+    apart = 0.0 if rough is None else float(rough.separation(row["peak_contact_pressure"]))
+    return max(float(row["min_gap"]), 0.0) + apart

@@ -33,7 +33,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from evfem.common.checks import Checked, Values, Within, above, at_least, finite, number, to_python
+from evfem.common.checks import Checked, Values, Within, above, at_least, finite, number, real, to_python
 from evfem.errors import ABSENT, InputError, describe_value
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
@@ -42,12 +42,16 @@ from evfem.tensor import derivative
 eps_0 = 8.8541878188e-12
 #: step of differences of a law by its gap (mm)
 GAP_STEP = 1e-5
+#: field (V/mm) that breaks any solid down, and which fields a layer may have as its own strength
+SOLID, STRONG = 3e5, Within(0.0, 1e8, above=True)
+STRENGTH = "a field in V/mm, larger than 0, up to 1e8"
 
 
 @dataclass(frozen=True)
 class Layer:
     """A solid dielectric: `thickness` in mm and relative permittivity `eps_r` >= 1, numbers or
-    arrays; or an `evfem.Dielectric` as `eps_r`, whose permittivity depends on the frequency.
+    arrays; or an `evfem.Dielectric` as `eps_r`, whose permittivity depends on the frequency. `strength` is
+    the field in V/mm above which it breaks down, without one that of any solid.
 
     >>> Layer(thickness=0.09, eps_r=3.35)
     Layer(thickness=0.09, eps_r=3.35)
@@ -55,8 +59,11 @@ class Layer:
 
     thickness: Values
     eps_r: Values
+    strength: float = field(default=SOLID, kw_only=True, repr=False)
 
     def __post_init__(self) -> None:
+        strength = real("layer strength", self.strength, STRENGTH, STRONG)
+        object.__setattr__(self, "strength", strength)
         thickness = at_least("layer thickness", self.thickness, 0.0, "a finite length in mm, not negative")
         object.__setattr__(self, "thickness", thickness)
         if not callable(getattr(self.eps_r, "permittivity", None)):

@@ -80,8 +80,9 @@ class Device(Checked):
         """
         solids = {"stratum corneum": SKIN, "insulator": INSULATORS[self.insulator]}
         law, layers = self.encoding.law, self.encoding.layers
-        broken = broken_down(voltage, layers.reduced, solids)
-        return (*broken, *touching(law, layers, voltage, self.roughness_gap))
+        near = self.roughness_gap + layers.reduced
+        fields = {name: (one, 1.0 / (one.eps_r * near)) for name, one in solids.items()}
+        return (*broken_down(voltage, fields), *touching(law, layers, voltage, self.roughness_gap))
 
     @property
     def amplifier(self) -> Amplifier | None:

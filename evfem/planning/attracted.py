@@ -9,11 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.checks import Values
 from evfem.electrostatics.laws import Layer, Layers
 
-#: field (V/um) that breaks any solid down
-BREAKDOWN = 300.0
 #: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
 PRESSED = 0.02
 #: air (mm) that rough skin keeps at least (docs, which law), and the share of the attraction of smooth faces
@@ -21,14 +18,15 @@ PRESSED = 0.02
 AIR, DECIDES = 0.005, 0.5
 
 
-def broken_down(voltage: float, reduced: Values, solids: Mapping[str, Layer]) -> Iterator[str]:
-    """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
-    for name, layer in solids.items():
-        field = 1e-3 * voltage / float(np.min(np.asarray(layer.eps_r)) * np.min(reduced))
-        if field > BREAKDOWN and np.max(layer.thickness) > 0.0:
+def broken_down(voltage: float, solids: Mapping[str, tuple[Layer, float]]) -> Iterator[str]:
+    """Solid layers, each with its field (V/mm) per volt, that a peak `voltage` (V) breaks down."""
+    for name, (layer, each) in solids.items():
+        field = voltage * each
+        if field > layer.strength and np.max(layer.thickness) > 0.0:
+            held = f"{1e-3 * layer.strength:g} V/um, from {layer.strength / each:.3g} V on"
             yield (
-                f"{voltage:g} V make a field of {field:.3g} V/um in the {name}, and any solid breaks down "
-                f"above {BREAKDOWN:g} V/um: voltages are in V, thicknesses in mm"
+                f"where skin touches {voltage:g} V make a field of {1e-3 * field:.3g} V/um in the {name}, "
+                f"which breaks down above {held}: voltages are in V, thicknesses in mm"
             )
 
 

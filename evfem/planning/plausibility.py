@@ -211,16 +211,17 @@ def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
 
 
 def _breakdown(scene: Scene) -> Iterator[str]:
-    """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
+    """A field across a solid layer where the skin touches: U / |eps_r (g + s)|, s the sum of d / eps_r and g
+    what rough faces keep.
+    """
     found = isinstance(scene.voltage, (FollowForce, ChargeControl))
     if scene.law is None or found or any(course.gap is not None for course in scene.courses):
         return
     seen = scene.electrics
-    films = seen.insulator.parts
-    names = [f"insulator's layer {i}" for i in range(1, len(films) + 1)] if films[1:] else ["insulator"]
-    solids = {"stratum corneum": seen.lossless(seen.skin)}
-    solids |= {name: seen.lossless(film) for name, film in zip(names, films, strict=True)}
-    yield from broken_down(seen.largest_voltage, seen.attraction[1].reduced, solids)
+    solids = {"stratum corneum": seen.skin} | seen.films
+    apart = _pressed(roughness_below(*seen.attraction, scene.roughness_gap))
+    fields = {name: (layer, seen.field_in(layer, apart)) for name, layer in solids.items()}
+    yield from broken_down(seen.crest * seen.largest_voltage, fields)
 
 
 def touching_traction(scene: Scene, law: ForceLaw | None = None) -> float | None:

@@ -210,6 +210,25 @@ class Electrics:
         """A layer with its real permittivity alone, at the drive's frequency or static without one."""
         return Layer(layer.thickness, seen_at(layer, self.frequency)[0])
 
+    @property
+    def films(self) -> dict[str, Layer]:
+        """The layers of the insulator by their names in a sentence."""
+        found = self.insulator.parts
+        several = len(found) > 1
+        return {f"insulator's layer {i}" if several else "insulator": one for i, one in enumerate(found, 1)}
+
+    def field_in(self, layer: Layer, gap: Values) -> float:
+        """Field (V/mm) in a solid layer per volt of the peak, below a `gap` (mm), where the layers are
+        thinnest: under an alternating voltage at its frequency, otherwise of lossless layers.
+        """
+        at, solids, air = self.frequency, (self.skin, self.insulator), complex(self.gap_eps_r)
+        if self.alternates and at is not None and self.drive is not None:
+            air += self.drive.gap_conductivity / (2j * np.pi * at * eps_0)
+            own, each = layer.permittivity(at), [one.thickness / one.permittivity(at) for one in solids]
+        else:
+            own, each = self.lossless(layer).eps_r, [self.attraction[1].reduced]
+        return float(np.max(1.0 / np.abs(own * (gap / air + sum(each)))))
+
 
 def check_drive(scene: Any) -> None:
     """Raise InputError where drive, law, voltage, breakdown and motions do not fit together."""

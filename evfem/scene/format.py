@@ -19,7 +19,7 @@ from evfem.common.tables import TABLES
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
-from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer
+from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, SOLID, STRENGTH, STRONG, Layer
 from evfem.electrostatics.timesignals import RATE, START, Sampled
 from evfem.errors import ABSENT, InputError, Mistakes
 from evfem.finger.fingerpad import Electrical, FingerPad
@@ -286,6 +286,11 @@ class Electrostatics:
         _layers("a relative permittivity, at least 1", Within(1.0)),
         "its relative permittivity",
     ] = None
+    insulator_strength: Annotated[
+        float | list[float] | None,
+        _layers(STRENGTH, STRONG, "V/mm"),
+        f"field above which it breaks down; {SOLID:g} without",
+    ] = None
     air_layer: AirLayer = True
     direction: Direction = "vertical"
     field: FieldChoice = "local"
@@ -301,6 +306,22 @@ class Electrostatics:
 
     def layer(self) -> Layer | list[Layer]:
         """The insulator by its name, or by thickness and permittivity of one layer or of several."""
+        own = self._sizes()
+        if self.insulator_strength is not None:
+            own["insulator_strength"] = self.insulator_strength
+        thickness = own["insulator_thickness"]
+        several, count = np.ndim(thickness), np.size(thickness)
+        for name, value in own.items():
+            if (np.ndim(value), np.size(value)) != (several, count):
+                given = f"{np.size(value)} beside {count} of insulator_thickness"
+                raise InputError(f"electrostatics.{name}", given, "as many, from the top")
+        names = [name.removeprefix("insulator_") for name in own]
+        if not several:
+            return Layer(**dict(zip(names, own.values(), strict=True)))
+        return [Layer(**dict(zip(names, one, strict=True))) for one in zip(*own.values(), strict=True)]
+
+    def _sizes(self) -> dict[str, Any]:
+        """Thickness and permittivity as they are given, or those of the insulator with the given name."""
         own = {name: getattr(self, name) for name in ("insulator_thickness", "insulator_eps_r")}
         mistakes = Mistakes()
         for name, value in own.items():
@@ -314,14 +335,10 @@ class Electrostatics:
                     allowed = f"{allowed}; or insulator = {' | '.join(INSULATORS)}"
                     raise InputError(f"electrostatics.{name}", ABSENT, allowed)
         mistakes.report()
-        if self.insulator is not None:
-            return INSULATORS[self.insulator]
-        sizes = [np.size(value) for value in own.values()]
-        if len({type(value) for value in own.values()}) > 1 or sizes[0] != sizes[1]:
-            given = f"{sizes[1]} beside {sizes[0]} of insulator_thickness"
-            raise InputError("electrostatics.insulator_eps_r", given, "as many, from the top")
-        stacked = isinstance(self.insulator_thickness, list)
-        return [*map(Layer, *own.values())] if stacked else Layer(*own.values())
+        if self.insulator is None:
+            return own
+        named = INSULATORS[self.insulator]
+        return {"insulator_thickness": named.thickness, "insulator_eps_r": named.eps_r}
 
     def scene_keys(self, law: Any, ramped: bool) -> dict[str, Any]:
         """What it says of a scene beside its law; `ramped`: the voltage may begin without one."""

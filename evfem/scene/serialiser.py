@@ -18,7 +18,7 @@ from evfem.circuit.signals import FOUND, FollowForce, VoltageProfile
 from evfem.common.checks import keys_of
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Drive
-from evfem.electrostatics.laws import FORCE_LAWS, LayerStack
+from evfem.electrostatics.laws import FORCE_LAWS, SOLID, LayerStack
 from evfem.electrostatics.timesignals import SIGNALS
 from evfem.errors import InputError
 from evfem.finger.fingerpad import MeshedFinger
@@ -132,7 +132,8 @@ def _electrostatics(scene: Scene) -> dict[str, Any]:
     insulator = scene.ground.insulator
     if not isinstance(insulator.eps_r, float):
         raise InputError("surface.insulator", "a permittivity that is no number", "a number, for a file")
-    for name in ("thickness", "eps_r"):
+    names = ("thickness", "eps_r", "strength")
+    for name in names if any(one.strength != SOLID for one in insulator.parts) else names[:2]:
         each = [getattr(one, name) for one in insulator.parts]
         table[f"insulator_{name}"] = each if type(insulator) is LayerStack else each[0]
     if (electrodes := getattr(scene.surface, "electrodes", None)) is not None:

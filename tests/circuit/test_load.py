@@ -221,7 +221,8 @@ def test_files_know_breakdown_and_refuse_what_has_no_limit(tmp_path):
 
 
 def test_no_doubt_below_breakdown():
-    assert not list(Air().doubts(scene(), [{"step": 1, "breakdown": 0.99}]))
+    row = {"step": 1, "breakdown": 0.99, "voltage": 1.0, "min_gap": 0.0}
+    assert not list(Air().doubts(scene(), [row]))
 
 
 def test_between_rough_faces_local_gaps_are_in_parallel():

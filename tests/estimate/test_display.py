@@ -113,6 +113,8 @@ def test_a_display_is_doubted_as_a_plan_doubts_a_scene():
     field = 1e-3 * 1000.0 / (3.9 * REDUCED)
     broken, pulled = Device(**SCREEN).doubts(1000.0)
     assert f"a field of {field:.3g} V/um in the insulator" in broken
+    rough = Device(**SCREEN, roughness_gap=0.005).doubts(1000.0)
+    assert not [one for one in rough if "breaks down" in one]  # 47 V/um
     press = [ev.Press(force=0.05)]
     pad = ev.FingerPad(ridges=False, resolution="coarse")
     scene = ev.Scene(pad, ev.Display(ev.TOUCHSCREEN), ev.StrongTroxel(), 1000.0, press)

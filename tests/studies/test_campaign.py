@@ -86,6 +86,7 @@ NEVER = {
     "electrostatics.signal.full_scale": "of a .wav alone",
     "electrostatics.electrodes": "a map of one's own",
     "electrostatics.coupling": "without effect",
+    "electrostatics.insulator_strength": "no number of a run depends on it",
     "electrostatics.grounded": "false has no balance of the source to be checked by",
     "solver.core": "off gives answers that depend on the way, a length changes what is asked for",
     "solver.strategy.hold": "another first rate leads to the same end, or `evfem check` says so",
