@@ -36,7 +36,12 @@ _NAMES = {
     "surface.ways": ("FrictionMap",),
     "electrostatics.dielectrics": ("Dielectric", "DielectricTable"),
     "electrostatics.laws": ("FILM", "Kaczmarek", "Layer", "Layers", "StrongTroxel", "TOUCHSCREEN", "eps_0"),
-    "electrostatics.roughness": ("ConstantRoughness", "ExponentialRoughness", "PowerRoughness"),
+    "electrostatics.roughness": (
+        "ConstantRoughness",
+        "ExponentialRoughness",
+        "PowerRoughness",
+        "TableRoughness",
+    ),
     "circuit.signalfile": ("Playback", "read_signal", "write_signal"),
     "circuit.signals": ("Amplifier", "FollowForce", "VoltageProfile"),
     "electrostatics.drive": ("Drive",),

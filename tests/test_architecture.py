@@ -53,7 +53,8 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy"},
-        "laws dielectrics breakdown relaxation alternating roughness localgaps forces wav timesignals drive",
+        "laws dielectrics breakdown relaxation alternating persson roughness localgaps forces wav "
+        "timesignals drive",
     ),
     "circuit": ({"numpy", "scipy", "PIL"}, "signals encoding signalfile load"),
     "field": (

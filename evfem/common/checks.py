@@ -8,7 +8,7 @@ them, and a scene file is read, written and described by them (`evfem.scene.keys
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from numbers import Integral, Real
@@ -133,6 +133,16 @@ def number(allowed: str, test: Callable[[float], bool], unit: str = "") -> dict[
     """Rule of a field that is a finite float and passes `test`; `allowed` says so in words."""
     check = lambda key, value: real(key, value, allowed, test)  # noqa: E731
     return {"allowed": allowed, "check": check, "test": test, "unit": unit}
+
+
+def several(allowed: str, test: Callable[[float], bool], unit: str = "") -> dict[str, Any]:
+    """Rule of a field that is a number or a list of them, kept as a tuple."""
+
+    def check(key: str, entered: Any) -> tuple[float, ...]:
+        values = tuple(entered) if isinstance(entered, Sequence | np.ndarray) else (entered,)
+        return tuple(real(key, value, allowed, test) for value in values)
+
+    return {"allowed": allowed, "check": check, "unit": unit, "type": float | list[float]}
 
 
 def between(low: float, high: float, unit: str = "", *, of: str = "") -> dict[str, Any]:

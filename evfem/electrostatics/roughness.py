@@ -12,13 +12,14 @@ law                         s above p_c                   source
 `ConstantRoughness`         gap
 `PowerRoughness`            gap (p / pressure)^-exponent  Guo et al., doi:10.1109/TOH.2019.2897768
 `ExponentialRoughness`      decay ln(pressure / p)        Persson, doi:10.1103/PhysRevLett.99.125502
+`TableRoughness`            rows; of a scan or spectrum   the same (`evfem.electrostatics.persson`)
 ==========================  ============================  ==========================================
 
-Both falling laws grow without bound as the load vanishes, while faces that just touch are apart by
+The falling laws grow without bound as the load vanishes, while faces that just touch are apart by
 no more than their highest asperities, `open_gap`: also the separation of nodes that are still open.
 Below the pressure p_c the tangent of the law at p_c therefore takes its place, with p_c such that
-it reaches `open_gap` at p = 0. Every law is convex and has a continuous derivative. Where Persson's
-law ends, at p = `pressure`, contact is complete and s = 0.
+it reaches `open_gap` at p = 0. Every law has a continuous derivative, and all but tables are convex.
+Where Persson's law ends, at p = `pressure`, contact is complete and s = 0.
 
 A part of one's own needs `separation(pressure)` (`evfem.protocols.RoughnessLaw`). Units: mm, MPa.
 
@@ -42,13 +43,27 @@ does.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Checked, Values, Within, among, check_fields, choice, number, real, to_python
+from evfem.common.checks import (
+    Checked,
+    Values,
+    Within,
+    among,
+    check_fields,
+    choice,
+    number,
+    real,
+    several,
+    to_python,
+)
+from evfem.electrostatics import persson
 from evfem.electrostatics.laws import traction_derivative
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw, RoughnessLaw
@@ -62,6 +77,11 @@ _OPEN = number(f"a length in mm, larger than 0, up to {WIDEST:g}", Within(0.0, W
 _PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "MPa")
 _EXPONENT = number("an exponent, larger than 0, up to 10", Within(0.0, 10.0, above=True))
 OpenGap = Annotated[float, _OPEN, "at no pressure, where the law itself has no bound"]
+#: rows of a table: what its lists may be
+_LOADS, _FALLING = "pressures in MPa that grow from 0, two to 1000", "as many lengths in mm that do not grow"
+_LOADED = several(_LOADS, Within(0.0, 1e6), "MPa") | {"type": list[float]}
+_APART = several(_FALLING, Within(0.0, WIDEST), "mm") | {"type": list[float]}
+MOST_ROWS = 1000
 #: distributions of local gaps; without one all are the mean gap
 NONE, DISTRIBUTIONS = "none", ("exponential", "gaussian")
 Distribution = Annotated[str, among((NONE, *DISTRIBUTIONS)), "of the local gaps around their mean"]
@@ -147,7 +167,89 @@ class ExponentialRoughness:
         return to_python(np.where(p.real > least, law, self.open_gap - self.decay * p / least))
 
 
-LAWS = {cls.law: cls for cls in (ConstantRoughness, PowerRoughness, ExponentialRoughness)}
+@dataclass(frozen=True)
+class TableRoughness:
+    """The separation at contact pressures, from none on; monotone cubics between the rows, level beyond them.
+
+    `from_map` and `from_spectrum` make the rows of measured roughness.
+
+    >>> law = TableRoughness(pressure=[0.0, 0.01, 0.1], gap=[0.004, 0.002, 0.001])
+    >>> law.separation(np.array([0.0, 0.01, 0.5])).round(12).tolist()
+    [0.004, 0.002, 0.001]
+    """
+
+    pressure: Annotated[Sequence[float], _LOADED, "of the rows"]
+    gap: Annotated[Sequence[float], _APART, "separation of the rows"]
+    distribution: Distribution = NONE
+    law = "table"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if not 2 <= len(self.pressure) <= MOST_ROWS or self.pressure[0] != 0.0:
+            raise InputError("pressure", f"{len(self.pressure)} from {self.pressure[:1]}", _LOADS)
+        if np.any(np.diff(self.pressure) <= 0.0):
+            raise InputError("pressure", "pressures that do not grow", _LOADS)
+        if len(self.gap) != len(self.pressure) or np.any(np.diff(self.gap) > 0.0):
+            raise InputError("gap", f"{len(self.gap)} for {len(self.pressure)} pressures", _FALLING)
+
+    @classmethod
+    def from_map(
+        cls, heights: Any, pixel: float, modulus: float, *, periodic: bool = False, **more: Any
+    ) -> TableRoughness:
+        """That of scanned heights (m, n) in mm on squares of `pixel` (mm), pressed against a soft plane of
+        the `modulus` E* = E / (1 - nu^2) in MPa, by Persson's theory (`evfem.electrostatics.persson`).
+
+        Open faces are apart by the `open_gap` (mm), that of the highest summit above the mean plane unless
+        given; the `distribution` is gaussian. A map that is not `periodic` is levelled and windowed.
+        Raises InputError for what is no such map.
+        """
+        return cls._of_waves(persson.waves_of_map(heights, pixel, periodic), modulus, **more)
+
+    @classmethod
+    def from_spectrum(cls, q: Any, C: Any, modulus: float, **more: Any) -> TableRoughness:
+        """That of roughness with the isotropic spectrum C (n,) in mm^4, <h^2> = 2 pi int q C dq, at wave
+        numbers q (n,) in 1/mm, 2 pi over the wavelength; as `from_map`, with three rms heights as `open_gap`.
+        """
+        return cls._of_waves(persson.waves_of_spectrum(q, C), modulus, **more)
+
+    @classmethod
+    def _of_waves(
+        cls,
+        waves: persson.Waves,
+        modulus: float,
+        open_gap: float | None = None,
+        distribution: str = "gaussian",
+    ) -> TableRoughness:
+        return cls(*persson.rows(waves, modulus, open_gap), distribution)
+
+    @cached_property
+    def _cubics(self) -> Floats:
+        """Coefficients (4, n) of the cubics from each row on, with 0 for the last."""
+        from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+        slopes = PchipInterpolator(self.pressure, self.gap).derivative()(self.pressure)
+        slopes[-1] = 0.0
+        found = CubicHermiteSpline(self.pressure, self.gap, slopes).c
+        return np.column_stack([found, [0.0, 0.0, 0.0, self.gap[-1]]])
+
+    def _at(self, pressure: Values) -> tuple[Values, Floats]:
+        """How far pressures are beyond their rows, and the cubics there."""
+        p = np.asarray(pressure)
+        row = np.clip(np.searchsorted(self.pressure, p.real, side="right") - 1, 0, None)
+        return np.where(p.real > 0.0, p - np.asarray(self.pressure)[row], p - p.real), self._cubics[:, row]
+
+    def separation(self, pressure: Values) -> Values:
+        """Separation in mm at contact pressures in MPa."""
+        d, (a, b, c, row) = self._at(pressure)
+        return to_python(((a * d + b) * d + c) * d + row)
+
+    def separation_derivative(self, pressure: Values) -> Values:
+        """Its derivative in mm/MPa."""
+        d, (a, b, c, _) = self._at(pressure)
+        return to_python((3.0 * a * d + 2.0 * b) * d + c)
+
+
+LAWS = {cls.law: cls for cls in (ConstantRoughness, PowerRoughness, ExponentialRoughness, TableRoughness)}
 ALLOWED = f"a length in mm from 0 to {WIDEST:g}, a table with a law, or an object with separation(pressure)"
 
 

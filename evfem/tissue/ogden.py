@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Checked, Within, check_fields, number, real, yes_or_no
+from evfem.common.checks import Checked, Within, check_fields, number, real, several, yes_or_no
 from evfem.errors import InputError, describe_value
 from evfem.tensor import Array, ddot, det, mul, symmetric_power, transpose
 from evfem.tissue.splitlaw import Hyperelastic, stepped_tangent
@@ -116,19 +116,9 @@ class Isotropic(Checked):
 MOST = 1000.0
 
 
-def _numbers(allowed: str, inside: Callable[[float], bool], unit: str = "") -> dict[str, Any]:
-    """Rule of a number or a list of them, kept as a tuple."""
-
-    def check(key: str, entered: Any) -> tuple[float, ...]:
-        values = tuple(entered) if isinstance(entered, Sequence | np.ndarray) else (entered,)
-        return tuple(real(key, value, allowed, inside) for value in values)
-
-    return {"allowed": allowed, "check": check, "unit": unit, "type": float | list[float]}
-
-
 _TERMS = "a number, or a list of numbers, none of them zero"
-_MU = _numbers(_TERMS, bool, "MPa")
-_ALPHA = _numbers(f"{_TERMS} or beyond +-{MOST:g}", lambda value: 0.0 < abs(value) <= MOST)
+_MU = several(_TERMS, bool, "MPa")
+_ALPHA = several(f"{_TERMS} or beyond +-{MOST:g}", lambda value: 0.0 < abs(value) <= MOST)
 
 
 @dataclass(frozen=True)
