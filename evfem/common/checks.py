@@ -93,12 +93,12 @@ def at_least(key: str, entered: Values, lowest: float, allowed: str) -> Values:
 
 
 def finite(key: str, entered: Values, allowed: str) -> Values:
-    """`entered` as float or array of floats (complex if it was), all finite."""
+    """`entered` as float or array of floats (complex if it was), all finite and none masked."""
     try:
         value = np.asarray(entered)
     except ValueError as error:  # rows of different length
         raise InputError(key, describe_value(entered), allowed) from error
-    if value.dtype.kind not in "iufc" or not np.all(np.isfinite(value)):
+    if value.dtype.kind not in "iufc" or np.ma.is_masked(entered) or not np.all(np.isfinite(value)):
         raise InputError(key, describe_value(entered), allowed)
     return to_python(value * 1.0)
 

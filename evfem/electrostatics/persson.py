@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import above, finite, real
+from evfem.common.checks import Within, above, real
 from evfem.errors import InputError
 
 #: share of the elastic energy in asperities that touch alone, fitted to simulations [2]
@@ -65,16 +65,17 @@ def waves_of_map(heights: Any, pixel: float, periodic: bool) -> Waves:
     A map that is not `periodic` is levelled by its plane and multiplied with Hann's window; the waves keep
     the rms height that it had before. Raises InputError for what is no such map.
     """
-    allowed = "heights (m, n) in mm, at least 4 x 4, not all the same"
-    h = np.asarray(finite("heights", heights, allowed))
-    if h.ndim != 2 or min(h.shape) < 4 or h.dtype.kind == "c":
-        raise InputError("heights", f"an array of shape {h.shape}", allowed)
-    step = float(
-        above("pixel", real("pixel", pixel, "a length in mm above 0"), 0.0, "a length in mm above 0")
-    )
+    allowed = "heights (m, n) in mm, at least 4 x 4, all there and not all the same"
+    given = np.ma.asarray(heights)
+    if given.ndim != 2 or min(given.shape) < 4 or given.dtype.kind not in "iuf":
+        raise InputError("heights", f"an array of shape {given.shape}, {given.dtype}", allowed)
+    if missing := np.ma.count_masked(np.ma.masked_invalid(given)):
+        raise InputError("heights", f"{missing} of {given.size} points missing", allowed)
+    step = real("pixel", pixel, "a length in mm above 0", Within(0.0, above=True))
+    h = np.asarray(given, dtype=float)
     h = h - h.mean() if periodic else _levelled(h)
     rms = float(np.sqrt(np.mean(h**2)))
-    if not rms > 1e-12 * np.abs(np.asarray(heights)).max():
+    if not rms > 1e-12 * np.abs(given).max():
         raise InputError("heights", f"heights of rms {rms:g} mm", allowed)
     summit = float(h.max())
     if not periodic:
@@ -108,8 +109,7 @@ def rows(waves: Waves, modulus: float, open_gap: float | None) -> tuple[tuple[fl
     the summit's. The first step is along the tangent that reaches it. Raises InputError for what is no
     modulus or gap.
     """
-    allowed = "a modulus E / (1 - nu^2) in MPa above 0"
-    above("modulus", real("modulus", modulus, allowed), 0.0, allowed)
+    real("modulus", modulus, "a modulus E / (1 - nu^2) in MPa above 0", Within(0.0, above=True))
     gap = waves.summit if open_gap is None else real("open_gap", open_gap, "a length in mm above 0")
     load = np.geomspace(open_pressure(gap, waves, modulus), full_pressure(waves, modulus), ROWS - 1)
     return (0.0, *load.tolist()), (gap, *separation(load, waves, modulus).tolist())

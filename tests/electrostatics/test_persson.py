@@ -237,7 +237,9 @@ def test_what_is_no_map_or_spectrum_is_refused():
     from_map, from_spectrum = ev.TableRoughness.from_map, ev.TableRoughness.from_spectrum
     h = heights()
     refuses(r"heights: given an array of shape \(64,\)", from_map, h[0], PIXEL, E)
-    refuses("heights: given", from_map, np.where(h > 2e-3, np.nan, h), PIXEL, E)
+    for gaps in (np.where(h == h.max(), np.nan, h), np.ma.masked_equal(h, h.max())):
+        refuses("heights: given 1 of 4096 points missing", from_map, gaps, PIXEL, E)
+    refuses("heights: given an array of shape .*complex", from_map, 1j * h, PIXEL, E)
     refuses("heights: given heights of rms", from_map, np.ones((8, 8)), PIXEL, E)
     refuses("pixel: given 0", from_map, h, 0.0, E)
     refuses("modulus: given -1", from_map, h, PIXEL, -1.0)
@@ -247,6 +249,7 @@ def test_what_is_no_map_or_spectrum_is_refused():
     refuses("q: given 2 wave numbers that do not grow", from_spectrum, [20.0, 10.0], [1e-9, 1e-9], E)
     refuses("C: given an array of shape", from_spectrum, [10.0, 20.0], [1e-9], E)
     refuses("C: given", from_spectrum, [10.0, 20.0], [1e-9, 0.0], E)
+    refuses("C: given", from_spectrum, [10.0, 20.0], np.ma.masked_less([1e-9, 1e-12], 1e-10), E)
 
 
 @pytest.mark.scans
