@@ -156,12 +156,12 @@ def test_the_law_has_the_theory_between_its_rows_and_its_summit_when_open():
     assert law.separation(10.0) == law.gap[-1] < 1e-12
 
 
-TABLE = ev.TableRoughness([0.0, 0.01, 0.05, 0.2], [0.004, 0.002, 0.0012, 0.001], "exponential")
+TABLE = ev.TableRoughness([0.0, 0.01, 0.05, 0.1], [0.004, 0.003, 0.0022, 0.0013], "exponential")
 
 
 def test_rows_are_met_and_slopes_are_continuous_and_those_of_the_separation():
     np.testing.assert_allclose(TABLE.separation(np.array(TABLE.pressure)), TABLE.gap, rtol=1e-14)
-    p = np.array([0.004, 0.03, 0.1, 0.5])
+    p = np.array([0.004, 0.03, 0.08, 0.5])
     by_step = np.imag(TABLE.separation(p + 1e-30j)) / 1e-30
     np.testing.assert_allclose(separation_derivative(TABLE, p), by_step, rtol=1e-12, atol=1e-15)
     by_difference = (TABLE.separation(p + 1e-7) - TABLE.separation(p - 1e-7)) / 2e-7
@@ -209,7 +209,7 @@ def test_a_scene_with_a_scanned_law_obeys_the_theory_at_every_node():
 
 
 def test_a_scene_file_holds_the_rows():
-    rows = "law = 'table'\npressure = [0.0, 0.01, 0.05, 0.2]\ngap = [0.004, 0.002, 0.0012, 0.001]\n"
+    rows = "law = 'table'\npressure = [0.0, 0.01, 0.05, 0.1]\ngap = [0.004, 0.003, 0.0022, 0.0013]\n"
     text = head('law = "kaczmarek"\nvoltage = 100.0\ninsulator = "touchscreen"\nROUGH') + PRESS
     table = "[electrostatics.roughness_gap]\n" + rows + "distribution = 'exponential'"
     scene = loads(text.replace("ROUGH", table))
