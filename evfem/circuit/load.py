@@ -87,7 +87,7 @@ class Air(Room):
         pad, attraction = model.equilibrium.pad_state(state), model.attraction.parts[0]
         gap = attraction.over_gaps(pad, lambda gap: gap)
         over = self._voltages(model, pad, gap) / np.asarray(breakdown_voltage(gap))
-        return {"breakdown": float(np.max(np.where(attraction.carrying(pad) > 0.0, over, 0.0)))}
+        return {"breakdown": float(np.max(np.where(attraction.weights(pad) > 0.0, over, 0.0)))}
 
     def _voltages(self, model: Any, pad: Any, gap: Floats) -> Any:
         """Peak voltages of the gaps (P,)."""

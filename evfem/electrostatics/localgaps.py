@@ -39,7 +39,7 @@ from evfem.electrostatics.roughness import (
     roughness_of,
     separation_derivative,
 )
-from evfem.errors import InputError
+from evfem.errors import InputError, describe_value
 from evfem.protocols import ForceLaw, RoughnessLaw
 
 #: Gauss points from 0 to 1, closer where gaps are small, and their weights
@@ -75,7 +75,8 @@ def equivalent_gap(
     Troxel's law over layers of the `reduced` thickness s (mm): <(u + s)^-2>^(-1/2) - s. All broadcast.
 
     `distribution` is exponential or gaussian, `rms` (mm) the rms height of gaussian gaps, U/3 unless given;
-    those below 0, a share of Phi(-U/rms), attract nothing. Raises InputError for what is no such length.
+    those below 0, a share of Phi(-U/rms), attract nothing. Raises InputError for what is no such length, and
+    for an rms height above U/2, where more than 2.3 % would.
 
     >>> stack = 0.001 / 3.9 + 0.2 / 1650.0
     >>> (1e3 * equivalent_gap([0.001, 0.003, 0.005], stack)).round(4).tolist()                      # um
@@ -87,6 +88,8 @@ def equivalent_gap(
     if rms is not None and distribution != "gaussian":
         raise InputError("rms", rms, "only that of gaussian gaps: of exponential ones it is the mean")
     height = U / APART if rms is None else above("rms", rms, 0.0, "a length in mm above zero")
+    if np.any(2.0 * height > U * (1.0 + 1e-12)):
+        raise InputError("rms", describe_value(rms), "up to half the mean gap: rougher faces overlap")
     away = (s > 0.0) & (U > 0.0)  # otherwise a gap of none attracts without bound, or is all there is
     U, s, height = (np.where(away, one, 1.0) for one in (U, s, height))
     if distribution == "exponential":

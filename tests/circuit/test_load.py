@@ -153,6 +153,13 @@ def test_a_step_in_several_substeps_has_the_power_of_all(swinging):
     assert result.current_rms[-1] == pytest.approx(swinging.current_rms[11], rel=0.1)
 
 
+def test_air_that_carries_no_force_breaks_down_all_the_same():
+    whole = scene(drive=None, voltage=1000.0, surface=ev.Display(friction=0.3))
+    found = [ev.simulate(replace(whole, air_layer=air)) for air in (True, False)]
+    assert found[1].breakdown[-1] == pytest.approx(found[0].breakdown[-1], rel=0.05)
+    assert any("air breaks down" in said for said in found[1].warnings)
+
+
 def test_breakdown_is_the_largest_ratio_of_all_gaps():
     """A round pad has every gap, and with it nearly the worst one of the curve."""
     film = scene(drive=None, voltage=1000.0, surface=ev.Display(friction=0.3))

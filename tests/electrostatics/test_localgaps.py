@@ -86,8 +86,8 @@ def test_thick_layers_see_the_mean_gap_and_none_the_smallest():
 
 
 def test_an_rms_of_its_own_is_that_of_the_faces():
-    pull = quad(lambda u: norm(3.0, 2.0).pdf(u) / (u + SCREEN) ** 2, 0.0, 30.0, limit=200, epsrel=1e-11)[0]
-    assert (gap_of(3.0, SCREEN, "gaussian", rms=2.0) + SCREEN) ** -2 == pytest.approx(pull, rel=1e-9)
+    pull = quad(lambda u: norm(3.0, 1.5).pdf(u) / (u + SCREEN) ** 2, 0.0, 30.0, limit=200, epsrel=1e-11)[0]
+    assert (gap_of(3.0, SCREEN, "gaussian", rms=1.5) + SCREEN) ** -2 == pytest.approx(pull, rel=1e-9)
     assert gap_of(3.0, SCREEN, "gaussian", rms=1.0) == gap_of(3.0, SCREEN, "gaussian")
 
 
@@ -96,6 +96,7 @@ def test_what_is_no_gap_or_distribution_is_refused():
     refuses("reduced: given -1.0; allowed: a length in mm", gap_of, 1.0, -1.0)
     refuses("distribution.*exponential | gaussian", gap_of, 1.0, SCREEN, "none")
     refuses("rms: given 1.0; allowed: only that of gaussian", gap_of, 1.0, SCREEN, rms=1.0)
+    refuses("rms: given 2.0; allowed: up to half the mean gap", gap_of, 3.0, SCREEN, "gaussian", rms=2.0)
     refuses("rms: given 0.0; allowed: a length in mm above zero", gap_of, 1.0, SCREEN, "gaussian", rms=0.0)
     refuses(
         "distribution.*none | exponential | gaussian", ev.ConstantRoughness, 0.001, distribution="uniform"
