@@ -183,27 +183,34 @@ class Amplifier:
         above("voltage_max", self.voltage_max, 0.0, "a voltage in V above zero")
         if self.slew is not None:
             above("slew", self.slew, 0.0, "a rate in V/s above zero, or None")
-        asked = self.largest_current, self.slew_rate
-        if asked == (None, None):
-            return
-        for key, value, unit in zip(("largest_current", "slew_rate"), asked, ("A", "V/s"), strict=True):
+        for key, value, unit in (
+            ("largest_current", self.largest_current, "A"),
+            ("slew_rate", self.slew_rate, "V/s"),
+        ):
             if value is not None:
                 above(key, value, 0.0, f"a number in {unit} above zero, or None")
-        allowed = "what evfem.electrical_impedance finds of a finger in space, or of one with a depth"
+        if self.load is not None:
+            self._loaded()
+
+    def _loaded(self) -> Any:
+        """The load. Raises InputError where there is none in ohm."""
         if getattr(self.load, "unit", None) != "ohm":
             given = ABSENT if self.load is None else f"{type(self.load).__name__}, not in ohm"
+            allowed = "what evfem.electrical_impedance finds of a finger in space, or of one with a depth"
             raise InputError("load", given, allowed)
+        return self.load
 
     @property
     def limits(self) -> dict[str, float]:
-        """Largest effective voltage (V) by the name of each limit."""
+        """Largest effective voltage (V) by the name of each limit. Raises InputError for a current or a rate
+        without a load.
+        """
         found = {"voltage_max": self.voltage_max}
         if self.largest_current is not None:
-            found["largest_current"] = self.largest_current * float(np.abs(self.load.impedance).min())
+            found["largest_current"] = self.largest_current * float(np.abs(self._loaded().impedance).min())
         if self.slew_rate is not None:
-            found["slew_rate"] = self.slew_rate / (
-                2.0 * np.pi * float(self.load.frequency.max()) * float(carrier_amplitude(1.0))
-            )
+            swing = float(carrier_amplitude(2.0 * np.pi * self._loaded().frequency.max()))
+            found["slew_rate"] = self.slew_rate / swing
         return found
 
     def stops(self, profile: VoltageProfile) -> str:

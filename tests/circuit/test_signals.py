@@ -137,7 +137,7 @@ def test_current_and_slew_rate_limit_an_alternating_voltage_by_its_load():
 
 
 def test_a_current_without_a_load_is_refused():
-    refuses("load: missing", Amplifier, 80.0, largest_current=1e-3)
+    refuses("load: missing", Amplifier(80.0, largest_current=1e-3).limit, JUMP)
     plane = SimpleNamespace(unit="ohm mm")
     refuses("load: given SimpleNamespace, not in ohm", Amplifier, 80.0, slew_rate=1e5, load=plane)
     refuses("largest_current: given 0", Amplifier, 80.0, largest_current=0.0, load=FINGER)
