@@ -33,6 +33,7 @@ from evfem.electrostatics.laws import eps_0 as eps_0
 from evfem.electrostatics.roughness import ConstantRoughness as ConstantRoughness
 from evfem.electrostatics.roughness import ExponentialRoughness as ExponentialRoughness
 from evfem.electrostatics.roughness import PowerRoughness as PowerRoughness
+from evfem.electrostatics.roughness import TableRoughness as TableRoughness
 from evfem.electrostatics.timesignals import Carrier as Carrier
 from evfem.electrostatics.timesignals import ChargeControl as ChargeControl
 from evfem.electrostatics.timesignals import OpenCircuit as OpenCircuit

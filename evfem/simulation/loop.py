@@ -334,7 +334,10 @@ class Loop:
         scene = self._moved(self._interactive.and_then(course))
         cored = (Closing(scene, run.model.mesh).core is None) != (run.model.closing.core is None)
         if cored or not run.scene.electrics.acts:
-            self._run = Run(scene, Saved(run.checkpoint(), run.rows) if run.rows else None)
+            self._run = Run(scene, None)
+            if run.rows:  # with the columns of what acts from now on
+                none = dict.fromkeys(self._run.model.column_names, 0.0)
+                self._run.restore(Saved(run.checkpoint(), [none | row for row in run.rows]))
             self._run.frames = run.frames
         self._largest = max(voltage, self._largest)
 

@@ -206,7 +206,7 @@ class Run:
         first = next(iter(scene.courses), Course())
         self.begin_at(-first.lift)
         if resume is not None:
-            self._restore(resume)
+            self.restore(resume)
 
     def begin_at(self, indentation: float) -> None:
         """Place the finger at rest before the first row. One that hovers first comes from afar, where nothing
@@ -434,7 +434,8 @@ class Run:
             **account_arrays(self.ledger, self.state),
         }
 
-    def _restore(self, saved: Saved) -> None:
+    def restore(self, saved: Saved) -> None:
+        """Go on from what was saved. Raises InputError for what is no checkpoint of this scene."""
         columns = self.model.column_names
         arrays = usable(saved, self.checkpoint(), self.scene.total_steps, columns)
         self.state = state_of(arrays)
