@@ -3,7 +3,7 @@ r"""Mean separation of rough faces under load from the waves of their roughness,
 A surface of the two-dimensional isotropic power spectrum C(q), <h^2> = 2 pi int q C dq, that is pressed
 with p against a soft plane of the modulus E* = E / (1 - nu^2), is flattened up to the wave number q on the
 share :math:`P = \mathrm{erf}(p / E^* \sigma)` of the area, with :math:`\sigma^2 = \pi \int q^3 C dq` up to q,
-half the mean square slope. The elastic energy of an area, [1]_ with the factor of [2]_,
+half the mean square slope. The elastic energy of an area, Persson's (2007) with the factor of Yang and Persson (2008),
 
 .. math:: U = \frac{\pi}{2} E^* \int q^2 C\, P\, [\gamma + (1 - \gamma) P^2]\, dq, \qquad \gamma = 0.45,
 
@@ -12,7 +12,7 @@ is the work of the pressure, dU = -p du, so that the mean separation is
 .. math:: u(p) = \frac{2}{\sqrt\pi} \int \frac{d\sigma}{q}\, J\Big(\frac{p}{E^* \sigma}\Big), \qquad
    J(x) = \int_x^\infty [\gamma + 3 (1 - \gamma)\, \mathrm{erf}^2 y]\, e^{-y^2}\, \frac{dy}{y},
 
-the formula of [1]_ and [2]_ with w = 1 / sigma, where :math:`q^2 C w\, dq = 2\, d\sigma / \pi q`. A ring of
+the formula of both with w = 1 / sigma, where :math:`q^2 C w\, dq = 2\, d\sigma / \pi q`. A ring of
 one q has the integral :math:`\sigma K(p / E^* \sigma)`, K(x) as J(x) with (y - x) / y^2 for 1 / y: a map,
 whose waves lie in rings, needs no quadrature over q. A light load separates by :math:`u_0 \ln (1 / p)`,
 :math:`u_0 = \sqrt\pi\, \gamma \int q^2 C w\, dq`, without bound: below `open_pressure` a tangent is followed.
@@ -20,9 +20,9 @@ whose waves lie in rings, needs no quadrature over q. A light load separates by 
 The energy is that of the public code of Xu et al. (github.com/xylcsi/PerssonModelFudgeFactor,
 `Persson_LE_SE_YP08.m`, `Variance_pressure.m`).
 
-.. [1] B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502, doi:10.1103/PhysRevLett.99.125502.
-.. [2] C. Yang, B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214,
-   doi:10.1088/0953-8984/20/21/215214.
+- B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502, doi:10.1103/PhysRevLett.99.125502.
+- C. Yang, B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214,
+  doi:10.1088/0953-8984/20/21/215214.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, real
 from evfem.errors import InputError
 
-#: share of the elastic energy in asperities that touch alone, fitted to simulations [2]
+#: share of the elastic energy in asperities that touch alone, fitted to simulations (Yang and Persson 2008)
 GAMMA = 0.45
 #: Gauss points over the reach of exp(-y^2)
 _AT, _SHARE = np.polynomial.legendre.leggauss(48)
@@ -60,7 +60,7 @@ class Waves(NamedTuple):
 
 
 def waves_of_map(heights: Any, pixel: float, periodic: bool) -> Waves:
-    """Waves of heights (m, n) in mm on squares of `pixel` (mm): |FFT|^2 in rings as wide as 1 / length.
+    """Waves of heights (m, n) in mm on squares of `pixel` (mm): abs(FFT)^2 in rings as wide as 1 / length.
 
     A map that is not `periodic` is levelled by its plane and multiplied with Hann's window; the waves keep
     the rms height that it had before. Raises InputError for what is no such map.
@@ -98,7 +98,7 @@ def _levelled(h: Floats) -> Floats:
 
 
 def _ordered(heights_q: Floats, slopes: Floats, rms: float, summit: float) -> Waves:
-    """Rings by their sums of q |h|^2 and q^2 |h|^2."""
+    """Rings by their sums of q abs(h)^2 and q^2 abs(h)^2."""
     there = slopes > 0.0
     heights_q, slopes = heights_q[there], slopes[there]
     return Waves(slopes / heights_q, np.sqrt(np.cumsum(slopes)), rms, summit)

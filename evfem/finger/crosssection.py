@@ -236,5 +236,5 @@ def outline_of(outline: Any, a: float, b: float) -> Outline:
 FingerOutline = Annotated[
     float | CrossSection | str | os.PathLike[str],
     {"allowed": ALLOWED, "type": float | str | dict[str, list[float]], "file": True, "check": checked},
-    "exponent n of |x/a|^n + |y/b|^n (+ |z/c|^n) = 1, 2: an ellipse; or points of a cross-section",
+    "exponent n of abs(x/a)^n + abs(y/b)^n (+ abs(z/c)^n) = 1, 2: an ellipse; or points of a cross-section",
 ]
