@@ -3,7 +3,8 @@ r"""Mean separation of rough faces under load from the waves of their roughness,
 A surface of the two-dimensional isotropic power spectrum C(q), <h^2> = 2 pi int q C dq, that is pressed
 with p against a soft plane of the modulus E* = E / (1 - nu^2), is flattened up to the wave number q on the
 share :math:`P = \mathrm{erf}(p / E^* \sigma)` of the area, with :math:`\sigma^2 = \pi \int q^3 C dq` up to q,
-half the mean square slope. The elastic energy of an area, Persson's (2007) with the factor of Yang and Persson (2008),
+half the mean square slope. The elastic energy of an area, Persson's (2007) with the factor of Yang and
+Persson (2008),
 
 .. math:: U = \frac{\pi}{2} E^* \int q^2 C\, P\, [\gamma + (1 - \gamma) P^2]\, dq, \qquad \gamma = 0.45,
 
