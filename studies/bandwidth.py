@@ -25,7 +25,7 @@ import evfem as ev
 from evfem.common.arrays import Floats
 
 from .common import Series, Study
-from .plots import COLOURS, FIRST, Figure, new_figure
+from .plots import COLOURS, FIRST, Figure, panels
 from .stick_slip import slab
 
 #: Hz per mm/s (arXiv:2505.11162), and mm
@@ -119,8 +119,7 @@ def main(quick: bool = False) -> Study:
 
 def draw(series: list[Series], speeds: tuple[float, ...]) -> Figure:
     """Gain and phase over the frequency with the closed form and the published cut-off; the onset."""
-    figure = new_figure(3.2)
-    size, phase, begin = figure.subplots(1, 3)
+    figure, (size, phase, begin) = panels(3.4, 3)
     kept = {one.name: one for one in series}
     for speed, colour in zip(speeds, FIRST, strict=False):
         one = kept[f"gain.{speed:g}_mm_s"]
@@ -133,10 +132,11 @@ def draw(series: list[Series], speeds: tuple[float, ...]) -> Figure:
         phase.plot(one.x, kept[f"phase.{speed:g}_mm_s"].y, "o", color=colour, ms=3.5)
     size.axhline(math.sqrt(0.5), color=COLOURS["neutral"], lw=0.6)
     size.set(xlabel="frequency (Hz)", ylabel="friction that follows")
+    size.plot([], [], ":", color=COLOURS["neutral"], lw=0.8, label="published cut-off")
     size.legend(fontsize=7)
     phase.set(xlabel="frequency (Hz)", ylabel="phase (degrees)")
-    for name, colour in (("memory", FIRST[0]), ("coulomb", FIRST[1])):
-        begin.plot(kept[f"onset.{name}"].x, kept[f"onset.{name}"].y, color=colour, label=name)
+    for name, said, colour in (("memory", "slip memory", FIRST[0]), ("coulomb", "Coulomb", FIRST[1])):
+        begin.plot(kept[f"onset.{name}"].x, kept[f"onset.{name}"].y, color=colour, label=said)
     begin.set(xlabel="slip (um)", ylabel="friction (mN/mm)", ylim=(0.0, None))
     begin.legend(fontsize=7)
     return figure

@@ -86,11 +86,11 @@ def _hover(ax: Axes, law: str, forces: Mapping[tuple[str, str, str], Floats]) ->
         for case, place in places.items():
             draw_box(ax, place + shift, forces[kind, law, case], 0.18, colour, hatch)
     ax.set_xticks(list(places.values()), list(places))
-    ax.set(ylabel="force (mN)", ylim=(0, None))
+    ax.set(ylabel="force (mN)", ylim=(0, 1.45 * ax.get_ylim()[1]))
     ax.set_title(LABELS[law], fontsize="medium")
     kinds = (("measured", COLOURS["measured"]), ("smooth", COLOURS[law]), ("ridged", COLOURS["fe"]))
     handles = [Patch(color=colour, label=label) for label, colour in kinds]
     handles.append(
         Patch(facecolor="white", edgecolor=COLOURS[law], hatch="////", label="smooth, held at 30°")
     )
-    ax.legend(handles=handles, fontsize="x-small")
+    ax.legend(handles=handles, fontsize="x-small", loc="upper right")
