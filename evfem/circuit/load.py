@@ -81,13 +81,19 @@ class Supply(Room):
 class Air(Room):
     """How near the air is to breakdown: the largest voltage of a gap over Paschen's."""
 
-    columns = (Column("breakdown", "", "largest peak voltage of a gap over that at which air breaks down"),)
+    columns = (
+        Column("breakdown", "", "largest peak voltage of a gap over that at which air breaks down"),
+        Column("breakdown_x", "mm", "x of the node above that gap, of the undeformed pad"),
+    )
 
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
         pad, attraction = model.equilibrium.pad_state(state), model.attraction.parts[0]
         gap = attraction.over_gaps(pad, lambda gap: gap)
         over = self._voltages(model, pad, gap) / np.asarray(breakdown_voltage(gap))
-        return {"breakdown": float(np.max(np.where(attraction.weights(pad) > 0.0, over, 0.0)))}
+        over = np.where(attraction.weights(pad) > 0.0, over, 0.0)
+        worst = int(over.argmax())
+        place = float(model.mesh.points[pad.pad.nodes[worst], 0]) if over[worst] > 0.0 else 0.0
+        return {"breakdown": float(over[worst]), "breakdown_x": place}
 
     def _voltages(self, model: Any, pad: Any, gap: Floats) -> Any:
         """Peak voltages of the gaps (P,)."""
@@ -108,8 +114,9 @@ class Air(Room):
         if over[worst] <= 1.0:
             return
         held = ", where the law holds the field" if scene.breakdown == "limit" else ""
-        much = f"{over[worst]:.3g} times Paschen's voltage in step {row['step']}"
-        yield f"air breaks down{self._where(scene, row)}, at {much}{held}"
+        where = f"at x = {row['breakdown_x']:.2g} mm of the pad in step {row['step']}"
+        much = f"at {over[worst]:.3g} times Paschen's voltage {where}"
+        yield f"air breaks down{self._where(scene, row)}, {much}{held}"
 
     def _fails(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         """Layers of the insulator whose field exceeds their strength where the gap is smallest."""

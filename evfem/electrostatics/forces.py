@@ -230,9 +230,9 @@ def outline_force(
     outline = _between("outline", outline, 2.0, 4.0, "an exponent from 2 (an ellipse) to 4")
     tilt = _between("tilt", tilt, -89.0, 89.0, "an angle in degrees from -89 to 89")
     given = np.broadcast_arrays(*axes, gap, voltage, layers.reduced, layers.thickness, outline, tilt)
-    found = np.empty(given[0].shape)
+    found = np.empty(given[0].shape, np.result_type(*given, float))
     for at in np.ndindex(found.shape):
-        a, b, c, lowest, volts, reduced, thickness, n, degrees = (float(one[at]) for one in given)
+        a, b, c, lowest, volts, reduced, thickness, n, degrees = (one[at].item() for one in given)
         rise, areas = _columns_of(a, b, c, n, degrees)
         found[at] = np.sum(law.traction(lowest + rise, volts, Layers(reduced, thickness)) * areas)
     return to_python(found)

@@ -53,5 +53,6 @@ class OfRooms:
     current_rms = _of_room("current_rms")
     power = _of_room("power")
     breakdown = _of_room("breakdown")
+    breakdown_x = _of_room("breakdown_x")
     missed_force = _of_room("missed_force")
     missed_gap = _of_room("missed_gap")

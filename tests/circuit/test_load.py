@@ -168,6 +168,12 @@ def test_breakdown_is_the_largest_ratio_of_all_gaps():
     assert 0.9 * worst < result.breakdown[-1] <= worst * (1.0 + 1e-12)
     (said,) = (one for one in result.warnings if "breaks down" in one)
     assert said.startswith("air breaks down in gaps of 12 to 80.8 um, at 1.2")
+    assert f"at x = {result.breakdown_x[-1]:.2g} mm of the pad in step {result.step[-1]}" in said
+    # the node there has that ratio by its own gap
+    gap = result.frames[-1].gap[result.mesh.points[:, 0] == result.breakdown_x[-1]]
+    own = gap[np.isfinite(gap)] / (gap[np.isfinite(gap)] + film.electrics.attraction[1].reduced)
+    held = ev.electrostatics.breakdown_voltage(gap[np.isfinite(gap)])
+    assert float(np.max(1000.0 * own / held)) == pytest.approx(result.breakdown[-1], rel=1e-9)
     assert "air breaks down from 790 V on (28.5 um)" in " ".join(str(ev.plan(film)).split())
     quiet = ev.simulate(scene(drive=None, voltage=700.0, surface=ev.Display(friction=0.3)))
     assert quiet.breakdown[-1] < 1.0
@@ -179,12 +185,12 @@ def test_breakdown_is_the_largest_ratio_of_all_gaps():
 
 
 def test_a_scene_pays_only_for_what_is_in_it():
-    names = ("charge", "current_rms", "power", "breakdown")
+    names = ("charge", "current_rms", "power", "breakdown", "breakdown_x")
     without = ev.simulate(scene(law=None, voltage=0.0, drive=None))
     assert not set(names) & set(without.columns)
     assert not without.breakdown.any()
     direct = ev.simulate(scene(drive=None, roughness_gap=ROUGH))
-    assert [name for name in names if name in direct.columns] == ["breakdown"]
+    assert [name for name in names if name in direct.columns] == ["breakdown", "breakdown_x"]
     off = ev.simulate(scene(drive=None, roughness_gap=ROUGH, breakdown="off"))
     assert not set(names) & set(off.columns)
     assert off.applied_force[-1] == direct.applied_force[-1]
@@ -228,7 +234,7 @@ def test_files_know_breakdown_and_refuse_what_has_no_limit(tmp_path):
 
 
 def test_no_doubt_below_breakdown():
-    row = {"step": 1, "breakdown": 0.99, "voltage": 1.0, "min_gap": 0.0}
+    row = {"step": 1, "breakdown": 0.99, "breakdown_x": 0.0, "voltage": 1.0, "min_gap": 0.0}
     assert not list(Air().doubts(scene(), [row]))
 
 

@@ -208,6 +208,12 @@ def test_a_tilted_superellipsoid_is_its_columns_one_by_one(n):
     assert force == pytest.approx(2.0 * step**2 * np.sum(column), rel=1e-3)
 
 
+def test_a_complex_step_of_the_voltage_is_its_derivative():
+    """The force is that of U^2, so dF/dU = 2 F/U."""
+    of = lambda volts: outline_force(StrongTroxel(), 16.0, 12.0, 22.0, 0.25, volts, TABLE_2)  # noqa: E731
+    assert of(2000.0 + 1e-20j).imag / 1e-20 == pytest.approx(2.0 * of(2000.0) / 2000.0, rel=1e-12)
+
+
 def test_a_sphere_does_not_see_its_tilt():
     forces = outline_force(StrongTroxel(), 12.0, 12.0, 12.0, 0.1, 100.0, TABLE_2, tilt=[0.0, 37.0])
     assert forces[1] == pytest.approx(forces[0], rel=1e-9)
