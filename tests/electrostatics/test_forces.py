@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from scipy.integrate import IntegrationWarning, quad
-from scipy.special import beta
+from scipy.special import beta, gamma
 from tools.refusals import refuses
 
 from evfem.electrostatics.forces import (
@@ -206,6 +206,25 @@ def test_a_tilted_superellipsoid_is_its_columns_one_by_one(n):
     column = StrongTroxel().traction(0.4 + found - found.min(), 1000.0, TABLE_2)
     force = outline_force(StrongTroxel(), 16.0, 12.0, 22.0, 0.4, 1000.0, TABLE_2, n, 30.0)
     assert force == pytest.approx(2.0 * step**2 * np.sum(column), rel=1e-3)
+
+
+class Gap:
+    """A traction that is the gap: its force is the volume of air below the body."""
+
+    def traction(self, gap, voltage, layers):
+        return gap
+
+
+@pytest.mark.parametrize("n", [2.2, 2.7])
+@pytest.mark.parametrize("tilt", [1.0, 30.0, 80.0])
+def test_the_air_below_a_tilted_superellipsoid_and_half_of_it_fill_its_shadow(n, tilt):
+    """The body's lowest point is the dual norm h of the vertical below its centre: air = h A - V/2."""
+    semi, turned = np.array([8.0, 6.0, 11.0]), np.radians(tilt)
+    power = n / (n - 1.0)
+    h = np.sum((semi * [0.0, np.cos(turned), np.sin(turned)]) ** power) ** (1.0 / power)
+    V = 8.0 * np.prod(semi) * gamma(1.0 + 1.0 / n) ** 3 / gamma(1.0 + 3.0 / n)
+    shadow, air = (outline_force(law, *2.0 * semi, 0.0, 1.0, TABLE_2, n, tilt) for law in (Unit(), Gap()))
+    assert h * shadow - air == pytest.approx(0.5 * V, rel=1e-9)
 
 
 def test_a_complex_step_of_the_voltage_is_its_derivative():
