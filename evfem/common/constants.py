@@ -74,6 +74,8 @@ BLOCK = 64
 #: a tangent with so many kept unknowns is factorised in single precision, as few are in the plane, where that
 #: gains nothing [space]
 LARGE_SCHUR = 1000
+#: and so is one of so many unknowns: x 1.15 to 1.2 on L2, and x 0.98 where that is refused once [A, B]
+LARGE_TANGENT = 30_000
 #: where factors of single precision give the motion under equal forces to this fraction [space]
 ACCURATE = 1e-3
 #: contact in space is solved to this fraction of the residual of the iterate; from 1e-2 on the next residual

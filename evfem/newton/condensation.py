@@ -47,6 +47,7 @@ class Pardiso:
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         self.pattern, self.kept = pattern, kept
+        self.single, self.refused = single, False
         self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
         library, self._threads = mkl(), ctypes.c_int32(threads)
         self._limit, self._call_pardiso = library.MKL_Set_Num_Threads_Local, library.pardiso
@@ -103,7 +104,7 @@ class Pardiso:
         for mtype, real in kinds[kinds.index((self.mtype, self.real)) :]:
             if (mtype, real) != (self.mtype, self.real):
                 self.close()
-                self.real = real
+                self.real, self.refused = real, self.single
                 self._start(mtype)
             self._values, self.schur = upper.astype(real), np.zeros((0, 0))
             self._values[self.pattern.diagonal[self.kept]] += shift
@@ -179,6 +180,9 @@ class Pardiso:
 
 class SuperLU:
     """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc."""
+
+    #: never of single precision
+    refused = False
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         linalg()  # whose BLAS SuperLU uses

@@ -356,12 +356,14 @@ class FactorisedBody:
         return findings(self.body, state, balance)
 
     def reusable(self) -> Reusable:
-        """Candidates and the point of the factorisation."""
-        return Reusable(self.linearisation.candidates, self.linearisation.reusable)
+        """Candidates, the point of the factorisation and the precision that it needs."""
+        of = self.linearisation
+        return Reusable(of.candidates, of.reusable, of.inaccurate)
 
     def resume(self, carried: Reusable) -> None:
         """Repeat the factorisation that the interrupted run had."""
         self.linearisation.candidates = carried.candidates
+        self.linearisation.inaccurate = carried.inaccurate
         if (at := carried.tangent_point) is not None:
             self.pressure.check(at.state.memory.get("pressure", np.zeros((0, 0))))
             self.linearisation.restore(at)

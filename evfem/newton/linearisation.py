@@ -61,6 +61,7 @@ class Linearisation:
         self.factor: Any = None
         self.tangent: Any = None
         self.stiffest = 0.0
+        self.inaccurate = False
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self._made_at: TangentPoint | None = None
         none = np.zeros((0, 0))
@@ -152,7 +153,8 @@ class Linearisation:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             # static condensation keeps candidates and bone
             kept = np.concatenate([unknowns, self.body.bone])
-            single = kept.size >= constants.LARGE_SCHUR
+            large = kept.size >= constants.LARGE_SCHUR or self.body.pattern.size >= constants.LARGE_TANGENT
+            single = large and not self.inaccurate
             self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, single)
             self.record.backend = type(self.factor).__name__
         pressure = state.memory.get("pressure")
@@ -163,6 +165,7 @@ class Linearisation:
             self.factor.factorise(upper)
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
+        self.inaccurate |= self.factor.refused
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())

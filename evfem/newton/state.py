@@ -134,10 +134,13 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What the next step reuses: candidates (pad nodes) and point of the factorisation."""
+    """What the next step reuses: candidates (pad nodes), point of the factorisation, and whether factors of
+    single precision were `inaccurate`.
+    """
 
     candidates: Ints
     tangent_point: TangentPoint | None
+    inaccurate: bool = False
 
 
 @dataclass(frozen=True)

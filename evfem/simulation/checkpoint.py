@@ -51,6 +51,7 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     nowhere = TangentPoint(state, state.touching, Beginning.of(state), 0.0)
     at = carried.tangent_point or nowhere
     found = {"candidates": carried.candidates, "factorised": at is not nowhere}
+    found["inaccurate"] = carried.inaccurate
     found |= {f"factor_{name}": value for name, value in state_arrays(at.state).items()}
     found |= {"touched": at.touched, "factor_seconds": at.duration}
     found |= {f"begun_{name}": getattr(at.begin, name) for name in BEGUN}
@@ -69,7 +70,7 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
         u, force, status, voltage = (arrays[f"begun_{name}"] for name in BEGUN)
         begin = Beginning(u, force, status, float(voltage), kept)
         at = TangentPoint(made, arrays["touched"], begin, float(arrays["factor_seconds"]))
-    return Reusable(arrays["candidates"].astype(np.int64), at)
+    return Reusable(arrays["candidates"].astype(np.int64), at, bool(arrays["inaccurate"]))
 
 
 def account_arrays(ledger: EnergyAccount, state: State) -> dict[str, Any]:

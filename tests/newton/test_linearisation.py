@@ -7,10 +7,13 @@ import pytest
 from tools.builders import INSULATOR, finger
 from tools.meshes import block
 
+from evfem.common import constants
+from evfem.common.arrays import mkl
 from evfem.common.constants import STABLE
 from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.roughness import PowerRoughness
+from evfem.newton import condensation
 from evfem.newton.condensation import Singular
 from evfem.newton.linearisation import no_progress
 from evfem.newton.state import StepFailed
@@ -252,3 +255,22 @@ def test_in_vain_the_tangent_is_that_of_the_field(under_the_field):
     np.testing.assert_allclose(known, coupling[inner, inner], atol=1e-6 * np.abs(coupling).max())
     by_columns = attraction.stiffness(pad).toarray()[np.ix_(unknowns, unknowns)]
     assert np.abs(field[np.ix_(unknowns, unknowns)] - by_columns).max() > 0.01 * np.abs(coupling).max()
+
+
+@pytest.mark.skipif(mkl() is None, reason="needs PARDISO, which alone has factors of single precision")
+@pytest.mark.parametrize(("bound", "refused"), [(0.0, True), (np.inf, False)])
+def test_a_precision_that_was_not_accurate_is_not_tried_again(bound, refused, monkeypatch):
+    """Nor by a run that is resumed, whose steps must be those of the whole run."""
+    monkeypatch.setattr(constants, "LARGE_TANGENT", 1)
+    monkeypatch.setattr(condensation, "ACCURATE", bound)
+    linear, model, state = made()
+    linear.choose_candidates(state, 0.1)
+    linear.factorise(state)
+    assert linear.factor.single
+    assert linear.factor.refused is refused
+    again = made()[1].equilibrium.body
+    again.resume(replace(model.equilibrium.body.reusable(), tangent_point=None))
+    for later in (linear, again.linearisation):
+        later.factor = None
+        later.factorise(state)
+        assert later.factor.single is not refused
