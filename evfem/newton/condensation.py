@@ -7,9 +7,10 @@ the bone's two translations):
           S x_c = g, \qquad K_{ii} x_i = b_i - K_{ic} x_c .
 
 Everything unsymmetric or jumpy (friction, electrostatic stiffness, prescribed forces) is added to
-the small dense S by the caller. `Pardiso` (from evfem[fast]) returns S with its factorisation and
-solves in two halves. `SuperLU` eliminates the kept unknowns last, so that S is the product of the
-trailing blocks of L and U. Only i must be positive definite: the bone may be free to move.
+the small dense S by the caller. `Pardiso` (from evfem[fast]) and `Cholesky` return S with the
+factorisation and solve in two halves. `SuperLU`, the readable twin, eliminates the kept unknowns last, so
+that S is the product of the trailing blocks of L and U. Only i must be positive definite: the bone may be
+free to move.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints, linalg, mkl
 from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
+from evfem.tissue.kernels.blocks import sparse_cholesky
 
 #: index of PARDISO's count of perturbed pivots among its parameters
 PERTURBED = 13
@@ -47,7 +49,6 @@ class Pardiso:
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         self.pattern, self.kept = pattern, kept
-        self.single, self.refused = single, False
         self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
         library, self._threads = mkl(), ctypes.c_int32(threads)
         self._limit, self._call_pardiso = library.MKL_Set_Num_Threads_Local, library.pardiso
@@ -104,7 +105,7 @@ class Pardiso:
         for mtype, real in kinds[kinds.index((self.mtype, self.real)) :]:
             if (mtype, real) != (self.mtype, self.real):
                 self.close()
-                self.real, self.refused = real, self.single
+                self.real = real
                 self._start(mtype)
             self._values, self.schur = upper.astype(real), np.zeros((0, 0))
             self._values[self.pattern.diagonal[self.kept]] += shift
@@ -181,9 +182,6 @@ class Pardiso:
 class SuperLU:
     """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc."""
 
-    #: never of single precision
-    refused = False
-
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         linalg()  # whose BLAS SuperLU uses
         self.pattern, self.kept = pattern, kept
@@ -236,25 +234,72 @@ class SuperLU:
         return state + self._solve(b)
 
 
+class Cholesky(SuperLU):
+    """Condensation by Cholesky factors of our own (`cholesky.c`); by SuperLU where the interior is not
+    positive definite.
+    """
+
+    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
+        super().__init__(pattern, kept, threads, single)
+        self._kernel, addresses = sparse_cholesky()
+        order, mark = pattern.elimination_order, np.zeros(pattern.size, dtype=bool)
+        mark[kept] = True
+        order = np.concatenate([order[~mark[order]], kept]).astype(np.int32)
+        arrays = pattern.indptr, pattern.indices, order
+        self._plan = self._kernel.analyse(pattern.size, kept.size, pattern.indices.size, arrays, addresses)
+        self._definite = True
+
+    def factorise(self, upper: Floats) -> None:
+        """Factorise new values of the pattern; raises `Singular` if that fails."""
+        columns = np.empty(2 * (self.kept.size,))
+        self._definite = bool(np.isfinite(upper).all()) and self._kernel.factorise(self._plan, upper, columns)
+        if self._definite:
+            self.schur = columns + columns.T
+            self.schur[np.diag_indices_from(columns)] = columns.diagonal()
+        else:
+            super().factorise(upper)
+
+    def forward(self, b: Floats) -> tuple[Floats, Floats]:
+        if not self._definite:
+            return super().forward(b)
+        x = b.copy()
+        self._kernel.solve(self._plan, False, x)
+        return x, x[self.kept]
+
+    def backward(self, state: Floats, kept: Floats) -> Floats:
+        if not self._definite:
+            return super().backward(state, kept)
+        x = state.copy()
+        x[self.kept] = kept
+        self._kernel.solve(self._plan, True, x)
+        return x
+
+
 #: a factorised matrix: its Schur complement, and solves in two halves
 Condensation = Pardiso | SuperLU
 #: whether the sparse solver is the one that is not chosen by itself
 _OTHER = ContextVar("_OTHER", default=False)
 
 
+def _kinds() -> list[type[Condensation]]:
+    """What is installed, the fastest first; SuperLU always is."""
+    found: list[tuple[type[Condensation], Any]] = [(Pardiso, mkl), (Cholesky, sparse_cholesky)]
+    return [*(kind for kind, library in found if library() is not None), SuperLU]
+
+
 @contextmanager
 def other_solver() -> Iterator[str]:
-    """Within, SuperLU instead of PARDISO; yields its name, "" where it is the only one."""
+    """Within, the second of the sparse solvers; yields its name, "" where there is one alone."""
     token = _OTHER.set(True)
     try:
-        yield "SuperLU" if mkl() else ""
+        yield kinds[1].__name__ if len(kinds := _kinds()) > 1 else ""
     finally:
         _OTHER.reset(token)
 
 
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
-    """PARDISO where evfem[fast] is installed; else SuperLU, never with factors of `single` precision, and
-    where all unknowns are kept: PARDISO then reads memory that nobody has written.
+    """PARDISO where evfem[fast] is installed; else Cholesky factors, where there was a C compiler; else
+    SuperLU, as where all unknowns are kept: PARDISO then reads memory that nobody has written.
     """
-    kind = Pardiso if kept.size < pattern.size and mkl() and not _OTHER.get() else SuperLU
-    return kind(pattern, kept, threads, single)
+    kinds = _kinds() if kept.size < pattern.size else [SuperLU]
+    return kinds[min(int(_OTHER.get()), len(kinds) - 1)](pattern, kept, threads, single)

@@ -61,7 +61,7 @@ class Linearisation:
         self.factor: Any = None
         self.tangent: Any = None
         self.stiffest = 0.0
-        self.inaccurate = False
+        self._single = self.inaccurate = False
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self._made_at: TangentPoint | None = None
         none = np.zeros((0, 0))
@@ -154,8 +154,8 @@ class Linearisation:
             # static condensation keeps candidates and bone
             kept = np.concatenate([unknowns, self.body.bone])
             large = kept.size >= constants.LARGE_SCHUR or self.body.pattern.size >= constants.LARGE_TANGENT
-            single = large and not self.inaccurate
-            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, single)
+            self._single = large and not self.inaccurate
+            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, self._single)
             self.record.backend = type(self.factor).__name__
         pressure = state.memory.get("pressure")
         upper = self.body.tangent(state.u, pressure)
@@ -165,7 +165,7 @@ class Linearisation:
             self.factor.factorise(upper)
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
-        self.inaccurate |= self.factor.refused
+        self.inaccurate |= self._single and self.factor.schur.dtype != np.float32
         dim = self.body.bone.size
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())

@@ -423,9 +423,11 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
 
 
 def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
-    backend = "SuperLU (install evfem[fast] for PARDISO)"
+    backend = "SuperLU (no C compiler was there at the installation)"
     if find_spec("pypardiso"):
         backend = "PARDISO (symmetric, Schur complement)"
+    elif find_spec("evfem.tissue.kernels.cholesky"):
+        backend = "sparse Cholesky factors (install evfem[fast] for PARDISO)"
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     yield f"symmetric stiffness matrix, factorised rarely and reused: {backend}; cell loops: {cells}"
     yield f"contact: {scene.solver.contact}, active-set method on the nodes that may touch"

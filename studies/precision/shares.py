@@ -21,12 +21,13 @@ from .growth import Clock
 from .runs import warm_up
 from .scenes import Case, build
 
+SOLVERS = ("Pardiso", "Cholesky", "SuperLU")
 PARTS = ("assembly", "factorisation", "solve", "contact", "output", "rest")
 #: part -> module, class (or none) and functions that do its work
 WORK: Mapping[str, tuple[tuple[str, str, str], ...]] = {
     "assembly": (("tissue.body", "Body", "forces tangent"), ("tissue.weakform", "Tissue", "smallest_J")),
-    "factorisation": tuple(("newton.condensation", name, "factorise") for name in ("Pardiso", "SuperLU")),
-    "solve": tuple(("newton.condensation", name, "forward backward") for name in ("Pardiso", "SuperLU")),
+    "factorisation": tuple(("newton.condensation", name, "factorise") for name in SOLVERS),
+    "solve": tuple(("newton.condensation", name, "forward backward") for name in SOLVERS),
     "contact": (
         ("contact.condensed", "LinearContactStep", "solve"),
         ("contact.condensed", "", "inverse"),

@@ -10,11 +10,13 @@ import pytest
 from tools.commands import printed
 
 from evfem.common.arrays import mkl_library
-from evfem.newton.condensation import Pardiso, Singular, SuperLU
+from evfem.newton.condensation import Cholesky, Pardiso, Singular, SuperLU
+from evfem.tissue.kernels.blocks import sparse_cholesky
 from evfem.tissue.pattern import Pattern
 
-#: PARDISO is part of evfem[fast]; without it there is one back end to test
-BACK_ENDS = [Pardiso, SuperLU] if importlib.util.find_spec("pypardiso") else [SuperLU]
+#: PARDISO is part of evfem[fast], Cholesky is compiled
+WITH_PARDISO = [Pardiso] if importlib.util.find_spec("pypardiso") else []
+BACK_ENDS = [*WITH_PARDISO, *([Cholesky] if sparse_cholesky() else []), SuperLU]
 every_back_end = pytest.mark.parametrize("back_end", BACK_ENDS)
 KEPT = np.array([17, 3, 39, 0, 22, 8])  # in no order, first and last unknown among them
 
@@ -99,6 +101,43 @@ def test_condensation_equals_dense_elimination(back_end, kept):
     compare(factor, problem, kept, 1e-12)
 
 
+@pytest.mark.skipif(sparse_cholesky() is None, reason="there was no C compiler at the installation")
+@pytest.mark.parametrize("kept", [[0, 5, 700], range(300, 420), [9]], ids=["few", "many", "one"])
+def test_cholesky_factors_are_those_of_superlu(kept):
+    """A grid of cells beside another one, with supernodes of all sizes, on two unknowns a node."""
+    rng, n = np.random.default_rng(3), 18
+    i, j = np.divmod(np.arange(n * (n - 1)), n - 1)
+    left = (n * i + j)[i < n - 1]
+    grid = np.stack([left, left + 1, left + n, left + n + 1], axis=1)
+    pattern = Pattern(np.concatenate([grid, grid + n * n]), 2)
+    roots = rng.normal(size=(2 * len(grid), 8, 8))
+    data = pattern.zeros()
+    pattern.add(roots @ roots.swapaxes(1, 2), np.arange(len(roots)), data)
+    upper, kept = pattern.finish(data), np.array(kept, dtype=np.int64)
+    b, x = rng.normal(size=pattern.size), rng.normal(size=kept.size)
+    found = []
+    for back_end in (Cholesky, SuperLU):
+        factor = back_end(pattern, kept)
+        factor.factorise(upper)
+        state, condensed = factor.forward(b)
+        found.append([factor.schur, condensed, factor.backward(state, x)])
+    assert np.abs(found[1][2]).max() > 0.0
+    for own, other in zip(*found, strict=True):
+        np.testing.assert_allclose(own, other, rtol=1e-9, atol=1e-9 * np.abs(other).max(initial=0.0))
+
+
+@pytest.mark.skipif(sparse_cholesky() is None, reason="there was no C compiler at the installation")
+@pytest.mark.parametrize(
+    ("indptr", "indices", "order"),
+    [([0, 2, 3], [0, 2, 1], [0, 1]), ([0, 2, 3], [0, 1, 0], [0, 1]), ([0, 2, 3], [0, 1, 1], [1, 1])],
+)
+def test_a_plan_of_what_is_no_upper_triangle_is_refused(indptr, indices, order):
+    kernel, addresses = sparse_cholesky()
+    arrays = tuple(np.array(one, dtype=np.int32) for one in (indptr, indices, order))
+    with pytest.raises(IndexError, match="no upper triangle"):
+        kernel.analyse(2, 1, 3, arrays, addresses)
+
+
 @every_back_end
 def test_one_analysis_many_factorisations(back_end):
     """Definite, indefinite and definite again: each answer belongs to the last matrix given."""
@@ -111,7 +150,7 @@ def test_one_analysis_many_factorisations(back_end):
         compare(factor, scaled, KEPT, 1e-10)
 
 
-@pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
+@pytest.mark.parametrize("back_end", WITH_PARDISO)
 @pytest.mark.parametrize(("stiff", "real", "rtol"), [(1.0, np.float32, 1e-5), (1e7, np.float64, 1e-9)])
 def test_single_precision_is_taken_where_it_moves_the_interior_alike(back_end, stiff, real, rtol):
     """A stiff chain on soft springs to the kept unknowns: as a whole it moves by what its pivots cancel."""
@@ -199,6 +238,7 @@ COLLECTED = """
 import contextvars, gc
 import numpy as np
 from evfem.newton.condensation import Pardiso
+from evfem.tissue.kernels.blocks import sparse_cholesky
 from evfem.tissue.pattern import Pattern
 
 others = [contextvars.ContextVar(str(k)) for k in range(3)]
@@ -229,7 +269,7 @@ def test_a_factorisation_may_be_collected_while_numpy_changes_its_error_state(ba
     assert printed(COLLECTED.replace("Pardiso", back_end.__name__)) == ""
 
 
-@pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
+@pytest.mark.parametrize("back_end", WITH_PARDISO)
 def test_a_call_to_the_library_asks_nothing_in_python(back_end):
     """What is interrupted while ctypes asks for an argument ends as an error of ctypes."""
     called = []
@@ -252,6 +292,7 @@ def test_where_all_unknowns_are_kept_memory_that_nobody_wrote_is_not_read():
     program = """
 import numpy as np
 from evfem.newton.condensation import make_condensation
+from evfem.tissue.kernels.blocks import sparse_cholesky
 from evfem.tissue.pattern import Pattern
 
 pattern = Pattern(np.arange(6)[None], 2)

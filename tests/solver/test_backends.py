@@ -16,10 +16,11 @@ HERE = Path(__file__).parent
 NAMES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
 NAMES += ("stored_energy", "min_gap")
 
+COMPILED = [f"evfem.tissue.kernels.{name}" for name in ("loops", "contact", "cholesky")]
 #: runs in a process of its own, in which they cannot be imported
 WITHOUT = """
 import json, sys
-for name in ("pypardiso", "evfem.tissue.kernels.loops", "evfem.tissue.kernels.contact"):
+for name in sys.argv[3:]:
     sys.modules[name] = None
 sys.path[:0] = json.loads(sys.argv[1])
 import test_backends
@@ -38,13 +39,17 @@ def numbers(element):
 
 
 @pytest.mark.parametrize("element", ["q2p1", "q1_fbar"])
+@pytest.mark.parametrize(
+    ("without", "solver"),
+    [(["pypardiso"], ("Cholesky", "compiled")), (["pypardiso", *COMPILED], ("SuperLU", "numpy"))],
+)
 @pytest.mark.slow
-def test_the_same_numbers_without_what_is_fast(element):
+def test_the_same_numbers_without_what_is_fast(element, without, solver):
     path = json.dumps([str(HERE), *sys.path])
-    command = [sys.executable, "-c", WITHOUT, path, element]
+    command = [sys.executable, "-c", WITHOUT, path, element, *without]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     slow, here = json.loads(done.stdout), numbers(element)
-    assert (slow["solver"]["backend"], slow["solver"]["cell_loops"]) == ("SuperLU", "numpy")
+    assert (slow["solver"]["backend"], slow["solver"]["cell_loops"]) == solver
     for name in NAMES:
         np.testing.assert_allclose(slow[name], here[name], rtol=1e-8, atol=1e-11)
     assert max(here["tangential_force"]) > 1e-3

@@ -62,13 +62,30 @@ def contact_loop() -> Any:
         return None
     if (library := mkl()) is not None:
         return partial(settle, ctypes.cast(library.dgesv, ctypes.c_void_p).value)
-    linalg()
-    from scipy.linalg import cython_lapack
+    return partial(settle, _address("lapack", "dgesv"))
 
-    capsule, python = cython_lapack.__pyx_capi__["dgesv"], ctypes.pythonapi
+
+@cache
+def sparse_cholesky() -> Any:
+    """The compiled sparse Cholesky factors, and the dense algebra of scipy that they take; None where they
+    were not built.
+    """
+    try:
+        kernel = import_module("evfem.tissue.kernels.cholesky")
+    except ImportError:
+        return None
+    names = ("dpotrf", "dtrsm", "dsyrk", "dgemv", "dtrsv")
+    return kernel, tuple(_address("lapack" if name == "dpotrf" else "blas", name) for name in names)
+
+
+def _address(library: str, name: str) -> int:
+    """Where a function of scipy's BLAS or LAPACK is in memory."""
+    linalg()
+    capsule = import_module(f"scipy.linalg.cython_{library}").__pyx_capi__[name]
+    python, own = ctypes.pythonapi, ctypes.py_object(capsule)
     python.PyCapsule_GetName.restype, python.PyCapsule_GetPointer.restype = ctypes.c_char_p, ctypes.c_void_p
-    own = ctypes.py_object(capsule)
-    return partial(settle, python.PyCapsule_GetPointer(own, python.PyCapsule_GetName(own)))
+    found: int = python.PyCapsule_GetPointer(own, python.PyCapsule_GetName(own))
+    return found
 
 
 def blocked(values: Any) -> Any:
