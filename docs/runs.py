@@ -53,7 +53,7 @@ def default_run(program: str) -> dict[str, float]:
 
 
 def loop_times(finger: ev.FingerPad | ev.Fingertip, force: float, steps: int) -> dict[str, float]:
-    """Steps of 0.02 mm under a voltage that changes, by SuperLU."""
+    """Steps of 0.02 mm under a voltage that changes, without PARDISO."""
     sys.modules["pypardiso"] = None  # type: ignore[assignment]
     begin = time.process_time()
     scene = ev.Scene(finger, ev.Display(friction=0.3), ev.Kaczmarek(), 0.0, [])

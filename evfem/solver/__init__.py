@@ -51,7 +51,7 @@ With `steps = "auto"` the length follows the difference of one substep and two h
 
 **3. A linear contact step** (`evfem.newton.factorised`; 2 to 4 name its neighbours). The tangent K of the
 tissue, often that of an earlier iterate, is condensed onto the nodes c that may touch and the bone
-(`linearisation`, `condensation`; PARDISO or SuperLU), and :math:`C = S_{cc}^{-1}`:
+(`linearisation`, `condensation`; PARDISO, own Cholesky factors or SuperLU), and :math:`C = S_{cc}^{-1}`:
 
 .. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta b = g_c + \lambda^+ - \lambda + \Delta f_{el}, \qquad
           S_{bc}\,\Delta u_c + S_{bb}\,\Delta b = g_b + F_b .
