@@ -127,7 +127,7 @@ LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm"}
 LATE |= {"distributed", "pyarrow", "pandas", "xarray", "SurfaceTopography", "netCDF4", "h5py", "vtkmodules"}
 LATE |= {"openpyxl"}
 #: compiled from C, without imports
-BUILT = {f"evfem.tissue.kernels.{name}" for name in ("loops", "solids", "contact")}
+BUILT = {f"evfem.tissue.kernels.{name}" for name in ("loops", "solids", "contact", "cholesky")}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 #: files of a folder beside its `__init__`, and lines
 MOST_FILES, MOST_LINES = 12, 3600

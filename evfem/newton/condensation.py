@@ -20,6 +20,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import chain, islice, repeat
 from typing import Any
 
 import numpy as np
@@ -281,10 +282,13 @@ Condensation = Pardiso | SuperLU
 _OTHER = ContextVar("_OTHER", default=False)
 
 
-def _kinds() -> list[type[Condensation]]:
+def _kinds() -> Iterator[type[Condensation]]:
     """What is installed, the fastest first; SuperLU always is."""
-    found: list[tuple[type[Condensation], Any]] = [(Pardiso, mkl), (Cholesky, sparse_cholesky)]
-    return [*(kind for kind, library in found if library() is not None), SuperLU]
+    if mkl() is not None:
+        yield Pardiso
+    if sparse_cholesky() is not None:
+        yield Cholesky
+    yield SuperLU
 
 
 @contextmanager
@@ -292,7 +296,8 @@ def other_solver() -> Iterator[str]:
     """Within, the second of the sparse solvers; yields its name, "" where there is one alone."""
     token = _OTHER.set(True)
     try:
-        yield kinds[1].__name__ if len(kinds := _kinds()) > 1 else ""
+        first, second = islice(chain(_kinds(), [SuperLU]), 2)
+        yield second.__name__ if second is not first else ""
     finally:
         _OTHER.reset(token)
 
@@ -301,5 +306,5 @@ def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bo
     """PARDISO where evfem[fast] is installed; else Cholesky factors, where there was a C compiler; else
     SuperLU, as where all unknowns are kept: PARDISO then reads memory that nobody has written.
     """
-    kinds = _kinds() if kept.size < pattern.size else [SuperLU]
-    return kinds[min(int(_OTHER.get()), len(kinds) - 1)](pattern, kept, threads, single)
+    kinds = chain(_kinds(), [SuperLU]) if kept.size < pattern.size else repeat(SuperLU)
+    return next(islice(kinds, int(_OTHER.get()), None))(pattern, kept, threads, single)
