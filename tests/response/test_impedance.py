@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.builders import coarse_pad, small_finger
 from tools.meshes import between, block, held
 from tools.solids import block as solid
 
@@ -116,8 +117,9 @@ DISPLAY = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.
 
 
 def sliding(surface=DISPLAY, law=None, voltage=0.0, **more):
-    finger = ev.FingerPad(ridges=False, resolution="coarse")
-    return ev.Scene(finger, surface, law, voltage, [PRESSED, SLID], solver=ev.Solver(tolerance=1e-10), **more)
+    return ev.Scene(
+        small_finger(), surface, law, voltage, [PRESSED, SLID], solver=ev.Solver(tolerance=1e-10), **more
+    )
 
 
 def slope(scene, axis, h=1e-5):
@@ -146,7 +148,10 @@ SCENES = {
     "attraction": (sliding(law=ev.Kaczmarek(), voltage=1000.0), "normal"),
     "Maxwell stress": (sliding(law=ev.Kaczmarek(), voltage=1000.0, direction="normal"), "normal"),
     "adhesion": (sliding(adhesion=ev.Dugdale(stress=0.002, reach=0.05)), "normal"),
-    "rough": (sliding(law=ev.Kaczmarek(), voltage=1000.0, roughness_gap=ROUGH), "normal"),
+    "rough": (
+        replace(sliding(law=ev.Kaczmarek(), voltage=1000.0, roughness_gap=ROUGH), finger=coarse_pad()),
+        "normal",
+    ),
 }
 
 

@@ -6,11 +6,18 @@ import evfem as ev
 from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.result import Saved
 from evfem.studies.stability.case import out_of_balance as balance
-from evfem.studies.stability.scenes import INSULATOR, SKIN, finger
+from evfem.studies.stability.scenes import INSULATOR, SKIN, block, finger
 from evfem.studies.stability.scenes import benchmark as benchmark_finger
 from evfem.studies.stability.scenes import pad as coarse_pad
 
-__all__ = ("INSULATOR", "SKIN", "balance", "benchmark_finger", "coarse_pad", "finger")
+__all__ = ("INSULATOR", "SKIN", "balance", "benchmark_finger", "coarse_pad", "finger", "small_finger")
+
+
+def small_finger():
+    """A block of 6 x 3 mm, round below, of 369 nodes in quadratic cells: a ninth of the coarse finger, for
+    what holds of every body.
+    """
+    return finger(block(20, 4, 6.0, 3.0, 0.6), E=0.05)
 
 
 def benchmark_scene(kind, level, element=None, steps=15):
