@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tools.builders import small_finger
 from tools.meshes import both_sides, contact_block, graded, parabola
 
 import evfem as ev
@@ -58,7 +59,7 @@ def test_every_way_leads_to_the_state_of_johnson_kendall_and_roberts():
 
 
 def pressed(friction=0.0, core="auto", law=None, voltage=100.0, **options):
-    finger = ev.FingerPad(ridges=False, resolution="coarse")
+    finger = small_finger(40, 3)
     display = ev.Display(ev.TOUCHSCREEN, friction=friction)
     motion = options.pop("motion", [ev.Press(force=0.05, steps=3)])
     solver = ev.Solver(core=core)

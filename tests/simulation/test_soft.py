@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from tools.builders import left_over, pad_state, unbalanced
+from tools.builders import coarse_pad, left_over, pad_state, small_finger, unbalanced
 from tools.domes import Dome, dome, dome_scene
 from tools.meshes import both_sides, contact_block, graded, parabola
 
@@ -12,7 +12,7 @@ import evfem as ev
 from evfem.reference import BondedLayer, CattaneoMindlin, HertzLine, plane_modulus, pull_in_strong_troxel
 
 SOFT = ev.ElasticLayer(E=0.2, nu=0.48, thickness=2.0)
-PAD = ev.FingerPad(ridges=False, resolution="coarse")
+PAD = small_finger(40, 3)
 
 
 def press(mesh, law, surface, *motion, **solver):
@@ -80,7 +80,7 @@ def test_two_elastic_bodies_of_cattaneo_and_mindlin():
         assert stick == pytest.approx(mindlin.stick_half_width, rel=0.04)
 
 
-DOME = Dome(dome((7, 3, 7)))
+DOME = Dome(dome((5, 3, 5)))
 IN_SPACE = [ev.Press(indentation=0.15, steps=2), ev.Slide(0.2, steps=2)]
 IN_PLANE = [ev.Press(indentation=0.6, steps=2), ev.Slide(1.0, steps=4)]
 
@@ -100,7 +100,7 @@ def test_the_width_of_contact_is_that_of_the_deformed_face():
     the face below them, which is drawn together, is 5 % less.
     """
     soft = ev.Flat(friction=0.8, elastic=ev.ElasticLayer(E=0.03, nu=0.45, thickness=4.0))
-    result = on_pad(soft, [ev.Press(indentation=1.5, steps=3)])
+    result = ev.simulate(ev.Scene(coarse_pad(), soft, motion=[ev.Press(indentation=1.5, steps=3)]))
     mesh, frame = result.mesh, result.frames[-1]
     pad = mesh.node_sets["pad"]
     x = (mesh.points + frame.displacement)[pad, 0]

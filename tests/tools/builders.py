@@ -13,11 +13,11 @@ from evfem.studies.stability.scenes import pad as coarse_pad
 __all__ = ("INSULATOR", "SKIN", "balance", "benchmark_finger", "coarse_pad", "finger", "small_finger")
 
 
-def small_finger():
-    """A block of 6 x 3 mm, round below, of 369 nodes in quadratic cells: a ninth of the coarse finger, for
-    what holds of every body.
+def small_finger(columns=20, rows=4):
+    """A block of 6 x 3 mm, round below, for what holds of every body: 369 nodes in quadratic cells, a ninth
+    of the coarse finger. Of 40 columns, its nodes are 0.075 mm apart.
     """
-    return finger(block(20, 4, 6.0, 3.0, 0.6), E=0.05)
+    return finger(block(columns, rows, 6.0, 3.0, 0.6), E=0.05)
 
 
 def benchmark_scene(kind, level, element=None, steps=15):
