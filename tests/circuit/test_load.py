@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import exp1
+from tools.builders import small_finger
 from tools.domes import dome_scene
 from tools.refusals import refuses
 
@@ -14,7 +15,7 @@ from evfem.finger.fingerpad import Electrical
 from evfem.simulation.model import make_model
 from evfem.simulation.run import Run
 
-PAD = ev.FingerPad(ridges=False, resolution="coarse")
+PAD, SMALL = ev.FingerPad(ridges=False, resolution="coarse"), small_finger(40, 3)
 SCREEN = ev.Display(insulator=ev.TOUCHSCREEN, friction=0.3)
 DRY = ev.Drive(frequency=1000.0, skin="gabriel_dry", gap_conductivity=1e-8)
 PRESS = ev.Press(force=0.05, steps=1)
@@ -122,9 +123,8 @@ CYCLES = (ev.Press(indentation=0.3, steps=1), ev.Wait(duration=2e-3, steps=80))
 
 @pytest.fixture(scope="module")
 def swinging():
-    return ev.simulate(
-        scene(drive=RESOLVED, voltage=ev.Sine(1000.0, 50.0 * 2**0.5), motion=CYCLES, roughness_gap=ROUGH)
-    )
+    sine = ev.Sine(1000.0, 50.0 * 2**0.5)
+    return ev.simulate(scene(RESOLVED, sine, CYCLES, SMALL, roughness_gap=ROUGH))
 
 
 def test_power_and_current_of_a_resolved_drive_are_those_of_its_source(swinging):
@@ -135,7 +135,8 @@ def test_power_and_current_of_a_resolved_drive_are_those_of_its_source(swinging)
     rate = np.diff(swinging.charge[-41:]) / 2.5e-5
     assert swinging.current_rms[last] == pytest.approx(np.abs(rate), rel=1e-9, abs=1e-12)
     # with the mean over the cycle: 40 steps of a period, and the start has decayed to a part
-    mean = ev.simulate(scene(drive=DRY, motion=ev.Press(indentation=0.3, steps=1), roughness_gap=ROUGH))
+    press = ev.Press(indentation=0.3, steps=1)
+    mean = ev.simulate(scene(motion=press, finger=SMALL, roughness_gap=ROUGH))
     rms = np.sqrt((swinging.current_rms[last] ** 2).mean())
     assert rms == pytest.approx(mean.current_rms[-1], rel=5e-3)
     assert swinging.power[last].mean() == pytest.approx(mean.power[-1], rel=2e-2)
