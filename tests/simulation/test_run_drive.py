@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.builders import small_finger
 from tools.meshes import block
 
 import evfem as ev
@@ -16,8 +17,8 @@ SCREEN = ev.Display(insulator=ev.TOUCHSCREEN, friction=0.4)
 FREQUENCY = 75.0
 
 
-def scene(drive, motion, voltage=70.0, **given):
-    finger = replace(SMOOTH, electrical=ELECTRICAL)
+def scene(drive, motion, voltage=70.0, finger=SMOOTH, **given):
+    finger = replace(finger, electrical=ELECTRICAL)
     return ev.Scene(finger, SCREEN, ev.StrongTroxel(), voltage, motion, drive=drive, **given)
 
 
@@ -51,10 +52,11 @@ def test_a_resolved_sine_has_the_mean_of_the_phasor():
     """A rigid pad whose charges follow within the cycle, beside the mean drive: the straight parts of
     the voltage cost (w h)^2 / 6.
     """
-    steps = 48
+    steps, finger = 48, small_finger()
     drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-4, resolved=True)
-    resolved = ev.simulate(scene(drive, [ev.Hover(2.0), ev.Wait(2.0 / FREQUENCY, steps=2 * steps)]))
-    mean = ev.simulate(scene(replace(drive, resolved=False), [ev.Hover(2.0)]))
+    motion = [ev.Hover(2.0), ev.Wait(2.0 / FREQUENCY, steps=2 * steps)]
+    resolved = ev.simulate(scene(drive, motion, finger=finger))
+    mean = ev.simulate(scene(replace(drive, resolved=False), motion[:1], finger=finger))
     last = resolved.electrostatic_force[-steps:]
     assert last.mean() == pytest.approx(mean.electrostatic_force[-1], rel=(2.0 * np.pi / steps) ** 2 / 3.0)
     pulse = np.fft.rfft(last)
