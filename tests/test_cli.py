@@ -97,7 +97,7 @@ def test_a_run_leaves_all_its_files_and_a_table(finished):
 def test_over_a_depth_a_run_is_told_in_newtons(place):
     text = SCENE.replace("[finger]", "[finger]\ndepth = 8.0")
     (place / "square.toml").write_text(text)
-    status, out, _ = run_process(place, "run", "square.toml", "--no-fields", "--no-plots")
+    status, out, _ = called(place, "run", "square.toml", "--no-fields", "--no-plots")
     assert status == 0
     force, lines = float(history(place / "square-out")[-1]["normal_force"]), out.splitlines()
     assert lines[1].split()[-4:] == ["N"] * 4
@@ -107,7 +107,7 @@ def test_over_a_depth_a_run_is_told_in_newtons(place):
 
 def test_a_load_that_drifts_is_told_after_the_run(place):
     (place / "square.toml").write_text(SCENE.replace("friction = 0.2", "friction = 1.2"))
-    _, out, _ = run_process(place, "run", "square.toml", "--no-fields", "--no-plots")
+    _, out, _ = called(place, "run", "square.toml", "--no-fields", "--no-plots")
     force = [float(row["applied_force"]) for row in history(place / "square-out")]
     drift = max(abs(f / force[1] - 1.0) for f in force[2:])
     assert drift > 0.05
@@ -396,7 +396,7 @@ def test_a_step_that_does_not_converge_keeps_what_went_before(place):
     crush = SCENE.replace("distance = 0.5\nsteps = 3", "distance = 0.5\nsteps = 2")
     crush += "[[motion]]\nkind = 'press'\nindentation = 1.99\nsteps = 1\n"
     (place / "square.toml").write_text(crush)
-    status, out, err = run_process(place, "run", "square.toml")
+    status, out, err = called(place, "run", "square.toml")
     assert status == 3
     message = err.splitlines()[-1]
     assert message.startswith("evfem: square.toml: step 5 did not converge (last residuals: ")
@@ -411,7 +411,7 @@ def test_a_step_that_does_not_converge_keeps_what_went_before(place):
 
 def test_a_folder_that_cannot_be_made_is_exit_status_4(place):
     (place / "file").write_text("not a folder")
-    status, out, err = run_process(place, "run", "square.toml", "--out", "file/results")
+    status, out, err = called(place, "run", "square.toml", "--out", "file/results")
     assert (status, out) == (4, "")
     assert err.count("\n") == 1  # before anything is computed
     assert "file/results" in err.splitlines()[-1]

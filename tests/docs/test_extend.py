@@ -168,11 +168,8 @@ def test_the_table_says_how_many_files_each_change_touches():
     assert max(told.values()) <= 3
 
 
-@pytest.mark.parametrize(
-    "use", [LAYER, COLUMN, WAVEFORM, OTHERS], ids=["layer", "column", "waveform", "others"]
-)
-def test_the_recipes_work_together_in_a_copy(copy, use):
+def test_the_recipes_work_together_in_a_copy(copy):
     head = (
         f"sys.path.insert(0, {str(copy)!r})\nimport evfem, evfem as ev\nassert {str(copy)!r} in ev.__file__\n"
     )
-    printed(head + use, copy)
+    printed(head + LAYER + COLUMN + WAVEFORM + OTHERS, copy)
