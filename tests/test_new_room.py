@@ -323,12 +323,13 @@ class Interrupt:
 def test_a_folder_goes_on_with_all_of_them_at_once(dim, tmp_path):
     """As `evfem run --resume`: two processes could not share more than the folder."""
     own = {"rooms": (Wetting(), Tethers()), "hand": MaxwellHand(0.02), "surface": flat(elastic=Creeping())}
+    own |= {"motion": motions(dim, 0.5)[:2]}
     scene = base(dim, **own)
     quiet = {"fields": False, "plots": False}
-    ev.simulate(scene, observers=[RunFolder(tmp_path, scene, **quiet), Interrupt(6)])
+    ev.simulate(scene, observers=[RunFolder(tmp_path, scene, **quiet), Interrupt(3)])
     scene = base(dim, **{**own, "rooms": (Wetting(), Tethers())})
     resume = saved(tmp_path, scene)
-    assert len(resume.rows) == 6
+    assert len(resume.rows) == 3
     folder = RunFolder(tmp_path, scene, resume=resume, **quiet)
     result = ev.simulate(scene, resume=resume, observers=[folder])
     folder.close(result)
