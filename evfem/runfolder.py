@@ -1,9 +1,11 @@
 """The folder of a run: history, fields, summary, picture and checkpoint, complete after every step.
 
 Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint to
-go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only files
-that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names
-(`evfem.sweeps.manifest`). `kept` and `saved` say what of an earlier run is there to go on from.
+go on from; what it was writing stays behind under a temporary name and is removed by the next run. Histories
+grow by a line at a time, which costs as much at the end of a long run as at its begin; a run that goes on
+first writes them whole, as its checkpoint has them. Only files that evfem wrote are ever replaced or removed:
+the folder's `.evfem-files` lists their names (`evfem.sweeps.manifest`). `kept` and `saved` say what of an
+earlier run is there to go on from.
 """
 
 from __future__ import annotations
@@ -21,12 +23,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.notices import LOG
-from evfem.common.storage import disk, refuse_others, replacing, write_text
+from evfem.common.storage import GrowingText, disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
-from evfem.simulation.checkpoint import ANOTHER, Checkpoint
+from evfem.simulation.checkpoint import ANOTHER, Checkpoint, rows_of
 from evfem.simulation.checkpoint import PROBES as AT_PROBES
 from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import columns_of, csv_header, csv_line, read_rows
@@ -47,7 +49,8 @@ FIELDS, PICTURE, STATE = "fields.pvd", "forces.png", "checkpoint.npz"
 #: of a finger in three dimensions: its skin alone, beside the fields of the solid
 SKIN = "skin.pvd"
 OURS = re.compile(
-    r"history\.csv|probes\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png|checkpoint\.npz"
+    r"history\.csv|probes\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png"
+    r"|checkpoint\.npz|\.checkpoint\.rows"
 )
 #: what a killed run was writing
 LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
@@ -71,8 +74,6 @@ class RunFolder:
     files: FieldFiles | None = field(default=None, init=False)
     _series: tuple[ParaViewSeries, ...] = field(default=(), init=False)
     _digest: str = field(default="", init=False)
-    _lines: list[str] = field(default_factory=list, init=False)
-    _probe_lines: list[str] = field(default_factory=list, init=False)
     _pending: tuple[Row, Frame | None, Callable[[], dict[str, Any]]] | None = field(default=None, init=False)
 
     def started(self, mesh: Mesh, scene: Scene, total_steps: int) -> None:
@@ -104,6 +105,14 @@ class RunFolder:
     def _manifest(self) -> Manifest:
         return Manifest(self.path / MANIFEST, OURS)
 
+    @cached_property
+    def _history(self) -> GrowingText:
+        return GrowingText(self.path / HISTORY)
+
+    @cached_property
+    def _probes(self) -> GrowingText:
+        return GrowingText(self.path / PROBES)
+
     @property
     def begun(self) -> bool:
         """Whether a step has converged, so that there is something to keep."""
@@ -115,17 +124,24 @@ class RunFolder:
         row, frame, checkpoint = self._pending
         if not self.opened:
             self._open()
-        if frame is not None and self._wants(row):
+        shown = frame is not None and self._wants(row)
+        if frame is not None and shown:
             self._add(row, frame)
         state = checkpoint()
         if not self.rows or self.rows[-1]["step"] != row["step"]:
-            with self._manifest.writing(self.path / STATE):
-                self._checkpoint.write(self._digest, state, [*self.rows, row])
+            self._write_checkpoint(state, [*self.rows, row])
             self.rows.append(row)
         self._write_probes(state.get(AT_PROBES))
         self._write_history()
-        self._write_index(self._series)
+        if shown:
+            self._write_index(self._series)
         self._pending = None
+
+    def _write_checkpoint(self, state: dict[str, Any], rows: Sequence[Row]) -> None:
+        with self._manifest.writing(rows_of(self.path / STATE)):
+            self._checkpoint.add_rows(state, rows)
+        with self._manifest.writing(self.path / STATE):
+            self._checkpoint.write(self._digest, state, rows)
 
     def _add(self, row: Row, frame: Frame) -> None:
         assert self.mesh is not None
@@ -142,10 +158,10 @@ class RunFolder:
         return self.files is not None and self.files.wants(row["step"])
 
     def _write_history(self) -> None:
-        self._lines += [csv_line(row) for row in self.rows[len(self._lines) :]]
-        header = csv_header(columns_of(self.rows[0])) if self.rows else csv_header()
+        rows = self.rows
+        header = csv_header(columns_of(rows[0])) if rows else csv_header()
         with self._manifest.writing(self.path / HISTORY):
-            write_text(self.path / HISTORY, header + "".join(self._lines))
+            self._history.write(header, len(rows), lambda k: csv_line(rows[k]))
 
     def _write_probes(self, values: Floats | None) -> None:
         """What was found at the probes' points (S, P, K) after every step, where the scene has some."""
@@ -153,12 +169,10 @@ class RunFolder:
             return
         from evfem.scene import probes
 
-        wanted, done = self.scene.output.probes, len(self._probe_lines)
-        new = zip(self.rows[done:], values[done:], strict=True)
-        self._probe_lines += [probes.csv_lines(wanted, row, one) for row, one in new]
+        wanted, rows = self.scene.output.probes, self.rows
         with self._manifest.writing(self.path / PROBES):
-            header = probes.csv_header(self.mesh.dim)
-            write_text(self.path / PROBES, header + "".join(self._probe_lines))
+            lines = lambda k: probes.csv_lines(wanted, rows[k], values[k])  # noqa: E731
+            self._probes.write(probes.csv_header(self.mesh.dim), len(rows), lines)
 
     def close(self, result: Result | None) -> dict[str, Any]:
         """Write history, summary and picture of what has converged; returns the summary.
@@ -250,6 +264,8 @@ class RunFolder:
             _remove_left(self.path)
         self._series = self._paraview()
         self._write_history()
+        if self.resume:  # a kill leaves the index a step behind
+            self._write_index(self._series)
         self.opened = True
 
     def _paraview(self) -> tuple[ParaViewSeries, ...]:

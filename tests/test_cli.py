@@ -39,7 +39,7 @@ distance = 0.5
 steps = 3
 """
 MANY_STEPS = SCENE.replace("steps = 3", "steps = 30").replace("every = 2", "every = 1")
-RESULTS = ["checkpoint.npz", "fields.pvd", "forces.png", "history.csv", "summary.json"]
+RESULTS = [".checkpoint.rows", "checkpoint.npz", "fields.pvd", "forces.png", "history.csv", "summary.json"]
 
 
 def history(folder):
@@ -132,7 +132,8 @@ def test_another_scene_replaces_results_only_when_told_and_leaves_other_files_al
     )
     assert contents(place / "here") == before
     assert called(place, *words, "--overwrite")[0] == 0
-    kept = [".evfem-files", "checkpoint.npz", "fields.vtu", "history.csv", "notes.txt", "summary.json"]
+    kept = [".checkpoint.rows", ".evfem-files", "checkpoint.npz", "fields.vtu", "history.csv"]
+    kept += ["notes.txt", "summary.json"]
     assert files(place / "here") == kept
     assert (place / "here" / "notes.txt").read_text() == "mine"
     assert len(history(place / "here")) == 3

@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import time
+import zlib
 from pathlib import Path
 from random import Random
 
@@ -16,9 +17,9 @@ from tools.commands import called, contents, run_process
 
 import evfem
 from evfem import runfolder
-from evfem.common.storage import load_arrays, save_arrays
+from evfem.common.storage import load_arrays, packed, save_arrays, unpacked
 from evfem.scene.file import load
-from evfem.simulation.checkpoint import CHECKPOINT_FORMAT
+from evfem.simulation.checkpoint import CHECKPOINT_FORMAT, rows_of
 from evfem.simulation.history import csv_header
 from evfem.simulation.result import COLUMNS
 from evfem.simulation.run import simulate
@@ -106,17 +107,26 @@ def run(place, *more):
     return status, error
 
 
-def replaced(path, **changes):
-    """The same archive with some arrays changed or, where None, left out; its checksums right."""
-    arrays = load_arrays(path, "checkpoint", CHECKPOINT_FORMAT)
-    arrays |= {name.replace("__", "/"): a for name, a in changes.items()}
-    save_arrays(path, {name: array for name, array in arrays.items() if array is not None})
+def replaced(path, state=None, **changes):
+    """The same checkpoint with some arrays, or some of its state, changed or, where None, left out; its
+    checksums right.
+    """
+    arrays = load_arrays(path, "checkpoint", CHECKPOINT_FORMAT) | changes
+    arrays |= packed({name: a for name, a in (unpacked(arrays) | (state or {})).items() if a is not None})
+    save_arrays(path, arrays)
+
+
+def rows_replaced(path, lines):
+    """Its rows are these lines, and it counts them."""
+    data = "".join(f"{line}\n" for line in lines).encode()
+    rows_of(path).write_bytes(data)
+    replaced(path, rows=np.array([len(lines), len(data), zlib.crc32(data)]))
 
 
 def row_changed(path, change):
-    rows = json.loads(str(load_arrays(path, "checkpoint", CHECKPOINT_FORMAT)["rows"]))
+    rows = [json.loads(line)[0] for line in rows_of(path).read_text().splitlines()]
     change(rows)
-    replaced(path, rows=np.array(json.dumps(rows)))
+    rows_replaced(path, [json.dumps([row, []]) for row in rows])
 
 
 def flipped(path, at):
@@ -141,17 +151,17 @@ DAMAGES = {
     ),
     "another version": (lambda p: replaced(p, version=np.array("0.0.1")), NOT_OURS),
     "another scene": (lambda p: replaced(p, scene=np.array("0" * 64)), "another scene"),
-    "no state": (lambda p: replaced(p, state__u=np.zeros(0)), "no usable u"),
-    "lacking": (lambda p: replaced(p, state__reaction=None), "no usable reaction"),
-    "another kind": (lambda p: replaced(p, state__status=np.zeros(25)), "no usable status"),
-    "node -1": (lambda p: replaced(p, state__candidates=np.array([-1, 2])), "no usable candidates"),
-    "text": (lambda p: replaced(p, state__time=np.array("now")), "no usable time"),
-    "not finite": (lambda p: replaced(p, state__time=np.array(np.nan)), "no usable time"),
-    "nodes elsewhere": (lambda p: replaced(p, state__candidates=np.array([3, 9999])), "no usable candidates"),
-    "nodes twice": (lambda p: replaced(p, state__candidates=np.array([3, 3])), "no usable candidates"),
-    "status 7": (lambda p: replaced(p, state__status=np.full(25, 7)), "no usable status"),
-    "part 0": (lambda p: replaced(p, state__substep=np.array(0.0)), "no usable substep"),
-    "part 1.5": (lambda p: replaced(p, state__substep=np.array(1.5)), "no usable substep"),
+    "no state": (lambda p: replaced(p, {"u": np.zeros(0)}), "no usable u"),
+    "lacking": (lambda p: replaced(p, {"reaction": None}), "no usable reaction"),
+    "another kind": (lambda p: replaced(p, {"status": np.zeros(25)}), "no usable status"),
+    "node -1": (lambda p: replaced(p, {"candidates": np.array([-1, 2])}), "no usable candidates"),
+    "text": (lambda p: replaced(p, {"time": np.array("now")}), "no plain array time"),
+    "not finite": (lambda p: replaced(p, {"time": np.array(np.nan)}), "no usable time"),
+    "nodes elsewhere": (lambda p: replaced(p, {"candidates": np.array([3, 9999])}), "no usable candidates"),
+    "nodes twice": (lambda p: replaced(p, {"candidates": np.array([3, 3])}), "no usable candidates"),
+    "status 7": (lambda p: replaced(p, {"status": np.full(25, 7)}), "no usable status"),
+    "part 0": (lambda p: replaced(p, {"substep": np.array(0.0)}), "no usable substep"),
+    "part 1.5": (lambda p: replaced(p, {"substep": np.array(1.5)}), "no usable substep"),
     "column lost": (
         lambda p: row_changed(p, lambda rows: [row.pop("min_gap") for row in rows]),
         "of another version: without the columns min_gap;",
@@ -165,8 +175,17 @@ DAMAGES = {
     "row lost": (lambda p: row_changed(p, lambda rows: rows.pop(2)), "damaged"),
     "row not finite": (lambda p: row_changed(p, lambda rows: rows[6].update(position=1e999)), "damaged"),
     "row of text": (lambda p: row_changed(p, lambda rows: rows[1].update(time="x")), "damaged"),
-    "rows of another kind": (lambda p: replaced(p, rows=np.array("{}")), "damaged"),
-    "rows too deep": (lambda p: replaced(p, rows=np.array("[" * 99999)), "damaged"),
+    "rows of another kind": (lambda p: rows_replaced(p, ["{}"] * 7), "damaged"),
+    "rows too deep": (lambda p: rows_replaced(p, ["[" * 99999]), "damaged"),
+    "rows uncounted": (lambda p: replaced(p, rows=np.array("{}")), "damaged"),
+    "rows miscounted": (lambda p: replaced(p, rows=np.array([1, 2, 3])), "damaged: the rows in .check"),
+    "rows lost": (lambda p: rows_of(p).unlink(), "damaged: the rows in .checkpoint.rows"),
+    "rows cut off": (lambda p: os.truncate(rows_of(p), 99), "damaged: the rows in .checkpoint.rows"),
+    "rows flipped": (lambda p: flipped(rows_of(p), 0.5), "damaged: the rows in .checkpoint.rows"),
+    "no layout": (
+        lambda p: save_arrays(p, load_arrays(p, "p", CHECKPOINT_FORMAT) | {"layout": np.array("[1]")}),
+        "damaged",
+    ),
     "more rows than steps": (
         lambda p: row_changed(p, lambda rows: rows.extend([rows[-1] | {"step": k} for k in range(8, 99)])),
         "98 steps",
@@ -198,7 +217,7 @@ def test_a_run_killed_before_its_first_step_was_stored_begins_again(place, writt
     (place / "stopped" / ".history.csv.123.tmp").write_text("half")
     status, error = run(place, "--no-fields", *more)
     assert status == 0, error
-    names = [".evfem-files", "checkpoint.npz", "history.csv", "summary.json"]
+    names = [".checkpoint.rows", ".evfem-files", "checkpoint.npz", "history.csv", "summary.json"]
     assert sorted(contents(place / "stopped")) == names
 
 
@@ -232,7 +251,10 @@ class Full:
     def __init__(self, room, monkeypatch):
         self.room = room
         self.real = {"write_text": Path.write_text, "write": np.lib.format.write_array}
+        self.real |= {"write_bytes": Path.write_bytes, "open": Path.open}
         monkeypatch.setattr(Path, "write_text", lambda *a, **k: self.text(*a, **k))
+        monkeypatch.setattr(Path, "write_bytes", lambda path, data: self.bytes(path, data))
+        monkeypatch.setattr(Path, "open", lambda path, mode="r", *a, **k: self.opened(path, mode, *a, **k))
         monkeypatch.setattr(np.lib.format, "write_array", lambda *a, **k: self.array(*a, **k))
         monkeypatch.setattr("meshio.vtu._vtu.write", self.fields(__import__("meshio").vtu._vtu.write))
 
@@ -244,6 +266,20 @@ class Full:
         if self.take():
             return self.real["write_text"](path, text, **more)
         self.real["write_text"](path, text[: len(text) // 2], **more)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def bytes(self, path, data):
+        if self.take():
+            return self.real["write_bytes"](path, data)
+        self.real["write_bytes"](path, data[: len(data) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def opened(self, path, mode, *words, **more):
+        if mode != "ab" or self.take():
+            return self.real["open"](path, mode, *words, **more)
+        half = self.real["open"](path, mode, *words, **more)
+        half.write(b"1,2,pre")
+        half.close()
         raise OSError(errno.ENOSPC, "No space left on device")
 
     def array(self, file, array, **more):
@@ -262,7 +298,7 @@ class Full:
         return wrapped
 
 
-@pytest.mark.parametrize("room", [0, 1, 2, 3, 11, 20, 23, 24, 25, 29, 50])
+@pytest.mark.parametrize("room", [*range(14), 20, 23, 29, 50])
 def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_later(
     place, whole, monkeypatch, room
 ):

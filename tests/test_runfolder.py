@@ -15,10 +15,11 @@ from tools.meshes import square_mesh
 
 from evfem import export
 from evfem.common import notices
+from evfem.common.storage import GrowingText
 from evfem.errors import InputError, StorageError
 from evfem.export import FieldFiles
 from evfem.finger.fingerpad import FingerPad
-from evfem.runfolder import RunFolder
+from evfem.runfolder import RunFolder, saved
 from evfem.scene.scene import Output, default_scene
 from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.result import Result
@@ -119,12 +120,90 @@ def kill(monkeypatch):
 
             return wrapped
 
-        changes = {Path: ("touch", "unlink", "write_text"), os: ("replace",), folder.Manifest: ("_append",)}
+        changes = {Path: ("touch", "unlink", "write_text", "write_bytes"), os: ("replace",)}
+        changes |= {folder.Manifest: ("_append",), GrowingText: ("_append",)}
         for owner, names in changes.items():
             for name in names:
                 monkeypatch.setattr(owner, name, counted(getattr(owner, name)))
 
     return at
+
+
+@pytest.fixture
+def torn(monkeypatch):
+    """Lets so many lines pass that are added to files; a kill comes in the middle of the next."""
+
+    def at(room):
+        added = GrowingText._append
+
+        def half(self, data):
+            nonlocal room
+            room -= 1
+            if room < 0:
+                with self.path.open("ab") as file:
+                    file.write(data[: len(data) // 2])
+                raise Killed
+            added(self, data)
+
+        monkeypatch.setattr(GrowingText, "_append", half)
+
+    return at
+
+
+@pytest.mark.parametrize("room", range(6))
+def test_a_run_killed_within_a_line_goes_on_as_if_that_had_not_been_begun(tmp_path, monkeypatch, torn, room):
+    """Of each step a line of the checkpoint is added, and one of the history, each but for the first ones."""
+    torn(room)
+    with suppress(Killed):
+        take(started(tmp_path, plots=False), 1, 2, 3, 4)
+    monkeypatch.undo()
+    left = saved(tmp_path, SCENE)
+    done = len(left.rows)
+    assert done == 1 + room // 2  # a line of the history comes after the checkpoint, which counts
+    assert left.arrays["u"].tolist() == [float(done)] * 3
+    take(started(tmp_path, plots=False, resume=left), *range(done + 1, 5))
+    assert steps_on_disk(tmp_path) == ([1, 2, 3, 4],) * 4
+    take(started(tmp_path / "whole", plots=False), 1, 2, 3, 4)
+    for name in ("history.csv", ".checkpoint.rows"):
+        assert (tmp_path / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_fields_from_before_a_kill_are_in_the_index_at_once(tmp_path, monkeypatch):
+    take(folder := started(tmp_path, plots=False), 1)
+    monkeypatch.setattr(export.ParaViewSeries, "write_index", lambda self: (_ for _ in ()).throw(Killed))
+    with suppress(Killed):
+        take(folder, 2)
+    monkeypatch.undo()
+    again = started(tmp_path, plots=False, resume=saved(tmp_path, SCENE))
+    again.step(fake_row(3), None, state(3))
+    assert steps_on_disk(tmp_path) == ([1, 2, 3], [1, 2], [1, 2], [1, 2, 3])
+
+
+def test_a_step_writes_as_much_however_many_there_were(tmp_path):
+    folder, names = started(tmp_path, fields=False), ("history.csv", ".checkpoint.rows", "checkpoint.npz")
+    sizes = []
+    for step in range(1, 100):
+        take(folder, step)
+        sizes.append([(tmp_path / name).stat().st_size for name in names])
+        if step == 2:
+            begun = [(tmp_path / name).stat().st_ino for name in names[:2]]
+    assert [(tmp_path / name).stat().st_ino for name in names[:2]] == begun  # added to, not replaced
+    grown = np.diff(sizes, axis=0)
+    assert (
+        grown[1:, :2].max(axis=0) < 1.2 * grown[1:, :2].min(axis=0)
+    ).all()  # a row, with more or fewer digits
+    assert not grown[:, 2].any()
+
+
+def test_a_history_that_somebody_changed_is_written_whole(tmp_path):
+    folder = started(tmp_path, fields=False)
+    take(folder, 1, 2)
+    (tmp_path / "history.csv").write_text("mine")
+    take(folder, 3)
+    (tmp_path / "history.csv").unlink()
+    take(folder, 4)
+    rows = (tmp_path / "history.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[0] for row in rows] == ["1", "2", "3", "4"]
 
 
 @pytest.mark.parametrize("before", [False, True])
@@ -139,6 +218,7 @@ def test_whenever_a_kill_comes_it_is_known_whose_a_file_is(tmp_path, monkeypatch
         take(started(out, plots=False), 1)
     monkeypatch.undo()
     names = ["checkpoint.npz", "fields.pvd", "fields_00001.vtu", "fields_00002.vtu", "history.csv"]
+    names.append(".checkpoint.rows")
     for name in [name for name in names if out.exists() and not (out / name).exists()]:
         there = shutil.copytree(out, tmp_path / name)
         (there / name).write_text("mine")

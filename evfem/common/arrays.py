@@ -29,6 +29,32 @@ Floats = NDArray[np.float64]
 Words = NDArray[np.str_]
 
 
+class GrowingRows:
+    """An array (k, ...) that grows by a row at a time; what `values` gave before stays as it is.
+
+    >>> grown = GrowingRows(np.zeros((0, 2)))
+    >>> grown.add(np.array([1.0, 2.0]))
+    >>> grown.values.tolist()
+    [[1.0, 2.0]]
+    """
+
+    def __init__(self, rows: Floats) -> None:
+        self._room, self._count = np.array(rows), len(rows)
+
+    @property
+    def values(self) -> Floats:
+        """The rows so far."""
+        return self._room[: self._count]
+
+    def add(self, row: Floats) -> None:
+        """One more; the room is doubled where it is full."""
+        if self._count == len(self._room):
+            more = np.empty((self._count + 1, *self._room.shape[1:]))
+            self._room = np.concatenate([self._room, more])
+        self._room[self._count] = row
+        self._count += 1
+
+
 class DenseSolver:
     """Solves dense systems one after the other; the factors of a large one serve the next with its unknowns.
 

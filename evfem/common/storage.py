@@ -1,20 +1,24 @@
 """Atomic writes: a file is written under a temporary name and then moved to its path in one step.
 
 This holds when the process is killed at any moment and when the disk is full; nothing is forced
-through the disk's own cache, so a power failure may cost the last steps. `alone_in` keeps other
-processes out of a folder.
+through the disk's own cache, so a power failure may cost the last steps. Text that grows with a run is
+added to its file line by line (`GrowingText`). `alone_in` keeps other processes out of a folder.
 """
 
 from __future__ import annotations
 
 import errno
+import json
 import math
 import os
 import warnings
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +72,54 @@ def write_text(path: str | Path, text: str) -> None:
     """Write `text` to `path` in one step (UTF-8)."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+@dataclass
+class GrowingText:
+    """A text file that grows by lines at its end, so that a line costs the same however many there are.
+
+    It is written whole, in one step, where it is not as it was left: at first, under another `head`, and
+    where somebody else has changed its size. A line that the disk refuses is taken back; of a line in which
+    a kill came a part may stay, which is beyond `size` (bytes), and `check` is the checksum of so many.
+    """
+
+    path: Path
+    head: str = field(default="", init=False)
+    lines: int = field(default=0, init=False)
+    size: int = field(default=-1, init=False)
+    check: int = field(default=0, init=False)
+
+    def write(self, head: str, number: int, line: Callable[[int], str]) -> None:
+        """The file has `head` and the lines 0 to `number`, ends included; what is there already is kept."""
+        with disk(f"write {self.path}"):
+            kept = self._kept(head, number)
+            first = self.lines if kept else 0
+            data = "".join(line(k) for k in range(first, number)).encode()
+            if not kept:
+                data = head.encode() + data
+                with replacing(self.path) as temporary:
+                    temporary.write_bytes(data)
+            elif data:
+                self._append(data)
+        self.check = zlib.crc32(data, self.check if kept else 0)
+        self.size = len(data) + (self.size if kept else 0)
+        self.head, self.lines = head, number
+
+    def _kept(self, head: str, number: int) -> bool:
+        if head != self.head or number < self.lines:
+            return False
+        with suppress(FileNotFoundError):
+            return self.path.stat().st_size == self.size
+        return False
+
+    def _append(self, data: bytes) -> None:
+        try:
+            with self.path.open("ab") as file:
+                file.write(data)
+        except BaseException:
+            with suppress(OSError):
+                os.truncate(self.path, self.size)
+            raise
 
 
 @contextmanager
@@ -141,6 +193,34 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
         for name, array in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
+
+
+def packed(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Arrays of numbers as two, the bytes of all and their `layout`, for a member of an archive costs more
+    than what is in a small one; an array that is there twice, under two names, is kept once.
+    """
+    layout, parts, at = list[list[Any]](), dict[int, tuple[bytes, int]](), 0
+    for name, array in arrays.items():
+        if id(array) not in parts:
+            parts[id(array)] = array.tobytes(), at
+            at += array.nbytes
+        layout.append([name, array.dtype.str, array.shape, parts[id(array)][1]])
+    data = np.frombuffer(b"".join(part for part, _ in parts.values()), dtype=np.uint8)
+    return {"layout": np.array(json.dumps(layout)), "data": data}
+
+
+def unpacked(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What was `packed`; KeyError, TypeError or ValueError for anything else."""
+    found, data = dict[str, np.ndarray](), arrays["data"].tobytes()
+    for name, kind, shape, at in json.loads(str(arrays["layout"])):
+        dtype = np.dtype(str(kind))
+        count = math.prod(shape)
+        if dtype.kind not in "biuf" or not all(type(size) is int and size >= 0 for size in (at, *shape)):
+            raise ValueError(f"no plain array {name}")
+        found[str(name)] = (
+            np.frombuffer(data, dtype, count, at).reshape(shape).astype(dtype.newbyteorder("="))
+        )
+    return found
 
 
 def format_of(path: str | Path) -> str:

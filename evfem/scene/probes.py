@@ -274,13 +274,14 @@ class Probes:
             return law
         return FormLaw(law.form, SimpleNamespace(x=self.points[own].T[..., None], n=None, law=None))
 
-    def stacked(self, several: Sequence[Floats]) -> Floats:
-        """The numbers of several steps (S, P, K)."""
-        return np.array(several).reshape(-1, len(self.points), len(columns(self.space.dim)))
+    @property
+    def none(self) -> Floats:
+        """The numbers (0, P, K) of no step."""
+        return np.zeros((0, len(self.points), len(columns(self.space.dim))))
 
-    def histories(self, several: Sequence[Floats]) -> dict[str, ProbeHistory]:
-        """The history of each probe from the numbers of several steps."""
-        return histories(self.wanted, self.space.dim, self.stacked(several))
+    def histories(self, several: Floats) -> dict[str, ProbeHistory]:
+        """The history of each probe from the numbers (S, P, K) of several steps."""
+        return histories(self.wanted, self.space.dim, several)
 
     def at(self, u: Floats, memory: Mapping[str, Floats]) -> Floats:
         """The numbers (P, K) of `columns` at displacements u (N, d) and the `memory` of a state."""

@@ -4,13 +4,20 @@ Beside the state a run carries over from step to step: the contact candidates, t
 the works so far with the forces that they go on from, and a factorisation made some steps ago. Of the last
 one the checkpoint keeps where it was made; a resumed run makes it there again, and the iterations that follow
 are the same to the last bit (with one thread, on the same machine and backend).
+
+What grows with the run, its rows and what probes found, is in a file beside that of the state, to which each
+step adds a line. The line is written first; the file of the state, replaced after it, says how many bytes of
+the other count, and their checksum. So a kill between the two, or within a line, loses nothing.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
+import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -18,8 +25,8 @@ from typing import Any
 import numpy as np
 
 import evfem
-from evfem.common.checks import to_python
-from evfem.common.storage import load_arrays, save_arrays
+from evfem.common.checks import set_frozen, to_python
+from evfem.common.storage import GrowingText, disk, load_arrays, packed, save_arrays, unpacked
 from evfem.errors import InputError
 from evfem.newton.state import Beginning, Reusable, State, TangentPoint
 from evfem.simulation.history import COLUMNS, NEEDED, columns_of
@@ -29,7 +36,7 @@ from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import EnergyState
 from evfem.terms.tractions import pull_off_of
 
-CHECKPOINT_FORMAT = "evfem-checkpoint-9"
+CHECKPOINT_FORMAT = "evfem-checkpoint-10"
 ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
@@ -149,27 +156,39 @@ def state_of(arrays: Mapping[str, np.ndarray]) -> State:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A file with the state after the last converged step of a run, from which the run can go on.
+    """The state after the last converged step of a run, from which the run can go on, in the file `path`, and
+    its `rows` in another.
 
-    The same object writes the rows of earlier steps again without making their text anew.
+    The same object adds to what it has written of the rows.
     """
 
     path: Path
-    _texts: list[tuple[Row, str]] = field(default_factory=list, repr=False, compare=False)
+    _grown: GrowingText = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        set_frozen(self, _grown=GrowingText(rows_of(self.path)))
 
     def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
         """Store the state in one step; the file before stays as it is if the disk refuses (StorageError)."""
+        self.add_rows(arrays, rows)
         header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
         header["version"] = np.array(evfem.__version__)
-        header["rows"] = np.array(self._text_of(rows))
-        save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
+        header["rows"] = np.array([len(rows), self._grown.size, self._grown.check])
+        state = {name: np.asarray(array) for name, array in arrays.items()}
+        state.pop(PROBES, None)
+        save_arrays(self.path, header | packed(state))
 
-    def _text_of(self, rows: Sequence[Row]) -> str:
-        pairs = zip(rows, self._texts, strict=False)
-        same = next((i for i, (row, known) in enumerate(pairs) if row is not known[0]), len(self._texts))
-        new = [(row, json.dumps({name: to_python(v) for name, v in row.items()})) for row in rows[same:]]
-        self._texts[same:] = new
-        return f"[{', '.join(text for _, text in self._texts[: len(rows)])}]"
+    def add_rows(self, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
+        """Store rows and what probes found; those stored by this object stay what they were. They count from
+        the next `write` on.
+        """
+        found = arrays.get(PROBES, np.zeros((len(rows), 0)))
+
+        def line(k: int) -> str:
+            row = {name: to_python(value) for name, value in rows[k].items()}
+            return json.dumps([row, found[k].tolist()]) + "\n"
+
+        self._grown.write("", len(rows), line)
 
     def read(self, scene_digest: str) -> Saved:
         """The state of the same scene. InputError for another scene's, another version's, a damaged file."""
@@ -177,11 +196,12 @@ class Checkpoint:
         arrays = load_arrays(self.path, "checkpoint", CHECKPOINT_FORMAT)
         try:
             owner, version = str(arrays["scene"]), str(arrays["version"])
-            rows = json.loads(str(arrays["rows"]))
+            rows, probes = _lines(self._grown.path, *(int(one) for one in arrays["rows"]))
+            state = {**unpacked(arrays), PROBES: np.array(probes)}
             odd = sorted({*COLUMNS} - {*rows[0]}) if rows and not columns_of(rows[0]) else []
             if owner == scene_digest and not odd:
                 _check_rows(rows)
-        except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
+        except (KeyError, ValueError, TypeError, AttributeError, IndexError, RecursionError) as error:
             raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
         if version != evfem.__version__:
             found = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
@@ -191,8 +211,30 @@ class Checkpoint:
         if odd:
             found = f"{self.path}, of another version: without the columns {', '.join(odd)}"
             raise InputError("checkpoint", found, allowed)
-        state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
         return Saved(state, rows)
+
+
+def rows_of(path: Path) -> Path:
+    """The file with the rows of the checkpoint `path`.
+
+    >>> rows_of(Path("checkpoint.npz")).name
+    '.checkpoint.rows'
+    """
+    return path.with_name(f".{path.stem}.rows")
+
+
+def _lines(path: Path, number: int, size: int, check: int) -> tuple[list[dict[str, Any]], list[Any]]:
+    """The rows in the first `size` bytes of a file, and what probes found; ValueError where that is not what
+    a checkpoint counted.
+    """
+    with disk(f"read {path}"), suppress(FileNotFoundError), path.open("rb") as file:
+        whole = os.fstat(file.fileno()).st_size >= size >= 0
+        data = file.read(size) if whole else b""
+        if whole and zlib.crc32(data) == check:
+            lines = [json.loads(line) for line in data.splitlines()]
+            if len(lines) == number:
+                return [line[0] for line in lines], [line[1] for line in lines]
+    raise ValueError(f"the rows in {path.name}")
 
 
 def _check_rows(rows: Any) -> None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common import notices
-from evfem.common.arrays import Floats, blas_limits
+from evfem.common.arrays import Floats, GrowingRows, blas_limits
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
 from evfem.common.rooms import begun
@@ -199,7 +199,7 @@ class Run:
             from evfem.scene.probes import Probes
 
             self.probes = Probes(scene.output.probes, self.model.body)
-        self.probed: list[Floats] = []
+        self.probed = GrowingRows(np.zeros((0, 0)) if self.probes is None else self.probes.none)
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
@@ -228,7 +228,11 @@ class Run:
         run.stepper = replace(
             self.stepper, equilibrium=model.equilibrium, body=model.body, rise=partial(climb, model)
         )
-        run.rows, run.frames, run.probed = self.rows.copy(), self.frames.copy(), self.probed.copy()
+        run.rows, run.frames, run.probed = (
+            self.rows.copy(),
+            self.frames.copy(),
+            GrowingRows(self.probed.values),
+        )
         return run
 
     # -- from motions to targets
@@ -370,7 +374,7 @@ class Run:
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if self.probes is not None:
-            self.probed.append(self.probes.at(self.model.body.whole(self.state.u), self.state.memory))
+            self.probed.add(self.probes.at(self.model.body.whole(self.state.u), self.state.memory))
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
@@ -417,7 +421,7 @@ class Run:
         if further := [one for one in self.model.columns if one.name not in ROOM_COLUMNS]:
             about["columns"] = [[one.name, one.unit, one.meaning] for one in further]
         about["warnings"] = [*said, *doubtful(self.scene, self.rows)]
-        probes = None if self.probes is None else self.probes.histories(self.probed)
+        probes = None if self.probes is None else self.probes.histories(self.probed.values)
         return Result.from_rows(self.rows, self.frames, self.model.mesh, about, probes, self.scene)
 
     # -- checkpoints
@@ -430,7 +434,7 @@ class Run:
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sunk": self.sunk,
-            **({} if self.probes is None else {PROBES: self.probes.stacked(self.probed)}),
+            **({} if self.probes is None else {PROBES: self.probed.values}),
             **account_arrays(self.ledger, self.state),
         }
 
@@ -442,4 +446,5 @@ class Run:
         self.model.equilibrium.body.resume(reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = account_of(self.model, arrays), arrays["sunk"]
-        self.rows, self.probed = list(saved.rows), list(arrays.get(PROBES, ()))
+        self.rows = list(saved.rows)
+        self.probed = GrowingRows(arrays.get(PROBES, self.probed.values))
