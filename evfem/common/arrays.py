@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,37 @@ class GrowingRows:
             self._room = np.concatenate([self._room, more])
         self._room[self._count] = row
         self._count += 1
+
+
+class MadeLater:
+    """A dataclass whose fields are made when one of them is read that was not given to `later`.
+
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Square(MadeLater):
+    ...     side: float
+    ...     area: float
+    >>> Square.later(lambda: {"area": 9.0}, side=3.0).area
+    9.0
+    """
+
+    @classmethod
+    def later(cls, make: Callable[[], Mapping[str, Any]], **known: Any) -> Self:
+        """One with the fields `known`; `make` is called once, and gives the others."""
+        found = cls.__new__(cls)
+        vars(found).update(known, _make=make)
+        return found
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self.__annotations__ and "_make" in vars(self):
+            vars(self).update(vars(self)["_make"]())
+            vars(self).pop("_make", None)
+            return vars(self)[name]
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For copies and other processes: all fields, made now."""
+        return {name: getattr(self, name) for name in self.__annotations__}
 
 
 class DenseSolver:

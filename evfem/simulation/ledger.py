@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from operator import or_
 from typing import Any
 
@@ -13,6 +13,7 @@ from evfem.common.arrays import Floats
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.errors import InputError
 from evfem.newton.control import VoltageControl
+from evfem.newton.interface import Interface
 from evfem.newton.state import State
 from evfem.simulation.history import ADDED, SUMS, WIDTHS
 from evfem.simulation.model import Model
@@ -20,7 +21,9 @@ from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import EnergyState, SubstepWork
 from evfem.surface.pad import Pad, reach, surface_state
 from evfem.terms.attraction import ELECTROSTATIC
+from evfem.terms.traction import PadTraction
 from evfem.terms.tractions import NoPullOff, PullOff
+from evfem.tissue.body import Body
 
 
 def unloaded(state: State) -> State:
@@ -98,7 +101,7 @@ class EnergyAccount:
             **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
             "min_gap": float(surface_state(model.surface, places).gap.min()),
-            "peak_contact_pressure": float(tractions(model, position, pressing, pressing).max()),
+            "peak_contact_pressure": float(tractions(interface, position, pressing, pressing).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
             **end.columns,
@@ -147,7 +150,7 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
     """Columns of the widths or areas of contact, mm or mm2, in space those along z too; pad nodes are at
     `position` (P, dim), and gaps those to the surface that has given way.
     """
-    pressure = state.contact_force[:, 0] / current_lengths(model, position)
+    pressure = state.contact_force[:, 0] / _positive(model.pad.tributary(position))
     places = model.equilibrium.interface.places(state)
     gap = surface_state(model.surface, places).normal_gap
     at = reach(gap, pressure, model.pad.spacing_at(position), model.shear_modulus)
@@ -167,52 +170,58 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
     }
 
 
-def current_lengths(model: Model, position: Floats) -> Floats:
-    """Current tributary lengths or areas of the pad nodes (P,) in mm or mm2; infinite where there is none."""
-    return _positive(model.pad.tributary(position))
-
-
-def tractions(model: Model, position: Floats, pressing: Floats, force: Floats) -> Floats:
+def tractions(interface: Interface, position: Floats, pressing: Floats, force: Floats) -> Floats:
     """Tractions (P,) in MPa of contact forces (P,) of pad nodes under pressing ones (P,), in N/mm or N: over
     what nodes stand for, above an elastic surface even along the facets of an outline.
     """
-    length = current_lengths(model, position)
-    return model.equilibrium.interface.foundation.evened(pressing / length, force / length)
+    length = _positive(interface.pad.tributary(position))
+    return np.asarray(interface.foundation.evened(pressing / length, force / length))
 
 
 def _positive(length: Floats) -> Floats:
+    """Tributary lengths or areas (P,), infinite where there is none."""
     return np.where(length > 0, length, np.inf)
 
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
-    """Fields of a state, as they go to ParaView."""
-    size, nodes, interface = model.body.space.size, model.pad.nodes, model.equilibrium.interface
-    surface, withheld = surface_state(model.surface, interface.places(state)), interface.withheld(state)
+    """Fields of a state, as they go to ParaView. In the plane they are made when they are read, unless the
+    memory of the state takes more room than they do, or rooms of one's own may have changed meanwhile.
+    """
+    at = {name: row[name] for name in ("step", "time", "position")}
+    kept = replace(state, last_increment=state.u)  # no field depends on it
+    # not of the model, whose factors would live as long as a result
+    make = partial(_fields, model.body, model.equilibrium.interface, model.attraction, kept)
+    memory = sum(np.asarray(one).nbytes for one in state.memory.values())
+    later = model.mesh.dim == 2 and not model.scene.rooms and memory <= state.u.nbytes
+    return Frame.later(make, **at) if later else Frame(**at, **make())
+
+
+def _fields(body: Body, interface: Interface, attraction: PadTraction, state: State) -> dict[str, Any]:
+    """The fields of `Frame` in a state, by name."""
+    size, nodes = body.space.size, interface.pad.nodes
+    surface, withheld = surface_state(interface.surface, interface.places(state)), interface.withheld(state)
     position, pressing = interface.positions(state.u), state.contact_force[:, 0] + withheld
-    pulled = _positive(model.attraction.weights(interface.pad_state(state, state.touching)))
+    pulled = _positive(attraction.weights(interface.pad_state(state, state.touching)))
 
     def on_pad(values: Any, off: float) -> Any:
         field = np.full(size, off)
         field[nodes] = values
         return field
 
-    stress, J = model.body.tissue.cell_stress(state.u)
+    stress, J = body.tissue.cell_stress(state.u)
     status = np.minimum(state.status, FORWARD)
-    return Frame(
-        step=row["step"],
-        time=row["time"],
-        position=row["position"],
-        displacement=model.body.whole(state.u).copy(),
-        gap=on_pad(surface.gap, np.nan),
-        contact_pressure=on_pad(tractions(model, position, pressing, pressing), 0.0),
-        shear_traction=on_pad(tractions(model, position, pressing, _shear(state)), 0.0),
-        electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
-        surface_sink=on_pad(interface.foundation.sink(state), 0.0),
-        contact_status=on_pad(status, 0).astype(np.int64),
-        von_mises=_von_mises(stress),
-        cauchy_stress=stress,
-        J=J,
-    )
+    return {
+        "displacement": body.whole(state.u).copy(),
+        "gap": on_pad(surface.gap, np.nan),
+        "contact_pressure": on_pad(tractions(interface, position, pressing, pressing), 0.0),
+        "shear_traction": on_pad(tractions(interface, position, pressing, _shear(state)), 0.0),
+        "electrostatic_traction": on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
+        "surface_sink": on_pad(interface.foundation.sink(state), 0.0),
+        "contact_status": on_pad(status, 0).astype(np.int64),
+        "von_mises": _von_mises(stress),
+        "cauchy_stress": stress,
+        "J": J,
+    }
 
 
 def _shear(state: State) -> Floats:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import evfem
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, MadeLater
 from evfem.common.storage import check_ending, load_arrays, save_arrays
 from evfem.common.tables import dataset
 from evfem.common.views import curves, plus, table
@@ -61,7 +61,7 @@ RESULT_FORMAT = "evfem-result-1"
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(MadeLater):
     """Fields of one step on N nodes and E cells; tractions in MPa, lengths in mm.
 
     `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip. `cauchy_stress`

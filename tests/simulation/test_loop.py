@@ -1,6 +1,8 @@
 """Steps at will: the rows are those of `simulate`, mistakes are told, and a failed step leaves no trace."""
 
-from dataclasses import replace
+import pickle
+import weakref
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -8,7 +10,9 @@ from tools.domes import dome_scene
 from tools.refusals import refuses
 
 import evfem as ev
+from evfem.simulation.result import Frame
 
+FIELDS = [spec.name for spec in fields(Frame)]
 PAD = ev.FingerPad(resolution="coarse", ridges=False)
 VISCOUS = ev.Solver(dynamics="viscous")
 
@@ -185,3 +189,59 @@ def test_a_scene_without_motion_is_for_loops_alone(tmp_path):
     for use in (ev.simulate, ev.plan):
         refuses("motion: missing; allowed: at least one of Press", use, plane())
     assert "0 steps" in repr(ev.loop(plane()))
+
+
+#: scenes whose fields are made in different ways: attraction, elastic surface, full field, rough faces, time
+SHOWN = {
+    "display": plane(),
+    "elastic": ev.Scene(PAD, ev.Flat(friction=0.3, elastic=ev.ElasticLayer(0.1, 0.4, 1.0))),
+    "full field": ev.Scene(
+        PAD, ev.Display(friction=0.3), ev.StrongTroxel(), 100.0, field="full", roughness_gap=0.005
+    ),
+    "penalty": plane(solver=ev.Solver(contact="penalty", penalty_normal=10.0, penalty_tangential=5.0)),
+    "time": ev.Scene(replace(PAD, viscosity=1e-3), ev.Flat(friction=0.3), solver=VISCOUS),
+}
+
+
+class Reader:
+    """Copies of the fields of every step, made at once."""
+
+    def __init__(self):
+        self.frames = []
+
+    def step(self, row, frame, checkpoint):
+        self.frames.append({name: np.copy(getattr(frame, name)) for name in FIELDS})
+
+
+@pytest.mark.parametrize("linearised", [False, True])
+@pytest.mark.parametrize("name", SHOWN)
+def test_fields_that_are_read_later_are_those_of_their_step(name, linearised):
+    """A frame of the plane is made when it is read: after other steps to the last bit the same."""
+    if linearised and name == "time":
+        return
+    read = Reader()
+    loops = [ev.loop(SHOWN[name], linearised=linearised, observers=each) for each in ([read], [])]
+    for loop in loops:
+        loop.step(indentation=0.3, duration=0.0)
+        for x in (0.2, 0.5):
+            loop.step(position=x, duration=0.01)
+    copied = pickle.loads(pickle.dumps(later := loops[1].result())).frames
+    assert linearised or len(copied) == 3
+    assert linearised or [sorted(vars(one)) for one in later.frames] == [sorted(FIELDS)] * 3
+    for field in FIELDS:
+        for k, frame in enumerate(read.frames):
+            np.testing.assert_array_equal(getattr(later.frames[k], field), frame[field], err_msg=field)
+            np.testing.assert_array_equal(getattr(copied[k], field), frame[field], err_msg=field)
+
+
+def test_frames_that_nobody_reads_hold_no_stresses_and_no_factors():
+    loop = ev.loop(plane())
+    loop.step(indentation=0.3)
+    frame, factor = loop.result().frames[0], weakref.ref(loop._run.model.equilibrium)
+    del loop
+    assert factor() is None
+    assert set(vars(frame)) == {"step", "time", "position", "_make"}
+    assert frame.von_mises.max() > 0.0
+    assert set(vars(frame)) == set(FIELDS)
+    with pytest.raises(AttributeError, match="'Frame' object has no attribute 'stress'"):
+        frame.stress  # noqa: B018
