@@ -134,6 +134,16 @@ class Tissue:
             total += float(np.sum(psi * integral.points.weight))
         return total
 
+    def energies(self, u: Floats, way: Floats, places: Floats) -> Floats:
+        """The same (w,) at u plus the shares `places` (w,) of a way (N, dim)."""
+        if self.loops is None:
+            return np.array([self.energy(u + s * way) for s in places])
+        found, (cells, at, *moduli) = np.empty(len(places)), self._request(u)
+        self.loops.energies(
+            cells, at, np.ascontiguousarray(way), *moduli, np.ascontiguousarray(places), found
+        )
+        return found
+
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
         """Cell means of the Cauchy stress (E, 4) as xx, yy, zz, xy, in space (E, 6) yz, xz; of J (E,)."""
         E = len(self.space.nodes)

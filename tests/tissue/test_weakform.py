@@ -203,6 +203,7 @@ def test_compiled_loops_are_the_form(element):
         lambda tissue: tissue.pressure_change(u, du),
         lambda tissue: tissue.pressure_forces(u, q),
         lambda tissue: np.array([tissue.energy(u), tissue.smallest_J(u)]),
+        lambda tissue: tissue.energies(u, du, np.array([0.0, 0.05, 0.1])),
         lambda tissue: np.column_stack(tissue.cell_stress(u)),
     ):
         expected = of(plain)

@@ -49,12 +49,12 @@ typedef struct {
     const stored *mean;   /* (B, modes): a_m */
 } mesh;
 
-/* What a loop works on: cells, its arrays in the order of `LOOPS` (`module.h`), branches of the tissue; and the
-   numbers that it finds. */
+/* What a loop works on: cells, its arrays in the order of `LOOPS` (`module.h`), branches of the tissue, places
+   on a way; and the numbers that it finds. */
 typedef struct {
     mesh m;
     void *arrays[MOST_ARRAYS];
-    int branches;
+    int branches, places;
     double found[2];
 } request;
 
@@ -164,6 +164,12 @@ INLINE lanes trace(tensor H) {
 INLINE tensor scaled(lanes factor, tensor T) {
     EACH(i) EACH(j) T.a[i][j] *= factor;
     return T;
+}
+
+/* H + s D */
+INLINE tensor between(tensor H, lanes s, tensor D) {
+    EACH(i) EACH(j) H.a[i][j] += s * D.a[i][j];
+    return H;
 }
 
 INLINE tensor inverse_transposed(tensor H, lanes e) { return scaled(1.0 / (1.0 + e), cofactors(H)); }

@@ -74,6 +74,49 @@ INLINE void forces(request *r, int n) {
     r->found[0] = sum(total), r->found[1] = smallest;
 }
 
+/* Stored energies (W,) at u plus the shares `places` (W,) of du: the gradients of both serve all of them. */
+INLINE void energies(request *r, int n) {
+    const mesh *m = &r->m;
+    const double *u = r->arrays[0], *du = r->arrays[1], *places = r->arrays[4];
+    const stored *mu = r->arrays[2], *lmbda = r->arrays[3];
+    double *out = r->arrays[5];
+    int S = m->sample.count, Q = m->at.count;
+    for (int w = 0; w < r->places; w++) out[w] = 0.0;
+    for (Py_ssize_t b = 0; b < m->blocks; b++) {
+        lanes ue[DIM * MOST_NODES], change[DIM * MOST_NODES];
+        tensor H[MOST_POINTS], D[MOST_POINTS], at[MOST_POINTS], along[MOST_POINTS];
+        gather(u, m->nodes + b * n * LANES, n, ue);
+        gather(du, m->nodes + b * n * LANES, n, change);
+        for (int s = 0; s < S; s++) {
+            H[s] = displacement_gradient(&m->sample, b, s, ue, n);
+            D[s] = displacement_gradient(&m->sample, b, s, change, n);
+        }
+        for (int q = 0; q < Q; q++) {
+            at[q] = m->apart ? displacement_gradient(&m->at, b, q, ue, n) : H[q];
+            along[q] = m->apart ? displacement_gradient(&m->at, b, q, change, n) : D[q];
+        }
+        for (int w = 0; w < r->places; w++) {
+            lanes log_J[MOST_POINTS], share = (lanes){0} + places[w], total = {0};
+            for (int s = 0; s < S; s++) {
+                log_J[s] = log_of_volume(volume_change(between(H[s], share, D[s])));
+                if (!HAS_MODES(m))
+                    total += m->weight[b * S + s] * log_J[s] * (0.5 * lmbda[b] * log_J[s] - mu[b]);
+            }
+            for (int j = 0; j < m->modes; j++) {
+                const stored *psi = m->psi + (b * m->modes + j) * S;
+                lanes c = {0};
+                for (int s = 0; s < S; s++) c += psi[s] * log_J[s];
+                total += c * (0.5 * lmbda[b] * c - mu[b] * m->mean[b * m->modes + j]);
+            }
+            for (int q = 0; q < Q; q++) {
+                tensor P = between(at[q], share, along[q]);
+                total += mu[b] * m->weight[b * Q + q] * (trace(P) + 0.5 * contracted(P, P));
+            }
+            out[w] += sum(total);
+        }
+    }
+}
+
 /* What changes of the tangent, added to the matrix: pairs k <= l of nodes, places (B, pairs, DIM DIM,
    LANES). The curvature of ln J is weighted with the law's own pressure, or with a given one (B, S). */
 INLINE void add_tangent(request *r, int n) {

@@ -13,6 +13,9 @@
 #define LOOPS(X, ...)                                                                                    \
     X(forces, "uccU", 2, "(cells, u, mu, lmbda, out): add the nodal forces; stored energy, smallest J.",  \
       __VA_ARGS__)                                                                                       \
+    X(energies, "uuccwW", 0,                                                                             \
+      "(cells, u, du, mu, lmbda, places, out): stored energies at u plus the shares `places` of du.",    \
+      __VA_ARGS__)                                                                                       \
     X(add_tangent, "uccopD", 0,                                                                          \
       "(cells, u, mu, lmbda, pressure, places, data): add what changes of the tangent; its curvature\n"   \
       "of ln J is weighted with a pressure, or with the law's own if that is None.", __VA_ARGS__)        \
@@ -105,15 +108,24 @@ static Py_ssize_t count_of(const request *r, Py_ssize_t size, char kind) {
     case 'k': case 'K': return points * r->branches * KEPT;            /* (B, Q, branches, KEPT, LANES) */
     case 'a': case 'A': return points * r->branches * (KEPT + 1);      /* (B, Q, branches, KEPT + 1, LANES) */
     case 'l': return 4 * cells * r->branches;                          /* (B, branches, 4, LANES) */
+    case 'W': return r->places;                                        /* (W,) */
     case 'p': return cells * DIM * DIM * r->m.n * (r->m.n + 1) / 2;    /* (B, pairs, DIM DIM, LANES) */
-    default: return -1;                                                /* any: b, D */
+    default: return -1;                                                /* any: b, w, D */
     }
 }
 
-/* The data of one array of a kind; v and o may be None, and b (B, branches, LANES) says how many branches. */
+/* The data of one array of a kind; v and o may be None, b (B, branches, LANES) says how many branches, and w
+   (W,) how many places. */
 static void *hold_kind(held *all, request *r, Py_ssize_t size, char kind, PyObject *array) {
     if ((kind == 'v' || kind == 'o') && array == Py_None) return NULL;
     void *found = hold(all, array, 'd', count_of(r, size, kind), kind < 'a');
+    if (found && kind == 'w') {
+        Py_ssize_t places = all->views[all->count - 1].len / (Py_ssize_t)sizeof(double);
+        if (places > INT16_MAX)
+            PyErr_SetString(PyExc_ValueError, "too many places");
+        else
+            r->places = (int)places;
+    }
     if (found && kind == 'b') {
         Py_ssize_t each = r->m.blocks * LANES * (Py_ssize_t)sizeof(double), length = all->views[all->count - 1].len;
         if (length < 0 || (each ? length % each || length / each > INT16_MAX : length))

@@ -44,6 +44,11 @@ def test_arrays_that_do_not_fit_are_refused(dim, nodes, kind):
     with pytest.raises(ValueError, match=r"kind|do not know"):
         loops(dim).smallest_J(space.cells._replace(sizes=(space.size, 2, nodes, 4, 0, kind)), u)
     assert loops(dim).smallest_J(space.cells, u) == 1.0
+    moduli = padded(np.ones(len(space.nodes)))
+    for places, out, many in ((3, 2, 3), (0, 1, 0), (2**15, 2**15, "too many places")):
+        told = many if many == "too many places" else f"expected {many}, format d"
+        with pytest.raises(ValueError, match=told):
+            loops(dim).energies(space.cells, u, u, moduli, moduli, np.zeros(places), np.zeros(out))
 
 
 def exact_log_J(H):
