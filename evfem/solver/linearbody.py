@@ -64,6 +64,7 @@ class LinearBody(Body):
         nodal = full.forces(u)
         self._at_base = nodal[pad]
         self._relative = (u[pad] - u[self._bone]).ravel()
+        self._at: tuple[Any, Floats, Floats] = (None, self._relative, self._relative)
         self.size = own.size + dim
         self.bone = np.arange(own.size, self.size)
         # inner nodes move with the bone until `whole` computes them
@@ -75,12 +76,16 @@ class LinearBody(Body):
         """Every node of the pad with every other one, as if they were a cell."""
         return Pattern(np.arange(self.size // self.space.dim)[None], self.space.dim)
 
-    def _strain(self, u: Floats) -> Floats:
-        return (u[self.pad] - u[self._bone]).ravel() - self._relative
+    def _strained(self, u: Floats) -> tuple[Floats, Floats]:
+        """x - x_0 and S (x - x_0) of the pad, (dim P,) each; the last ones are kept for who asks again."""
+        if u is not self._at[0]:
+            strain = (u[self.pad] - u[self._bone]).ravel() - self._relative
+            self._at = u, strain, self.matrix @ strain
+        return self._at[1:]
 
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, dim), on the pad and the first node of the bone."""
-        pulled = self._at_base + (self.matrix @ self._strain(u)).reshape(-1, self.space.dim)
+        pulled = self._at_base + self._strained(u)[1].reshape(-1, self.space.dim)
         total = np.zeros_like(u)
         total[self._bone] = -pulled.sum(axis=0)
         total[self.pad] = pulled if self.drag_rate == 0.0 else pulled + self._drag_forces(u)
@@ -121,13 +126,13 @@ class LinearBody(Body):
 
     def energy(self, u: Floats) -> float:
         """Stored energy: N mm, in the plane per mm of depth."""
-        strain = self._strain(u)
-        mean = self._at_base.ravel() + 0.5 * self.matrix @ strain
+        strain, pulled = self._strained(u)
+        mean = self._at_base.ravel() + 0.5 * pulled
         return self.energy_at_base + float(mean @ strain)
 
     def energies(self, u: Floats, increment: Floats, fractions: Floats) -> Floats:
-        strain, more = self._strain(u), (increment[self.pad] - increment[self._bone]).ravel()
-        pulled = self._at_base.ravel() + self.matrix @ strain
+        more = (increment[self.pad] - increment[self._bone]).ravel()
+        pulled = self._at_base.ravel() + self._strained(u)[1]
         return self.energy(u) + fractions * (pulled @ more) + 0.5 * fractions**2 * (more @ self.matrix @ more)
 
     @cached_property

@@ -70,6 +70,11 @@ class Pad:
         line = self.edges[:, [0, *range(2, self.edges.shape[1]), 1]]
         return np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2)
 
+    @cached_property
+    def _ends(self) -> Ints:
+        """The nodes of the edges, one after the other."""
+        return self.edges.ravel()
+
     @property
     def shares(self) -> Floats:
         """Tributary fractions of an edge's projected length, one for each of its nodes."""
@@ -93,7 +98,7 @@ class Pad:
         rows = x.reshape(-1, x.shape[-1])
         width = np.maximum(rows[:, self.edges[:, 1]] - rows[:, self.edges[:, 0]], 0.0)
         shared = width[:, :, None] * self.shares
-        nodes = self.edges + rows.shape[1] * np.arange(len(rows))[:, None, None]
+        nodes = self._ends if len(rows) == 1 else self._ends + rows.shape[1] * np.arange(len(rows))[:, None]
         found = np.bincount(nodes.ravel(), shared.ravel(), rows.size)
         return found.astype(float, copy=False).reshape(x.shape)
 
@@ -217,12 +222,18 @@ def fold(position: Floats, segments: Ints, touching: Any, down: Any) -> float | 
 
 
 def _near(begin: Floats, end: Floats) -> tuple[Ints, Ints]:
-    """Pairs a < b of segments (S, 2), from begin to end, whose boxes overlap: (K,) and (K,)."""
+    """Pairs a < b of segments (S, 2), from begin to end, whose boxes overlap: (K,) and (K,), in order."""
     low, high = np.minimum(begin, end), np.maximum(begin, end)
-    apart = low[:, None, 0] > high[:, 0]
-    apart |= low[:, None, 1] > high[:, 1]
-    a, b = divmod(np.flatnonzero(~(apart | apart.T)), len(apart))  # sooner than by two axes
-    return a[a < b], b[a < b]
+    order = np.argsort(low[:, 0])
+    # behind each one, in order of their left ends, those that begin before it ends
+    behind = np.searchsorted(low[order, 0], high[order, 0], side="right") - np.arange(1, order.size + 1)
+    first = np.repeat(np.arange(order.size), behind)
+    second = np.arange(first.size) - np.repeat(np.cumsum(behind) - behind, behind) + first + 1
+    a, b = order[first], order[second]
+    beside = (low[a, 1] <= high[b, 1]) & (low[b, 1] <= high[a, 1])
+    a, b = np.sort(np.stack([a[beside], b[beside]]), axis=0)
+    there = np.lexsort((b, a))
+    return a[there], b[there]
 
 
 def _side(begin: Floats, end: Floats, point: Floats) -> Floats:

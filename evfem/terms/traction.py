@@ -79,8 +79,9 @@ class PadState:
     def states(self) -> list[PadState]:
         """The states of a path, one by one."""
         pressing = [None] * len(self.position) if self.pressing is None else list(self.pressing)
-        each = zip(self.position, self.voltage.tolist(), self.load.tolist(), pressing, strict=True)
-        return [replace(self, position=x, voltage=u, load=s, pressing=f) for x, u, s, f in each]
+        each = zip(self.position, self.voltage.tolist(), pressing, self.load.tolist(), strict=True)
+        ends, known = (self.pad, self.surface), (self.touching, self.memory, self.below)
+        return [PadState(*ends, place, volts, force, *known, load) for place, volts, force, load in each]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,14 @@ class PadPath:
 
 
 def evenly(before: float, after: float, fractions: Floats) -> Floats:
-    """Values (w,) whose square grows evenly from that of `before` to that of `after`."""
+    """Values (w,) whose square grows evenly from that of `before` to that of `after`; to the last digit the
+    same where these are, for states under one load are one call of a law.
+
+    >>> evenly(0.11, 0.11, np.array([0.05])).tolist(), evenly(0.0, 2.0, np.array([0.25])).tolist()
+    ([0.11], [1.0])
+    """
+    if before == after:
+        return np.full(fractions.shape, after)
     return np.asarray(np.sqrt((1.0 - fractions) * before**2 + fractions * after**2))
 
 

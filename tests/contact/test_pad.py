@@ -6,7 +6,7 @@ from tools.meshes import block
 
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh, raised
-from evfem.surface.pad import Pad, fold, make_pad, reach, surface_state
+from evfem.surface.pad import Pad, _near, fold, make_pad, reach, surface_state
 from evfem.surface.surfaces import Sinusoid
 
 CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
@@ -147,6 +147,23 @@ def test_the_normal_gap_is_the_distance_along_the_normal_to_first_order():
 
 
 LINE = np.column_stack([np.arange(6.0), np.zeros(6)])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_segments_near_each_other_are_those_whose_boxes_overlap(seed):
+    """All pairs against all, in order; on whole numbers many boxes touch."""
+    random = np.random.default_rng(seed)
+    line = np.cumsum(random.normal(size=(random.integers(2, 60), 2)), axis=0)
+    line = np.round(line) if seed % 2 else line
+    begin, end = line[:-1], line[1:]
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
+    expected = [
+        (a, b)
+        for a in range(len(begin))
+        for b in range(a + 1, len(begin))
+        if (low[a] <= high[b]).all() and (low[b] <= high[a]).all()
+    ]
+    assert list(zip(*(one.tolist() for one in _near(begin, end)), strict=True)) == expected
 
 
 def folded(position, touching=(), edges=None):
