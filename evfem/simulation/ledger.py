@@ -184,16 +184,15 @@ def _positive(length: Floats) -> Floats:
 
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
-    """Fields of a state, as they go to ParaView. In the plane they are made when they are read, unless the
-    memory of the state takes more room than they do, or rooms of one's own may have changed meanwhile.
+    """Fields of a state, as they go to ParaView, made when they are read, unless the memory of the state takes
+    more room than they do.
     """
     at = {name: row[name] for name in ("step", "time", "position")}
     kept = replace(state, last_increment=state.u)  # no field depends on it
     # not of the model, whose factors would live as long as a result
     make = partial(_fields, model.body, model.equilibrium.interface, model.attraction, kept)
     memory = sum(np.asarray(one).nbytes for one in state.memory.values())
-    later = model.mesh.dim == 2 and not model.scene.rooms and memory <= state.u.nbytes
-    return Frame.later(make, **at) if later else Frame(**at, **make())
+    return Frame.later(make, **at) if memory <= state.u.nbytes else Frame(**at, **make())
 
 
 def _fields(body: Body, interface: Interface, attraction: PadTraction, state: State) -> dict[str, Any]:

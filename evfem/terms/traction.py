@@ -80,8 +80,11 @@ class PadState:
         """The states of a path, one by one."""
         pressing = [None] * len(self.position) if self.pressing is None else list(self.pressing)
         each = zip(self.position, self.voltage.tolist(), pressing, self.load.tolist(), strict=True)
-        ends, known = (self.pad, self.surface), (self.touching, self.memory, self.below)
-        return [PadState(*ends, place, volts, force, *known, load) for place, volts, force, load in each]
+        on, kept, below = self.touching, self.memory, self.below
+        return [
+            PadState(self.pad, self.surface, place, volts, force, on, kept, below, load)
+            for place, volts, force, load in each
+        ]
 
 
 @dataclass(frozen=True, eq=False)

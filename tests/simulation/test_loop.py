@@ -200,6 +200,7 @@ SHOWN = {
     ),
     "penalty": plane(solver=ev.Solver(contact="penalty", penalty_normal=10.0, penalty_tangential=5.0)),
     "time": ev.Scene(replace(PAD, viscosity=1e-3), ev.Flat(friction=0.3), solver=VISCOUS),
+    "space": dome_scene(law=ev.Kaczmarek(), voltage=200.0),
 }
 
 
@@ -213,17 +214,16 @@ class Reader:
         self.frames.append({name: np.copy(getattr(frame, name)) for name in FIELDS})
 
 
-@pytest.mark.parametrize("linearised", [False, True])
-@pytest.mark.parametrize("name", SHOWN)
+@pytest.mark.parametrize(
+    ("name", "linearised"), [*((name, False) for name in SHOWN), *((name, True) for name in [*SHOWN][:4])]
+)
 def test_fields_that_are_read_later_are_those_of_their_step(name, linearised):
-    """A frame of the plane is made when it is read: after other steps to the last bit the same."""
-    if linearised and name == "time":
-        return
+    """A frame is made when it is read: after other steps to the last bit the same."""
     read = Reader()
     loops = [ev.loop(SHOWN[name], linearised=linearised, observers=each) for each in ([read], [])]
     for loop in loops:
-        loop.step(indentation=0.3, duration=0.0)
-        for x in (0.2, 0.5):
+        loop.step(indentation=0.1, duration=0.0)
+        for x in (0.05, 0.1):
             loop.step(position=x, duration=0.01)
     copied = pickle.loads(pickle.dumps(later := loops[1].result())).frames
     assert linearised or len(copied) == 3
