@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -314,14 +314,15 @@ class ParaViewSeries:
 
     def write_index(self) -> None:
         """Write the .pvd file in one step; every file it names is complete."""
-        root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
-        collection = ElementTree.SubElement(root, "Collection")
-        for row, value in zip(self.rows, instants(self.rows), strict=True):
-            name = self.frame_path(int(row["step"])).name
-            ElementTree.SubElement(collection, "DataSet", timestep=repr(value), part="0", file=name)
-        ElementTree.indent(root)
+        stem = quoteattr(self.path.stem, {'"': "&quot;"})[1:-1]
+        entries = "".join(
+            f'    <DataSet timestep="{value!r}" part="0" file="{stem}_{int(row["step"]):05d}.vtu" />\n'
+            for row, value in zip(self.rows, instants(self.rows), strict=True)
+        )
         write_text(
-            self.path, '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+            self.path,
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+            f"  <Collection>\n{entries}  </Collection>\n</VTKFile>\n",
         )
 
 
@@ -344,6 +345,8 @@ def instants(rows: Sequence[Mapping[str, Any]]) -> list[float]:
         along = np.array([float(row.get("position_z", 0.0)) for row in rows])
         if along.any() or np.any(np.diff(values) < 0.0):
             values = np.cumsum(np.hypot(np.diff(values, prepend=0.0), np.diff(along, prepend=0.0)))
+    if (np.diff(values) >= 2.0 * INSTANT).all():
+        return values.tolist()
     result: list[float] = []
     for value in values.tolist():
         result.append(max(value, result[-1] + INSTANT) if result else value)

@@ -41,6 +41,14 @@ def entries(path):
     return [(float(e.attrib["timestep"]), e.attrib["file"]) for e in root.iter("DataSet")]
 
 
+def test_the_index_names_files_of_any_name(tmp_path):
+    """Also those of which XML would take a character for its own."""
+    path = paraview(fake_result(), tmp_path / """a & b's "best" <1>.pvd""")
+    names = [name for _, name in entries(path)]
+    assert names == [f"{path.stem}_0000{step}.vtu" for step in (2, 4)]
+    assert all((tmp_path / name).exists() for name in names)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_frame_is_read_back_with_all_its_fields(kind, tmp_path):
     result = fake_result(kind)

@@ -184,8 +184,8 @@ def _positive(length: Floats) -> Floats:
 
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
-    """Fields of a state, as they go to ParaView, made when they are read, unless the memory of the state takes
-    more room than they do.
+    """Fields of a state, as they go to ParaView, made when they are read, unless the memory of the state
+    takes more room than they do.
     """
     at = {name: row[name] for name in ("step", "time", "position")}
     kept = replace(state, last_increment=state.u)  # no field depends on it
