@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from operator import or_
@@ -23,7 +24,6 @@ from evfem.surface.pad import Pad, reach, surface_state
 from evfem.terms.attraction import ELECTROSTATIC
 from evfem.terms.traction import PadTraction
 from evfem.terms.tractions import NoPullOff, PullOff
-from evfem.tissue.body import Body
 
 
 def unloaded(state: State) -> State:
@@ -189,15 +189,22 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
     """
     at = {name: row[name] for name in ("step", "time", "position")}
     kept = replace(state, last_increment=state.u)  # no field depends on it
-    # not of the model, whose factors would live as long as a result
-    make = partial(_fields, model.body, model.equilibrium.interface, model.attraction, kept)
+    # of parts, not of the model or the body, whose factors and pattern would live as long as a result
+    parts = model.body.tissue, model.body.whole, model.equilibrium.interface, model.attraction
+    make = partial(_fields, *parts, kept)
     memory = sum(np.asarray(one).nbytes for one in state.memory.values())
     return Frame.later(make, **at) if memory <= state.u.nbytes else Frame(**at, **make())
 
 
-def _fields(body: Body, interface: Interface, attraction: PadTraction, state: State) -> dict[str, Any]:
+def _fields(
+    tissue: Any,
+    whole: Callable[[Floats], Floats],
+    interface: Interface,
+    attraction: PadTraction,
+    state: State,
+) -> dict[str, Any]:
     """The fields of `Frame` in a state, by name."""
-    size, nodes = body.space.size, interface.pad.nodes
+    size, nodes = len(state.u), interface.pad.nodes
     surface, withheld = surface_state(interface.surface, interface.places(state)), interface.withheld(state)
     position, pressing = interface.positions(state.u), state.contact_force[:, 0] + withheld
     pulled = _positive(attraction.weights(interface.pad_state(state, state.touching)))
@@ -207,10 +214,10 @@ def _fields(body: Body, interface: Interface, attraction: PadTraction, state: St
         field[nodes] = values
         return field
 
-    stress, J = body.tissue.cell_stress(state.u)
+    stress, J = tissue.cell_stress(state.u)
     status = np.minimum(state.status, FORWARD)
     return {
-        "displacement": body.whole(state.u).copy(),
+        "displacement": whole(state.u).copy(),
         "gap": on_pad(surface.gap, np.nan),
         "contact_pressure": on_pad(tractions(interface, position, pressing, pressing), 0.0),
         "shear_traction": on_pad(tractions(interface, position, pressing, _shear(state)), 0.0),

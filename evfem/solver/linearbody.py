@@ -16,6 +16,7 @@ Source: R. J. Guyan, AIAA J. 3 (1965) 380, doi:10.2514/3.2874.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -156,7 +157,11 @@ class LinearBody(Body):
         """Reduced displacements (n,) of the full body for displacements of the pad and the bone (m,)."""
         return self._factor.backward(self._still, kept)
 
-    def whole(self, u: Floats) -> Floats:
+    @property
+    def whole(self) -> Callable[[Floats], Floats]:
+        return self._whole
+
+    def _whole(self, u: Floats) -> Floats:
         """Displacements (N, dim) of all nodes for the displacements u (N, dim) of pad and bone."""
         moved = np.concatenate([(u - self.base)[self.pad].ravel(), (u - self.base)[self._bone]])
         return self.base + self.full.expand(self._solve(moved))

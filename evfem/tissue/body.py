@@ -7,7 +7,7 @@ nodes' displacements, bone x, y[, z]); forces of the bone's nodes add up to the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -128,9 +128,10 @@ class Body:
             )
         return self.pattern.finish(data)
 
-    def whole(self, u: Floats) -> Floats:
-        """Displacements (N, dim) of all nodes in a state that has u: here the same."""
-        return u
+    @property
+    def whole(self) -> Callable[[Floats], Floats]:
+        """What makes displacements (N, dim) of all nodes of a state's u; here they are the same."""
+        return _itself
 
     def begin(self, old: Any, seconds: float) -> None:
         """A trial of so many seconds begins from an accepted state, or what is kept of it."""
@@ -162,6 +163,10 @@ class Body:
     def energies(self, u: Floats, way: Floats, places: Floats) -> Floats:
         """The same at u plus the shares `places` (w,) of a way (N, dim)."""
         return self.tissue.energies(u, way, places)
+
+
+def _itself(u: Floats) -> Floats:
+    return u
 
 
 def translated(u: Floats, way: Floats) -> Floats:

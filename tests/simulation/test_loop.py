@@ -237,9 +237,10 @@ def test_fields_that_are_read_later_are_those_of_their_step(name, linearised):
 def test_frames_that_nobody_reads_hold_no_stresses_and_no_factors():
     loop = ev.loop(plane())
     loop.step(indentation=0.3)
-    frame, factor = loop.result().frames[0], weakref.ref(loop._run.model.equilibrium)
-    del loop
-    assert factor() is None
+    model, frame = loop._run.model, loop.result().frames[0]
+    large = [weakref.ref(one) for one in (model.equilibrium, model.body)]
+    del loop, model
+    assert [one() for one in large] == [None, None]
     assert set(vars(frame)) == {"step", "time", "position", "_make"}
     assert frame.von_mises.max() > 0.0
     assert set(vars(frame)) == set(FIELDS)
