@@ -65,7 +65,7 @@ ROOMS = {
         {"numpy", "scipy"},
         "ways friction adhesion patches elastic surfaces relief textures usersurface pad skin spread",
     ),
-    "contact": ({"numpy", "scipy"}, "below byforce signorini solve follower condensed stability"),
+    "contact": ({"numpy", "scipy"}, "below byforce signorini statuses solve follower condensed stability"),
     "terms": (
         {"numpy", "scipy"},
         "traction tractions charging attraction fullfield drivenfield foundation slipping "

@@ -86,6 +86,28 @@ class MadeLater:
         return {name: getattr(self, name) for name in self.__annotations__}
 
 
+class Memory:
+    """Memory of large arrays that are made again and again, kept: of memory taken anew the system zeroes
+    every page.
+
+    >>> memory = Memory()
+    >>> first = memory.array("matrix", (2, 3))
+    >>> memory.array("matrix", (2, 2), np.float32).base is first.base
+    True
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[str, Any] = {}
+
+    def array(self, name: str, shape: tuple[int, ...], kind: Any = np.float64) -> Any:
+        """An array of any values; what the last one of this `name` had is lost."""
+        size = int(np.prod(shape)) * np.dtype(kind).itemsize
+        if name not in self._kept or self._kept[name].size < size:
+            self._kept.pop(name, None)
+            self._kept[name] = np.empty(size, np.uint8)
+        return self._kept[name][:size].view(kind).reshape(shape)
+
+
 class DenseSolver:
     """Solves dense systems one after the other; the factors of a large one serve the next with its unknowns.
 
@@ -94,37 +116,44 @@ class DenseSolver:
     [[1.0], [1.0]]
     """
 
-    def __init__(self) -> None:
+    def __init__(self, memory: Memory | None = None) -> None:
+        self._memory = memory or Memory()
         self._unknowns: Hashable = None
         self._factors: tuple[Floats, Any, Any] | None = None
 
-    def solve(self, matrix: Floats, right: Floats, unknowns: Hashable = None) -> Any:
+    def solve(self, matrix: Any, right: Floats, unknowns: Hashable = None) -> Any:
         """Solution (n, q) of a matrix (n, n) for right-hand sides (n, q), named by its `unknowns`; raises
-        `numpy.linalg.LinAlgError` where it is singular.
+        `numpy.linalg.LinAlgError` where it is singular. Of a large matrix rows (but for the diagonal, in
+        single precision), diagonal and products are used: it need not be an array.
         """
         if len(matrix) < LARGE_SYSTEM:
-            return np.linalg.solve(matrix, right)
+            return np.linalg.solve(np.asarray(matrix), right)
         named = None if unknowns is None else (len(matrix), unknowns)
         old = named is not None and named == self._unknowns
         found = self._refined(matrix, right, OLD_FACTORS) if old else None
         if found is None and self._factorise(matrix):
             self._unknowns = named
             found = self._refined(matrix, right, 2 * OLD_FACTORS)
-        return np.linalg.solve(matrix, right) if found is None else found
+        return np.linalg.solve(np.asarray(matrix), right) if found is None else found
 
-    def _factorise(self, matrix: Floats) -> bool:
+    def _factorise(self, matrix: Any) -> bool:
         lapack = linalg().lapack
-        self._unknowns = self._factors = None  # their memory is free before that of new ones is taken
-        own = np.abs(np.diagonal(matrix))
-        scale = 1.0 / np.sqrt(np.maximum(own, 1e-30 * (own.max() or 1.0)))  # within single precision
-        single = np.multiply(matrix, scale, out=np.empty(matrix.shape, np.float32), casting="same_kind")
-        single *= scale.astype(np.float32)[:, None]
+        self._unknowns = self._factors = None
+        own, n = matrix.diagonal(), len(matrix)
+        largest = np.abs(own).max() or 1.0
+        scale = 1.0 / np.sqrt(np.maximum(np.abs(own), 1e-30 * largest))  # within single precision
+        single, by = self._memory.array("factors", (n, n), np.float32), scale.astype(np.float32)
+        for begin in range(0, n, BLOCK):
+            some = slice(begin, begin + BLOCK)
+            rows = np.multiply(matrix[some], by, out=single[some], casting="same_kind")
+            rows *= by[some, None]
+        single[np.diag_indices(n)] = own * scale**2
         # the transposed is in LAPACK's order: nothing is copied
         factors, pivots, failed = lapack.sgetrf(single.T, overwrite_a=True)
         self._factors = scale, factors, pivots
         return not failed
 
-    def _refined(self, matrix: Floats, right: Floats, slowest: float) -> Floats | None:
+    def _refined(self, matrix: Any, right: Floats, slowest: float) -> Floats | None:
         """The solution by the factors at hand, None where the residual falls by less than `slowest`."""
         lapack = linalg().lapack
         assert self._factors is not None
@@ -144,15 +173,33 @@ class DenseSolver:
         return None
 
 
-def block(matrix: Floats, rows: Ints, columns: Ints) -> Floats:
-    """The block (r, c) of a matrix at these rows and columns: one after the other takes a fourth of the time
-    of both at once (`np.ix_`).
+def block(matrix: Any, rows: Ints, columns: Ints, out: Any = None) -> Any:
+    """The block (r, c) of a matrix at these rows and columns, or written to `out`: one after the other takes
+    a fourth of the time of both at once (`np.ix_`).
     """
-    return np.asarray(matrix.take(rows, axis=0).take(columns, axis=1))
+    out = np.empty((rows.size, columns.size), matrix.dtype) if out is None else out
+    for begin in range(0, rows.size, BLOCK):  # what the cache holds; "clip" copies without another array
+        some = matrix.take(rows[begin : begin + BLOCK], axis=0)
+        some.take(columns, axis=1, out=out[begin : begin + BLOCK], mode="clip")
+    return out
 
 
-def inverse(matrix: Any, symmetric: bool) -> Floats:
-    """Inverse (n, n); a large positive definite one by Cholesky, in half the time and its own precision."""
+def product(matrix: Any, x: Floats) -> Floats:
+    """A matrix (r, c) of single or double precision times x (c,) or (c, q), in double precision."""
+    if matrix.dtype == float:
+        return np.asarray(matrix @ x)
+    found, double = np.empty((len(matrix), *x.shape[1:])), np.empty((BLOCK, matrix.shape[1]))
+    for begin in range(0, len(matrix), BLOCK):
+        some = found[begin : begin + BLOCK]
+        double[: len(some)] = matrix[begin : begin + BLOCK]
+        np.dot(double[: len(some)], x, out=some)
+    return found
+
+
+def inverse(matrix: Any, symmetric: bool) -> Any:
+    """Inverse (n, n); a large positive definite one by Cholesky, in half the time and in its own precision,
+    others in double precision.
+    """
     if len(matrix) < LARGE_SYSTEM:
         return np.linalg.inv(matrix.astype(float))
     lapack = linalg().lapack
@@ -160,13 +207,12 @@ def inverse(matrix: Any, symmetric: bool) -> Floats:
         factorise, invert = lapack.get_lapack_funcs(("potrf", "potri"), (matrix,))
         factor, failed = factorise(np.array(matrix, order="F"), lower=True, overwrite_a=True)
         if not failed:
-            lower, _ = invert(factor, lower=True, overwrite_c=True)
-            whole = np.array(lower, dtype=float, order="C")
+            whole = invert(factor, lower=True, overwrite_c=True)[0].T
             for begin in range(0, len(whole), BLOCK):  # without a second matrix as large
-                rows = whole[begin : begin + BLOCK]
-                whole[:begin, begin : begin + BLOCK] = rows[:, :begin].T
-                square = rows[:, begin : begin + BLOCK]
-                square += np.tril(square, -1).T
+                rows, end = whole[begin : begin + BLOCK], begin + BLOCK
+                whole[end:, begin:end] = rows[:, end:].T
+                square = rows[:, begin:end]
+                square += np.triu(square, 1).T
             return whole
     factor, pivots, failed = lapack.dgetrf(matrix)
     if failed:

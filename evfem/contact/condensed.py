@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import DenseSolver, Floats, Ints, block, inverse
+from evfem.common.arrays import DenseSolver, Floats, Ints, Memory, block, inverse, product
 from evfem.common.constants import DISC_OWN, LARGE_SYSTEM, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
 from evfem.contact.below import RIGID_BELOW, RigidBelow
 from evfem.contact.follower import Candidates, FollowerStiffness, local
@@ -68,37 +68,52 @@ class StepSolution:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """Condensed tangent on (candidates, bone x, y[, z]), compliance of the candidates, with attraction."""
+    """Condensed tangent on (candidates, bone x, y[, z]), compliance of the candidates, with attraction: in
+    space of single precision where the tangent was factorised so. Its contact problems use `memory`.
+    """
 
     schur: Floats
-    compliance: Floats
+    compliance: Any
     dim: int = 2
-    dense: DenseSolver = field(default_factory=DenseSolver, repr=False)
-    _last: dict[bytes, Floats] = field(default_factory=dict, repr=False)
+    memory: Memory = field(default_factory=Memory, repr=False)
+    _last: dict[bytes, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def make(cls, schur: Floats, coupling: Floats | None, dim: int = 2) -> CondensedTangent:
+    def make(
+        cls, schur: Floats, coupling: Floats | None, dim: int = 2, memory: Memory | None = None
+    ) -> CondensedTangent:
         """From S (m, m) and the attraction's stiffness between nodes (m - dim, m - dim), or None."""
         nodal = schur[:-dim, :-dim] if coupling is None else schur[:-dim, :-dim] - coupling
-        return cls(schur, inverse(nodal, symmetric=coupling is None), dim)
+        compliance = inverse(nodal, symmetric=coupling is None)
+        if dim == 2:
+            compliance = compliance.astype(float, copy=False)  # that of the compiled contact
+        return cls(schur, compliance, dim, memory or Memory())
+
+    @cached_property
+    def dense(self) -> DenseSolver:
+        """What solves its contact problems."""
+        return DenseSolver(self.memory)
 
     def rows(self, nodes: Ints) -> Ints:
         """Rows of these candidates, (y, x[, z]) node by node."""
         return np.asarray((self.dim * nodes[:, None] + COMPONENTS[: self.dim]).ravel())
 
-    def among(self, nodes: Ints) -> Floats:
-        """Compliance among these candidates, in the order of `rows`; often those of the last call."""
+    def among(self, nodes: Ints) -> Any:
+        """Compliance among these candidates, in the order of `rows`; often those of the last call. It is lost
+        in a call with others.
+        """
         key = nodes.tobytes()
         if key not in self._last:
-            rows = self.rows(nodes)
+            rows, kind = self.rows(nodes), self.compliance.dtype
             self._last.clear()
-            self._last[key] = block(self.compliance, rows, rows)
+            out = self.memory.array("among", (rows.size, rows.size), kind)
+            self._last[key] = block(self.compliance, rows, rows, out)
         return self._last[key]
 
     @cached_property
     def bone_rows(self) -> Floats:
         """Forces on the bone by forces on the candidates, (dim, m - dim)."""
-        return self.schur[-self.dim :, : -self.dim] @ self.compliance
+        return product(self.compliance.T, self.schur[-self.dim :, : -self.dim].T).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +164,7 @@ class LinearContactStep:
     tolerance: float = ROUNDING
 
     @cached_property
-    def relative_compliance(self) -> Floats:
+    def relative_compliance(self) -> Any:
         """Compliance of the candidates' positions relative to the surface."""
         return self.below.relative(self.body.compliance)
 
@@ -160,7 +175,7 @@ class LinearContactStep:
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(
-            unloaded_motion[:, 0] + self.relative_compliance @ self._present
+            unloaded_motion[:, 0] + product(self.relative_compliance, self._present)
         )
         status = self.candidates.status
         own = np.diagonal(self.relative_compliance)[1 :: self.body.dim]
@@ -190,7 +205,7 @@ class LinearContactStep:
             whole = np.zeros(unloaded_motion.shape[0])
             whole[self.body.rows(nodes)] = pushed
             moved = unloaded_motion[:, 0] + unloaded_motion[:, 1:] @ found.extra
-            moved += self.relative_compliance @ whole
+            moved += product(self.relative_compliance, whole)
             gap = known.surface.normal_gap + self._along_normal(moved)
             gap[nodes] = 0.0  # solved in the dense problem
             penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(known.surface.gap)))
@@ -239,7 +254,7 @@ class LinearContactStep:
         status = marks[0].astype(np.int64)
         return None if solves < 0 else (moved, whole, acts.reshape(c, 4)[:, :2], status, extra, solves, False)
 
-    def among(self, nodes: Ints) -> Floats:
+    def among(self, nodes: Ints) -> Any:
         """`relative_compliance` among these candidates, in the order of `CondensedTangent.rows`."""
         return self.below.among(self.body.among(nodes), self.body.rows(nodes))
 
@@ -257,7 +272,8 @@ class LinearContactStep:
     @cached_property
     def _own(self) -> Floats:
         """Diagonal compliance of each candidate along x[, z], (c, d)."""
-        return np.diagonal(self.relative_compliance).reshape(-1, self.body.dim)[:, ::2]
+        own = np.diagonal(self.relative_compliance).astype(float)
+        return own.reshape(-1, self.body.dim)[:, ::2]
 
     def _along_normal(self, moved: Floats) -> Floats:
         normal, dim = self.candidates.surface.axes[:, 0], self.body.dim
@@ -268,7 +284,7 @@ class LinearContactStep:
         dim = self.body.dim
         right = self.residual[:-dim] - self._present - self.body.schur[:-dim, -dim:] @ self.bone
         pushes = (unknown.push[:-dim] for unknown in self.unknowns)
-        return self.body.compliance @ np.column_stack([right, *pushes])
+        return product(self.body.compliance, np.column_stack([right, *pushes]))
 
     @cached_property
     def _present(self) -> Floats:
@@ -288,10 +304,11 @@ class LinearContactStep:
         """
         known, rows, dim = self.candidates[active_nodes], self.body.rows(active_nodes), self.body.dim
         follower = FollowerStiffness.of(known.follower_rate(self._own[active_nodes]))
-        among, motion, present = self.among(active_nodes), unloaded_motion[rows], self._present[rows]
-        motion[:, 0] += among @ present
-        C, W = follower.apply(among, motion)
-        W[:, 0] -= C @ present  # the unknowns are whole forces again, not increments
+        C, W, present = self.among(active_nodes), unloaded_motion[rows], self._present[rows]
+        if follower.loaded.size:
+            W[:, 0] += product(C, present)
+            C, W = follower.apply(C, W)
+            W[:, 0] -= C @ present  # the unknowns are whole forces again, not increments
         problem = self._problem(known, (C, W), self._bone_balance(rows, body_motion, (C, W), follower))
         attraction = AttractionStiffness(
             known.negative_stiffness, known.surface.normal_gap, known.gain_on_closing, known.by_force
@@ -355,11 +372,12 @@ class LinearContactStep:
             return None
         (C, W), (carried, pivot, value, floor) = active, self._far_balance(body_motion)
         row = carried[:, rows]
-        through = follower.transposed(row)
-        pivot = pivot + through @ W[:, 1:]
+        if follower.loaded.size:
+            through = follower.transposed(row)
+            row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
         own = np.diagonal(pivot)
         least_pivots = np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
-        return row + through @ C, pivot + least_pivots, value - through @ W[:, 0]
+        return row, pivot + least_pivots, value
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -377,5 +395,5 @@ class LinearContactStep:
         for i, unknown in enumerate(self.unknowns):
             if (condition := unknown.condition) is not None:
                 S[i], by_unknowns[i], wanted[i] = condition.row, condition.by_unknowns, condition.wanted
-                carried[i] = condition.row[:-dim] @ self.body.compliance
+                carried[i] = product(self.body.compliance.T, condition.row[:-dim])
         return S, by_unknowns, wanted, carried

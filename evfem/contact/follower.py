@@ -76,7 +76,7 @@ class Candidates:
         normal, along = np.maximum(self.force[:, 0], 0.0), self.shear_direction
         (c, n), every = self.force.shape, np.arange(len(normal))
         chord = self.friction + self.cohesion / np.where(normal > 0.0, normal, np.inf)
-        blocks = compliance.reshape(c, n, c, n)[every, 0, every]
+        blocks = compliance.reshape(c, n, c, n)[every, 0, every].astype(float)
         pressed = -blocks[:, 1:] / blocks[:, :1]
         on = np.where(along.any(axis=1), np.sum(pressed * along, axis=1), np.linalg.norm(pressed, axis=1))
         return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
@@ -131,8 +131,6 @@ class FollowerStiffness:
 
     def apply(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
         """(1 - C T)^-1 applied to the compliance (m, m) and to motions (m, p): T has few columns."""
-        if not self.loaded.size:
-            return C, W
         x, B = self._first + self.axis, self._low_rank_product(C)
         gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
         return C + gain @ C[x], W + gain @ W[x]

@@ -1,5 +1,5 @@
-r"""Unilateral contact with Coulomb friction on the dense compliance of the contact candidates: the problem,
-its laws, and the linear equations for given statuses of the nodes.
+r"""Unilateral contact with Coulomb friction on the dense compliance of the contact candidates: the problem
+and its laws.
 
 A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered per
 node. With the contact forces :math:`\lambda` the new gaps and slips are :math:`v = (g, s) = v_0 + C\lambda +
@@ -15,7 +15,8 @@ slip    g = 0, lam_t = mu lam_n e       lam_n >= 0, s along -e
 ======  ==============================  =====================================================
 
 In the plane a slip is FORWARD, e = -1, or BACKWARD, e = +1. In three dimensions it is SLIP, along
-e = z/abs(z), and the direction is an unknown of its own (`solve_statuses`). The same laws as projections:
+e = z/abs(z), and the direction is an unknown of its own (`evfem.contact.statuses`). The same laws as
+projections:
 
 .. math:: \lambda_n = \max(0, p), \quad \lambda_t = \mathrm{proj}_{\mu\lambda_n}(z), \qquad
           p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
@@ -44,8 +45,8 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import DenseSolver, Floats, Ints
-from evfem.common.constants import BLOCK, DISC_OWN, ROUNDING
+from evfem.common.arrays import DenseSolver, Floats, Ints, product
+from evfem.common.constants import DISC_OWN, ROUNDING
 from evfem.contact.byforce import OF_GAP_ALONE, OfGapAlone
 
 
@@ -155,7 +156,8 @@ class ContactProblem:
     def gives_way(self) -> bool:
         """Whether the compliance is not positive definite: the body yields against its load."""
         try:
-            return not np.linalg.cholesky(self.under_forces + self.under_forces.T).size
+            twice = np.add(self.under_forces, self.under_forces.T, dtype=float)
+            return not np.linalg.cholesky(twice).size
         except np.linalg.LinAlgError:
             return True
 
@@ -173,17 +175,18 @@ class ContactProblem:
     @cached_property
     def own(self) -> tuple[Floats, Floats]:
         """Diagonal compliance of each node, normal and tangent, (k,), at least `DISC_OWN` of the mean."""
-        i, C = self.dim * np.arange(self.size), self.under_forces
-        shear = np.abs(C[i + 1, i + 1])
-        if self.dim == 3:
-            a, b, c = C[i + 1, i + 1], C[i + 2, i + 2], 0.5 * (C[i + 1, i + 2] + C[i + 2, i + 1])
+        every, n = np.arange(self.size), self.dim
+        C = self.under_forces.reshape(self.size, n, self.size, n)[every, :, every].astype(float)
+        shear = np.abs(C[:, 1, 1])
+        if n == 3:
+            a, b, c = C[:, 1, 1], C[:, 2, 2], 0.5 * (C[:, 1, 2] + C[:, 2, 1])
             shear = 0.5 * np.abs(a + b) + np.hypot(0.5 * (a - b), c)
-        normal, shear = (np.maximum(a, max(DISC_OWN * a.mean(), 1e-300)) for a in (np.abs(C[i, i]), shear))
+        normal, shear = (np.maximum(a, max(DISC_OWN * a.mean(), 1e-300)) for a in (np.abs(C[:, 0, 0]), shear))
         return normal, shear
 
     def state(self, forces: Forces) -> Floats:
         """Gaps and slips (m,) under these forces."""
-        v = self.start + self.compliance @ (forces.contact + forces.attraction_loss)
+        v = self.start + product(self.compliance, forces.contact + forces.attraction_loss)
         if self.give is not None:
             v = v + self.give * forces.contact
         return v if self.extra_unknowns is None else v + self.extra_unknowns.columns @ forces.extra
@@ -246,134 +249,3 @@ def side(status: Ints) -> Floats:
 def sizes(vectors: Floats) -> Floats:
     """Lengths (k,) of vectors (k, d) in the plane of contact."""
     return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1] if vectors.shape[1] > 1 else 0.0))
-
-
-class _Equations:
-    """Unknowns and equations of nodes that have these statuses (k,).
-
-    Known per node, (k, 1 + d): the force of a closed one with unit pressing force, `sheared`, the attraction
-    that this adds, `gain`, and the constant `attraction_loss` and `shear`. Unknown, at `position` of the m
-    components: first the pressing forces of the `closed` nodes, of which `felt` (c, 1 + d) acts on the body,
-    the shear forces of sticking nodes, and the losses of the `attracted` open ones; then the shear forces
-    of the `turned` nodes (t,) along `aside` (t, 2), with the weight `kept` (t,), and the slip across with
-    `turns` (t,). All components that act with the unknowns are `whole` (w,), numbered by `index` (m,).
-    """
-
-    def __init__(
-        self, problem: ContactProblem, status: Ints, along: Floats, turning: Floats | None = None
-    ) -> None:
-        n, opened, resists = problem.dim, (status == OPEN)[:, None], problem.resists
-        along = np.where((status >= SLIP)[:, None], along, 0.0)
-        self.sheared = np.hstack([np.ones(opened.shape), problem.friction[:, None] * along])
-        self.gain, self.attraction_loss, self.shear = np.zeros((3, *self.sheared.shape))
-        if problem.cohesion is not None:
-            self.shear[:, 1:] = problem.cohesion[:, None] * along
-        attracted = np.zeros(0, dtype=np.int64)
-        if (attraction := problem.attraction) is not None:
-            attracted = np.flatnonzero(opened[:, 0] & (attraction.negative_stiffness > 0.0))
-            self.attraction_loss[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
-            self.gain = self.gain + attraction.by_force.gain
-            self.attraction_loss += attraction.by_force.loss(opened)
-        turned = np.flatnonzero((status == SLIP) & resists & (turning is not None))
-        m = np.ones(status.size) if turning is None else turning
-        self.attracted, self.turned, self.closed = attracted, turned, np.flatnonzero(status != OPEN)
-        self.aside = along[turned, ::-1] * np.array([-1.0, 1.0]) if turned.size else np.zeros((0, n - 1))
-        self.kept, self.turns = 1.0 - m[turned], m[turned] / problem.own[1][turned]
-        self._find(n, status)
-
-    def _find(self, n: int, status: Ints) -> None:
-        """Positions of the unknowns among the m components, and the components that act with them."""
-        closed, tangents = self.closed, np.arange(1, n)
-        self.felt = (self.sheared - self.gain)[closed]
-        sheared = closed[(status[closed] != STICK) & self.felt[:, 1:].any(axis=1)]
-        beside = np.append(self.turned, np.setdiff1d(sheared, self.turned)) if self.turned.size else sheared
-        held = (n * np.flatnonzero(status == STICK)[:, None] + tangents).ravel()
-        self.position = np.concatenate([n * closed, held, n * self.attracted])
-        self.whole = np.append(self.position, (tangents[:, None] + n * beside).ravel())
-        self.index = np.zeros(n * status.size, dtype=np.int64)
-        self.index[self.whole] = np.arange(self.whole.size)
-
-    def matrix(self, compliance: Floats) -> Floats:
-        """The equations (u, u) but for their diagonal, in blocks of rows that fit into the cache."""
-        columns = np.empty((self.whole.size, self.position.size + self.turned.size))
-        for begin in range(0, self.whole.size, BLOCK):
-            rows = compliance.take(self.whole[begin : begin + BLOCK], axis=0)
-            columns[begin : begin + BLOCK] = self.columns(rows.take(self.whole, axis=1))
-        return self.rows(columns)
-
-    def columns(self, C: Floats) -> Floats:
-        """Effect of the unknowns (q, u) from that of the `whole` (q, w), which is overwritten."""
-        n, first = self.felt.shape[1], C[:, : self.closed.size]
-        if (self.felt[:, 0] != 1.0).any():
-            first *= self.felt[:, 0]
-        for a in range(1, n):
-            if (some := np.flatnonzero(self.felt[:, a])).size:
-                first[:, some] += C[:, self.index[n * self.closed[some] + a]] * self.felt[some, a]
-        return self._across(C.T, self.aside).T
-
-    def rows(self, v: Floats) -> Floats:
-        """Rows (u, q) of the equations from gaps and slips of the `whole` (w, q), which are overwritten."""
-        return self._across(v, self.turns[:, None] * self.aside)
-
-    def _across(self, v: Floats, weight: Floats) -> Floats:
-        """v (w, q) with the tangential components of turned nodes as one, by a `weight` (t, 2) of each."""
-        size, end = self.position.size, self.position.size + self.turned.size
-        if self.turned.size:
-            v[size:end] *= weight[:, :1]
-            v[size:end] += v[self.index[self.felt.shape[1] * self.turned + 2]] * weight[:, 1:]
-        return v[:end]
-
-
-def solve_statuses(
-    problem: ContactProblem, status: Ints, along: Floats, turning: Floats | None = None
-) -> Forces:
-    r"""Forces of nodes that have these statuses (k,), slipping ones with a shear force `along` e (k, d): one
-    dense linear system; raises `numpy.linalg.LinAlgError` where that is singular.
-
-    In three dimensions the direction of a slip turns by a shear force lam_e along e_perp,
-
-    .. math:: (1 - m)\,\lambda_e + m\,r_t\,(e_\perp \cdot s) = 0, \qquad m = \min(1, \mu p/|z|),
-
-    with m given as `turning` (k,); at the solution r drops out.
-    """
-    extra, system = problem.extra_unknowns, _Equations(problem, status, along, turning)
-    position, closed, attracted, whole = system.position, system.closed, system.attracted, system.whole
-    steady = (system.attraction_loss + system.shear).ravel()
-    start = problem.start + problem.compliance @ steady if steady.any() else problem.start
-    right = -system.rows(start[whole, None])
-    matrix = system.matrix(problem.compliance)
-    pressed, own = np.split(np.arange(position.size), [position.size - attracted.size])
-    last = np.arange(position.size, len(right))
-    matrix[last, last] += system.kept
-    if problem.give is not None:
-        matrix[pressed, pressed] += problem.give[position[pressed]]
-    if attracted.size:
-        pull: Any = problem.attraction
-        matrix[own, own] -= 1.0 / pull.negative_stiffness[attracted]
-        right[own, 0] += pull.reference_gap[attracted]
-    names = whole.tobytes(), last.size
-    if extra is None:
-        x, d = problem.dense.solve(matrix, right, names)[:, 0], np.zeros(0)
-    else:
-        balance, rest = system.columns(extra.rows[:, whole]), extra.right - extra.rows @ steady
-        right = np.hstack([right, system.rows(extra.columns[whole])])
-        both = problem.dense.solve(matrix, right, names)
-        d = np.linalg.solve(extra.pivot - balance @ both[:, 1:], rest - balance @ both[:, 0])
-        x = both[:, 0] - both[:, 1:] @ d
-    pressing = np.zeros((problem.size, 1))
-    pressing[closed, 0] = x[: closed.size]
-    force = system.shear + pressing * system.sheared
-    attraction_loss = system.attraction_loss - pressing * system.gain
-    force.ravel()[position[closed.size : pressed.size]] = x[closed.size : pressed.size]
-    force[system.turned, 1:] += x[last, None] * system.aside
-    attraction_loss[attracted, 0] += x[own]
-    return Forces(force.ravel(), attraction_loss.ravel(), d)
-
-
-def linearised(problem: ContactProblem, found: Projected) -> Forces:
-    """The forces that solve the equations linearised where the laws were projected."""
-    if problem.dim == 2:
-        return solve_statuses(problem, found.status, side(found.status))
-    size = np.maximum(sizes(found.z), 1e-200)
-    limit = np.where(found.status == SLIP, np.maximum(problem.limit(found.p), 0.0), 0.0)
-    return solve_statuses(problem, found.status, found.z / size[:, None], np.minimum(1.0, limit / size))

@@ -42,8 +42,8 @@ from evfem.contact.signorini import (
     ContactSolution,
     Forces,
     Projected,
-    linearised,
 )
+from evfem.contact.statuses import linearised
 
 #: how often the attraction's stiffness is scaled down, by at least which factor, before that of a pad
 #: without closed nodes decides

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common import constants
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, Memory
 from evfem.contact.byforce import OF_GAP_ALONE, OfGapAlone
 from evfem.contact.condensed import COMPONENTS, CondensedTangent
 from evfem.contact.signorini import OPEN, STICK
@@ -60,7 +60,7 @@ class Linearisation:
         self._reachable = height - height.min() <= constants.FAR * limits.deepest
         self.factor: Any = None
         self.tangent: Any = None
-        self.stiffest = 0.0
+        self.stiffest, self._memory = 0.0, Memory()
         self._single = self.inaccurate = False
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self._made_at: TangentPoint | None = None
@@ -167,7 +167,7 @@ class Linearisation:
             raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
         self.inaccurate |= self._single and self.factor.schur.dtype != np.float32
         dim = self.body.bone.size
-        self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
+        self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim, self._memory)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         self._made_at = TangentPoint(state, self.touching, self._begin, self._seconds)
         self.record.factorisations += 1

@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import evfem as ev
 from evfem.common import arrays
 from evfem.common.arrays import DenseSolver, inverse
-from evfem.contact.signorini import FORWARD, OPEN, SLIP, STICK, Forces, Projected, side, solve_statuses
+from evfem.contact.condensed import CondensedTangent, ExtraUnknown, LinearContactStep
+from evfem.contact.follower import Candidates
+from evfem.contact.signorini import FORWARD, OPEN, SLIP, STICK, Forces, Projected, side
 from evfem.contact.solve import solve_contact
+from evfem.contact.statuses import solve_statuses
+from evfem.surface.pad import surface_state
 from tests.contact.test_disc import half_space, missed
 
 N = 400
@@ -63,10 +68,11 @@ def test_a_matrix_beyond_single_precision_is_solved_in_double():
 def test_the_inverse_has_the_precision_of_its_matrix(real, error):
     """Larger than one block of rows; positive definite, and indefinite by LU."""
     matrix = system(4)[0]
-    for one in (matrix @ matrix.T, matrix + matrix.T - 2.0 * np.eye(N) * (np.arange(N) % 2)):
+    indefinite = matrix + matrix.T - 2.0 * np.eye(N) * (np.arange(N) % 2)
+    for one, own in ((matrix @ matrix.T, real), (indefinite, float)):
         kept = one.astype(real)
         found = inverse(kept if one[1, 1] > 0.0 else one, symmetric=True)
-        assert found.dtype == float
+        assert found.dtype == own
         assert_allclose(found @ one, np.eye(N), atol=100 * error)
         assert_array_equal(kept, one.astype(real))
 
@@ -114,3 +120,40 @@ def test_contact_is_solved_to_its_tolerance():
         Projected.of(problem, Forces(loose.force, loose.attraction_drop, loose.extra)).miss.max()
         <= 0.02 + 1e-12
     )
+
+
+def pressed(real, dim=3, k=120):
+    """A step of the condensed body in space: a flat surface, nodes that touch, and the force on the bone."""
+    rng = np.random.default_rng(5)
+    A = rng.normal(size=(dim * k + dim, 2 * dim * k))
+    schur = (np.eye(len(A)) + A @ A.T / k).astype(real)
+    place = np.column_stack([rng.uniform(size=(k, 2)), np.zeros(k)])[:, [0, 2, 1]]
+    touching = rng.uniform(size=k) < 0.5
+    surface = surface_state(ev.Flat().shifted(0.0), place - np.outer(0.1 * ~touching, [0.0, -1.0, 0.0]))
+    normal, zero = np.where(touching, rng.uniform(0.01, 0.02, k), 0.0), np.zeros(k)
+    force, status = np.outer(normal, [1.0, 0.1, 0.05]), np.where(touching, STICK, OPEN)
+    known = Candidates(
+        surface, np.zeros((k, 2)), force, status, zero + 0.3, np.zeros((k, 3)), zero, zero, np.zeros((k, 2))
+    )
+    body = CondensedTangent.make(schur, None, dim)
+    extra = (ExtraUnknown(-schur[:, 1 - dim].astype(float), 1, -2.0),)
+    return LinearContactStep(body, known, rng.normal(size=len(A)), np.zeros(dim), extra)
+
+
+def test_a_compliance_of_single_precision_is_kept_so_and_taken_as_exact():
+    """The motion and the forces on it are those on the same numbers in double precision."""
+    step = pressed(np.float32)
+    body = step.body
+    assert body.compliance.dtype == np.float32
+    assert CondensedTangent.make(body.schur, None, 2).compliance.dtype == float
+    exact = CondensedTangent(body.schur.astype(float), body.compliance.astype(float), 3)
+    assert_allclose(body.bone_rows, exact.bone_rows, rtol=0, atol=1e-13)
+    found, expected = step.solve(), replace(step, body=exact).solve()
+    assert {OPEN, STICK} < set(found.status)
+    for one, other in ((found.force, expected.force), (found.moved, expected.moved)):
+        assert_allclose(one, other, atol=1e-11 * np.abs(other).max())
+    # of other candidates, and of the first again: the memory is the same
+    some, all_of = np.arange(5, 70), np.arange(120)
+    for nodes in (all_of, some, all_of):
+        rows = body.rows(nodes)
+        assert_array_equal(body.among(nodes), body.compliance[np.ix_(rows, rows)])
