@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints, linalg, mkl
+from evfem.common.arrays import Floats, Ints, block, linalg, mkl
 from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
 from evfem.tissue.kernels.blocks import sparse_cholesky
@@ -117,7 +117,7 @@ class Pardiso:
             self._analysed = error == 0
             if error == 0 and self._iparm[PERTURBED] == 0 and np.isfinite(S).all() and self._accurate():
                 rank = np.argsort(self._order)
-                self.schur = S[np.ix_(rank, rank)]
+                self.schur = block(S, rank, rank)
                 self.schur[np.diag_indices_from(S)] -= shift
                 return
         raise Singular(f"PARDISO error {error}, {self._iparm[PERTURBED]} perturbed pivots")

@@ -166,9 +166,9 @@ class Linearisation:
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
         self.inaccurate |= self._single and self.factor.schur.dtype != np.float32
-        dim = self.body.bone.size
+        self.stiffest, dim = float(upper[self.body.pattern.diagonal].max()), self.body.bone.size
+        del upper  # a twentieth of the memory of a large body
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim, self._memory)
-        self.stiffest = float(upper[self.body.pattern.diagonal].max())
         self._made_at = TangentPoint(state, self.touching, self._begin, self._seconds)
         self.record.factorisations += 1
 
@@ -258,11 +258,13 @@ class Linearisation:
         # nodes beyond the candidates move along with their neighbours, so that sliding changes nothing
         along = np.where((column < 0) & (axis != 1), row - row % dim + axis, column)
         inside = (row >= 0) & (along >= 0)
-        added = Entries(unknowns.size, row[inside], along[inside], whole.value[inside]).toarray()
         normal = surface_state(self.interface.surface, pad.position[c]).axes[:, 0, COMPONENTS[:dim]]
-        softening = self.weakening(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
         # softening with the node's own gap is in the contact problem already
-        blocks = added.reshape(c.size, dim, c.size, dim)
-        blocks[np.arange(c.size), :, np.arange(c.size)] -= softening
-        stiffened = np.abs(added).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
-        return added if stiffened.max() > constants.SMALLEST_STIFFENING else None
+        softening = -self.weakening(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        own = np.arange(unknowns.size).reshape(c.size, dim)
+        between = row[inside], along[inside], whole.value[inside]
+        within = own[:, :, None], own[:, None, :], softening
+        added = Entries.of(unknowns.size, [between, within]).summed()
+        stiffened = np.bincount(added.row, np.abs(added.value), added.size)
+        faint = (stiffened <= constants.SMALLEST_STIFFENING * np.diagonal(self.factor.schur)[:-dim]).all()
+        return None if faint else added.toarray()

@@ -161,6 +161,11 @@ class Entries(NamedTuple):
             return cls(size, *(np.zeros(0, dtype=np.int64),) * 2, np.zeros(0))
         return cls(size, *(np.concatenate([each[i].ravel() for each in whole]) for i in range(3)))
 
+    def summed(self) -> Entries:
+        """The same without duplicates."""
+        flat, of = np.unique(self.size * self.row + self.column, return_inverse=True)
+        return Entries(self.size, *np.divmod(flat, self.size), np.bincount(of, self.value, flat.size))
+
     def toarray(self) -> Floats:
         """The dense matrix."""
         flat: Any = np.bincount(self.size * self.row + self.column, self.value, self.size**2)

@@ -21,7 +21,7 @@ from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.surface.surfaces import Display, Sinusoid
-from evfem.terms.traction import PadTraction
+from evfem.terms.traction import Entries, PadTraction
 
 #: voltages that no insulator stands, to see far attractions from near
 pytestmark = pytest.mark.filterwarnings("ignore:.* V make a field")
@@ -222,6 +222,31 @@ def test_iterations_in_vain_are_known_from_the_residuals():
     assert not no_progress(VAIN[:8], False)
     assert not no_progress([*VAIN, 9e-3], False)
     assert not no_progress([*VAIN, 2.0], False)  # the bone is still on its way
+
+
+def test_a_faint_coupling_is_known_without_its_dense_matrix(monkeypatch):
+    """It is refused where no row of it is a hundredth of the tissue's stiffness, by what adds up there."""
+    linear, _, state = made(voltage=VOLTS, law=StrongTroxel(), body=FINE)
+    linear.choose_candidates(state, 0.5)
+    linear.refactorise_if_needed(state, [])
+    monkeypatch.setattr(constants, "SMALLEST_STIFFENING", 0.0)
+    found = linear._coupling(state)
+    row = (np.abs(found).sum(axis=1) / np.diagonal(linear.factor.schur)[:-2]).max()
+    monkeypatch.setattr(Entries, "toarray", None)
+    monkeypatch.setattr(constants, "SMALLEST_STIFFENING", (1.0 + 1e-9) * row)
+    assert linear._coupling(state) is None
+    monkeypatch.setattr(constants, "SMALLEST_STIFFENING", (1.0 - 1e-9) * row)
+    with pytest.raises(TypeError):
+        linear._coupling(state)
+
+
+def test_entries_add_up():
+    many = Entries(3, np.array([0, 2, 0, 2]), np.array([1, 2, 1, 0]), np.array([1.0, 2.0, -4.0, 8.0]))
+    one = many.summed()
+    assert one.row.tolist() == [0, 2, 2]
+    assert one.column.tolist() == [1, 0, 2]
+    assert one.value.tolist() == [-3.0, 8.0, 2.0]
+    np.testing.assert_array_equal(one.toarray(), many.toarray())
 
 
 @pytest.fixture
