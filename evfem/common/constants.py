@@ -48,8 +48,9 @@ FIRST_CANDIDATES = 0.05
 CANDIDATE_GROWTH, CANDIDATE_ROUNDS = 3.0, 4
 #: changes of tributary lengths that stiffen no node by more than this fraction are left to the iterations [C]
 SMALLEST_STIFFENING = 0.01
-#: an attraction whose feedback on its own node is below this fraction is left to the next iteration [C]
-WEAK = 1e-4
+#: an attraction whose feedback on its own node is below this fraction, by dimension, is left to the next
+#: iteration: in 3D nodes that take part cost more than iterations [C, press]
+WEAK = {2: 1e-4, 3: 1e-2}
 #: a residual above the first, or above the second times the last one, asks for a new factorisation [A, B]
 STALLED, SLOW = 0.1, 0.5
 #: and so does a time step outside these multiples of the one it was made for [texture]
@@ -74,8 +75,16 @@ BLOCK = 64
 #: a tangent with so many kept unknowns is factorised in single precision, as few are in the plane, where that
 #: gains nothing [space]
 LARGE_SCHUR = 1000
-#: and so is one of so many unknowns: x 1.15 to 1.2 on L2, and x 0.98 where that is refused once [A, B]
-LARGE_TANGENT = 30_000
+#: and so is one of so many unknowns: x 1.15 to 1.2 on L2, and x 0.98 where that is refused once [A, B]; in space
+#: a factorisation then costs as much as ten iterations and more
+LARGE_BODY = 30_000
+#: such a body in space keeps so many times as many candidates as are needed, once nodes touch, as every new
+#: choice costs an analysis of the matrix [ridged tips]; of small bodies under a strong attraction steps were cut
+KEPT = 2.5
+#: while their compliance takes less than this fraction of the operations of the factorisation [whorls]
+CHEAP = 0.5
+#: and its residuals are judged by the mean rate of so many iterations: single ones stall [ridged tips]
+RATES = 3
 #: where factors of single precision give the motion under equal forces to this fraction [space]
 ACCURATE = 1e-3
 #: contact in space is solved to this fraction of the residual of the iterate; from 1e-2 on the next residual

@@ -180,7 +180,8 @@ class LinearContactStep:
         status = self.candidates.status
         own = np.diagonal(self.relative_compliance)[1 :: self.body.dim]
         # in contact, in the surface, or attracted with a feedback on the node itself
-        active = (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
+        fed_back = self.candidates.negative_stiffness * own > WEAK[self.body.dim]
+        active = (status != OPEN) | (gap < 0.0) | fed_back
         if not active.any():  # the dense problem has at least one node: the one with the smallest gap
             active[np.argmin(gap)] = True
         found = self._compiled(active, unloaded_motion, body_motion) if self.body.dim == 2 else None

@@ -45,6 +45,23 @@ def no_progress(residuals: list[float], same: bool) -> bool:
     return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
 
 
+def too_old(residuals: list[float], tolerance: float, patience: float, over: int) -> bool:
+    """Whether a factorisation is to be made anew: at the mean rate of the last `over` iterations, but for the
+    first one of a step, more than `patience` would be left, or residuals fall too slowly.
+
+    >>> falls = [1.0, 1e-2, 3e-5, 2e-5]
+    >>> too_old(falls, 1e-8, 8.0, over=1), too_old(falls, 1e-8, 8.0, over=3)
+    (True, False)
+    """
+    if (count := len(residuals) - 1) < 1:
+        return False
+    now, first = residuals[-1], max(count - over, min(1, count - 2), 0)
+    rate = (now / max(residuals[first], 1e-30)) ** (1.0 / (count - first))
+    if now > constants.STALLED or rate > constants.SLOW:
+        return True
+    return bool(now > tolerance and np.log(tolerance / now) / np.log(rate) > patience)
+
+
 class Linearisation:
     """Candidates, factorisation and condensed tangent of a body under an attraction."""
 
@@ -110,17 +127,31 @@ class Linearisation:
         self.factor = None
 
     def _follow(self, state: State, gap: Floats, steep: Any) -> None:
-        """Candidates in three dimensions: nodes in contact and half as many others; distant ones are dropped
-        once a step.
+        """Candidates in three dimensions: nodes in contact and others near them, as many as cost little;
+        distant ones are dropped once a step.
         """
         needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
         if self.candidates.size and needed[self.candidates].sum() == needed.sum():
             return
         count = max(constants.SPARE * needed.sum(), constants.FIRST_CANDIDATES * self.pad.free.sum())
+        if self._costly and self.touching.any():  # in a linear step from afar too many would touch at once
+            count = max(count, min(constants.KEPT * needed.sum(), self._cheap))
         enough = np.sort(gap)[min(int(count), int(self.pad.free.sum()) - 1)]
         chosen = np.flatnonzero(self.pad.free & (gap <= enough) | needed)
         self.candidates = chosen if self._may_drop_candidates else np.union1d(self.candidates, chosen)
         self.factor, self._may_drop_candidates = None, False
+
+    @property
+    def _costly(self) -> bool:
+        """Whether a factorisation takes the time of several iterations: of a large body in space."""
+        return bool(self.interface.follows and self.body.pattern.size >= constants.LARGE_BODY)
+
+    @property
+    def _cheap(self) -> float:
+        """Number of candidates in space whose compliance takes few operations, m^3 for m unknowns, beside the
+        factorisation, about 10 n^2 for n unknowns.
+        """
+        return (constants.CHEAP * 10.0 * self.body.pattern.size**2) ** (1.0 / 3.0) / 3.0
 
     # -- factorisation
 
@@ -132,7 +163,8 @@ class Linearisation:
         if self._has_fringes(state) and no_progress(history, same):
             self._outdated |= not self.fringes
             self.fringes = True
-        if not self.outdated and not self._too_old(history):
+        limits, over = self.limits, constants.RATES if self._costly else 1
+        if not self.outdated and not too_old(history, limits.tolerance, limits.strategy.patience, over):
             return False
         self.factorise(state)
         return True
@@ -153,7 +185,7 @@ class Linearisation:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             # static condensation keeps candidates and bone
             kept = np.concatenate([unknowns, self.body.bone])
-            large = kept.size >= constants.LARGE_SCHUR or self.body.pattern.size >= constants.LARGE_TANGENT
+            large = kept.size >= constants.LARGE_SCHUR or self.body.pattern.size >= constants.LARGE_BODY
             self._single = large and not self.inaccurate
             self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, self._single)
             self.record.backend = type(self.factor).__name__
@@ -200,18 +232,6 @@ class Linearisation:
         for traction in self.attraction.keeping:
             traction.begin(self.interface.pad_state(at.begin, at.begin.touching), at.duration)
         self.factorise(at.state)
-
-    def _too_old(self, history: list[float]) -> bool:
-        if len(history) < 2:
-            return False
-        before, now = history[-2:]
-        if now > constants.STALLED or now > constants.SLOW * before:
-            return True
-        # iterations left at the last rate of convergence, against the strategy's patience
-        tolerance = self.limits.tolerance
-        if now <= tolerance:
-            return False
-        return bool(np.log(tolerance / now) / np.log(now / before) > self.limits.strategy.patience)
 
     # -- the attraction
 

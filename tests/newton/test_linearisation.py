@@ -15,7 +15,7 @@ from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.roughness import PowerRoughness
 from evfem.newton import condensation
 from evfem.newton.condensation import Singular
-from evfem.newton.linearisation import no_progress
+from evfem.newton.linearisation import no_progress, too_old
 from evfem.newton.state import StepFailed
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
@@ -249,6 +249,28 @@ def test_entries_add_up():
     np.testing.assert_array_equal(one.toarray(), many.toarray())
 
 
+@pytest.mark.parametrize(
+    ("residuals", "last", "mean"),
+    [
+        ([1.0], False, False),
+        ([1.0, 0.2], True, True),  # above 0.1
+        ([1.0, 1e-2], False, False),
+        ([1.0, 0.02, 0.012], True, False),  # one iteration stalls: 0.11 each in the mean of two
+        ([1e-2, 1e-4, 3e-5, 1e-5], False, False),
+        ([1.0, 1e-4, 6e-5, 3.9e-5], True, True),  # the first fall is no rate
+        ([1e-2, 1e-4, 8e-5, 4.1e-5, 1.5e-5], False, True),  # 17 to go at 0.53
+        ([1.0, 0.3, 0.03, 2e-2, 2e-3], False, False),
+        ([1e-3, 1e-8, 1e-8], True, False),
+        ([0.0, 0.2], True, True),  # nothing acted before
+        ([0.0, 0.0], False, False),
+        ([1e-2, 0.0], False, False),
+    ],
+)
+def test_a_tangent_is_renewed_by_the_last_rate_or_by_the_mean_one(residuals, last, mean):
+    found = [too_old(residuals, 1e-8, 8.0, over) for over in (1, 3)]
+    assert found == [last, mean]
+
+
 @pytest.fixture
 def under_the_field():
     """A linearisation under the full field, its model, and a state 0.1 mm above the display."""
@@ -286,7 +308,7 @@ def test_in_vain_the_tangent_is_that_of_the_field(under_the_field):
 @pytest.mark.parametrize(("bound", "refused"), [(0.0, True), (np.inf, False)] if mkl() else [])
 def test_a_precision_that_was_not_accurate_is_not_tried_again(bound, refused, monkeypatch):
     """Nor by a run that is resumed, whose steps must be those of the whole run."""
-    monkeypatch.setattr(constants, "LARGE_TANGENT", 1)
+    monkeypatch.setattr(constants, "LARGE_BODY", 1)
     monkeypatch.setattr(condensation, "ACCURATE", bound)
     linear, model, state = made()
     linear.choose_candidates(state, 0.1)

@@ -9,9 +9,12 @@ from tools.domes import LINEAR, Dome, dome, dome_scene
 from tools.steps import begin_under
 
 import evfem as ev
+from evfem.common import constants
+from evfem.common.constants import WEAK
 from evfem.contact.condensed import Candidates
 from evfem.contact.follower import FollowerStiffness
 from evfem.contact.signorini import OPEN, SLIP, STICK
+from evfem.newton.linearisation import Linearisation
 from evfem.simulation.model import make_model
 from evfem.surface.pad import surface_state
 
@@ -154,6 +157,52 @@ def test_candidates_grow_within_a_step_and_what_has_left_is_let_go_in_the_next()
     linear.choose_candidates(touches, 0.0)
     assert rim in linear.candidates
     assert linear.candidates.size < wide.size
+
+
+def test_many_candidates_are_kept_beside_what_touches_where_they_cost_little(monkeypatch):
+    """2.5 times as many as touch, or as many as may have m^3 operations in 10 n^2, at least 1.5 times, which
+    are those of a small body.
+    """
+    body, model, state = at_rest()
+    linear, deep, large = body.linearisation, sunk(state, 0.05), body.body.pattern.size
+    monkeypatch.setattr(constants, "LARGE_BODY", large)
+    gap = surface_state(model.surface, model.equilibrium.interface.positions(deep.u)).gap
+    sunken = int((gap <= 0.0).sum())
+    cases = [(True, 1e3, 2.5), (True, 1e-9, 1.5), (False, 1e3, 1.5), (True, None, 2.0), (True, 1e3, 1.5)]
+    for touches, cheap, most in cases:
+        if (touches, cheap, most) == cases[-1]:
+            monkeypatch.setattr(constants, "LARGE_BODY", large + 1)
+        found = 2.0 * sunken
+        few = (3.0 * found) ** 3 / (10.0 * large**2) * (1.0 + 1e-9)
+        monkeypatch.setattr(constants, "CHEAP", few if cheap is None else cheap)
+        linear.begin(replace(state, status=np.full_like(state.status, STICK if touches else OPEN)))
+        linear.candidates = linear.candidates[:0]
+        linear.choose_candidates(deep, 0.0)
+        assert set(np.flatnonzero(gap <= 0.0)) <= set(linear.candidates)
+        # neighbours as deep, by symmetry, come together
+        assert most * sunken <= linear.candidates.size <= most * sunken + 9
+
+
+def test_equilibria_do_not_depend_on_what_is_kept_and_for_how_long(monkeypatch):
+    """Pressed and slid: other candidates, other rules of renewal, the whole feedback of the attraction."""
+    monkeypatch.setattr(constants, "LARGE_BODY", 1)
+    made, factorise = [], Linearisation.factorise
+    monkeypatch.setattr(Linearisation, "factorise", lambda *given: made.append(1) or factorise(*given))
+    motion = [ev.Press(force=0.3, steps=5), ev.Slide(0.05, steps=3, hold="force")]
+
+    def run(**changes):
+        made.clear()
+        for name, value in changes.items():
+            monkeypatch.setattr(constants, name, value)
+        finger = Dome(shape=dome((12, 2, 12)), law=TISSUE)
+        found = ev.simulate(dome_scene(*motion, finger=finger))
+        return np.stack([found.normal_force, found.tangential_force_x]), len(made)
+
+    (forces, few), (others, many) = run(), run(KEPT=1.5, RATES=1)
+    monkeypatch.setitem(WEAK, 3, 1e-12)
+    assert_allclose(others, forces, atol=1e-7 * np.abs(forces).max())
+    assert_allclose(run()[0], others, atol=1e-7 * np.abs(forces).max())
+    assert few < many
 
 
 @pytest.mark.parametrize(("stiff", "many"), [(0.1, False), (1e-3, True)])
