@@ -100,16 +100,18 @@ class Pardiso:
         return self._handle.ctypes.data, kind, (*matrix, *control)
 
     def factorise(self, upper: Floats) -> None:
-        """Factorise new values; raises `Singular` if even the indefinite factorisation fails."""
+        """Factorise new values, which are used up; raises `Singular` if even the indefinite factorisation
+        fails.
+        """
         shift = shift_of_kept(self.pattern, self.kept, upper)
+        upper[self.pattern.diagonal[self.kept]] += shift
         kinds: list[tuple[int, Any]] = [(2, np.float32), (2, np.float64), (-2, np.float64)]
         for mtype, real in kinds[kinds.index((self.mtype, self.real)) :]:
             if (mtype, real) != (self.mtype, self.real):
                 self.close()
                 self.real = real
                 self._start(mtype)
-            self._values, self.schur = upper.astype(real), np.zeros((0, 0))
-            self._values[self.pattern.diagonal[self.kept]] += shift
+            self._values, self.schur = upper.astype(real, copy=False), np.zeros((0, 0))
             S, b = np.zeros(2 * (self.kept.size,), real), np.zeros(self.pattern.size, real)
             self._open = True
             error = 0 if self._analysed else self._call(11, b, S)
@@ -191,11 +193,11 @@ class SuperLU:
         self.schur = np.zeros((kept.size, kept.size))
 
     def factorise(self, upper: Floats) -> None:
-        """Factorise new values of the pattern; raises `Singular` if that fails."""
+        """Factorise new values of the pattern, which are used up; raises `Singular` if that fails."""
         from scipy.sparse.linalg import splu
 
         options = {"SymmetricMode": True, "Equil": False}
-        shift, upper = shift_of_kept(self.pattern, self.kept, upper), upper.copy()
+        shift = shift_of_kept(self.pattern, self.kept, upper)
         upper[self.pattern.diagonal[self.kept]] += shift
         A = self.pattern.full(upper)
         try:

@@ -193,12 +193,12 @@ class Linearisation:
         upper = self.body.tangent(state.u, pressure)
         if self.interface.follows:
             self._subtract_softening(upper, state)
+        self.stiffest, dim = float(upper[self.body.pattern.diagonal].max()), self.body.bone.size
         try:
             self.factor.factorise(upper)
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
         self.inaccurate |= self._single and self.factor.schur.dtype != np.float32
-        self.stiffest, dim = float(upper[self.body.pattern.diagonal].max()), self.body.bone.size
         del upper  # a twentieth of the memory of a large body
         self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim, self._memory)
         self._made_at = TangentPoint(state, self.touching, self._begin, self._seconds)

@@ -101,6 +101,16 @@ def test_condensation_equals_dense_elimination(back_end, kept):
     compare(factor, problem, kept, 1e-12)
 
 
+@pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
+def test_values_of_double_precision_are_not_copied(back_end):
+    problem = random_problem()
+    pattern = Pattern(problem.unknowns, 1)
+    factor, upper = back_end(pattern, KEPT), entries(pattern, problem.cells)
+    factor.factorise(upper)
+    assert np.shares_memory(factor._values, upper)
+    compare(factor, problem, KEPT, 1e-12)
+
+
 @every_back_end
 def test_one_analysis_many_factorisations(back_end):
     """Definite, indefinite and definite again: each answer belongs to the last matrix given."""
