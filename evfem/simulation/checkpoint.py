@@ -197,7 +197,7 @@ class Checkpoint:
         try:
             owner, version = str(arrays["scene"]), str(arrays["version"])
             rows, probes = _lines(self._grown.path, *(int(one) for one in arrays["rows"]))
-            state = {**unpacked(arrays), PROBES: np.array(probes)}
+            state = unpacked(arrays) | ({PROBES: np.array(probes)} if any(probes) else {})
             odd = sorted({*COLUMNS} - {*rows[0]}) if rows and not columns_of(rows[0]) else []
             if owner == scene_digest and not odd:
                 _check_rows(rows)
