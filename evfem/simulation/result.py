@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -93,6 +94,8 @@ class Frame(MadeLater):
 _SHAPES: dict[str, tuple[str, ...]] = {
     spec.name: spec.metadata["shape"] for spec in fields(Frame) if spec.metadata
 }
+#: of a warning in a printed result
+WIDTH = 84
 #: unit of a field that is not in MPa
 FIELD_UNITS = {"displacement": "mm", "gap": "mm", "surface_sink": "mm", "contact_status": "", "J": ""}
 #: size in a shape -> its name in a data set
@@ -266,7 +269,7 @@ class Result(History, FurtherColumns, Told):
         lines[3] = f"over {self.depth:g} mm: {lines[3]}" if self._shows_total else lines[3]
         if (drift := self.load_drift) > DRIFT:
             lines.append(f"the load drifted by {drift:.1%} at a held indentation")
-        lines += self.warnings
+        lines += [part for said in self.warnings for part in wrap(said, WIDTH, subsequent_indent="  ")]
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:

@@ -164,7 +164,8 @@ class Entries(NamedTuple):
     def summed(self) -> Entries:
         """The same without duplicates."""
         flat, of = np.unique(self.size * self.row + self.column, return_inverse=True)
-        return Entries(self.size, *np.divmod(flat, self.size), np.bincount(of, self.value, flat.size))
+        row, column = np.divmod(flat, self.size)
+        return Entries(self.size, row, column, np.bincount(of, self.value, flat.size))
 
     def toarray(self) -> Floats:
         """The dense matrix."""

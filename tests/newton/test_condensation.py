@@ -101,7 +101,7 @@ def test_condensation_equals_dense_elimination(back_end, kept):
     compare(factor, problem, kept, 1e-12)
 
 
-@pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
+@pytest.mark.parametrize("back_end", WITH_PARDISO)
 def test_values_of_double_precision_are_not_copied(back_end):
     problem = random_problem()
     pattern = Pattern(problem.unknowns, 1)
