@@ -95,7 +95,7 @@ _SHAPES: dict[str, tuple[str, ...]] = {
     spec.name: spec.metadata["shape"] for spec in fields(Frame) if spec.metadata
 }
 #: of a warning in a printed result
-WIDTH = 84
+WIDTH = 80
 #: unit of a field that is not in MPa
 FIELD_UNITS = {"displacement": "mm", "gap": "mm", "surface_sink": "mm", "contact_status": "", "J": ""}
 #: size in a shape -> its name in a data set
