@@ -243,9 +243,12 @@ def test_a_charge_is_kept_by_a_finger_under_a_given_force():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_voltage_is_found_for_every_gap_through_the_pull_in_and_back(dim):
-    """U^2 = 2 k x (g + s)^2 / (eps_0 A): up to a third of the gap, down beyond, and the same way back."""
+    """U^2 = 2 k x (g + s)^2 / (eps_0 A): up to a third of the gap, down beyond, and the same way back; at no
+    force the square of the voltage has the error of the forces, 1e-8 of (853 V)^2 by default.
+    """
     there = [ev.VoltageRamp(gap=0.02, steps=8), ev.VoltageRamp(gap=GAP, steps=2)]
-    found, (k, area) = ev.simulate(scene(dim, 0.0, there)), spring(dim)
+    found = ev.simulate(scene(dim, 0.0, there, solver=ev.Solver(tolerance=1e-10)))
+    k, area = spring(dim)
     gap = np.array([0.10, 0.09, 0.08, 0.07, 0.06, 0.05, 0.04, 0.03, 0.02, 0.06, 0.10])
     np.testing.assert_allclose(found.min_gap, gap, rtol=1e-8)
     expected = np.sqrt(2.0 * k * np.maximum(GAP - gap, 0.0) * (gap + SOLIDS) ** 2 / (eps_0 * area))
