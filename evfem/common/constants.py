@@ -75,8 +75,8 @@ BLOCK = 64
 #: a tangent with so many kept unknowns is factorised in single precision, as few are in the plane, where that
 #: gains nothing [space]
 LARGE_SCHUR = 1000
-#: and so is one of so many unknowns: x 1.15 to 1.2 on L2, x 0.98 where that is refused once [A, B]; in
-#: space a factorisation then costs as much as ten iterations and more
+#: and so is one of so many unknowns, in the plane by own factors: x 1.4 to 1.5 on L2, x 0.98 where that
+#: is refused once [A, B]; in space a factorisation then costs as much as ten iterations and more
 LARGE_BODY = 30_000
 #: such a body in space keeps so many times as many candidates as are needed, once nodes touch, as every new
 #: choice costs an analysis [ridged tips]; of small bodies under a strong attraction steps were cut

@@ -182,9 +182,9 @@ def checked_by(
 
     for variant in (*_others(scene, own), *_for_errors(scene, mesh)):
         add(variant, run)
-    with other_solver() as name:
-        if name:
-            add(Variant(PATH, f"sparse solver {name}", partial(replace, scene)), simulate)
+    with other_solver() as there:
+        if there:
+            add(Variant(PATH, "another sparse solver", partial(replace, scene)), simulate)
     return Checked(rows, accuracies(names, own, found, scene))
 
 

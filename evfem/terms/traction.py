@@ -165,7 +165,8 @@ class Entries(NamedTuple):
         """The same without duplicates."""
         flat, of = np.unique(self.size * self.row + self.column, return_inverse=True)
         row, column = np.divmod(flat, self.size)
-        return Entries(self.size, row, column, np.bincount(of, self.value, flat.size))
+        value: Any = np.bincount(of, self.value, flat.size)
+        return Entries(self.size, row, column, value)
 
     def toarray(self) -> Floats:
         """The dense matrix."""

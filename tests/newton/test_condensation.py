@@ -123,10 +123,12 @@ def test_one_analysis_many_factorisations(back_end):
         compare(factor, scaled, KEPT, 1e-10)
 
 
-@pytest.mark.parametrize("back_end", WITH_PARDISO)
-@pytest.mark.parametrize(("stiff", "real", "rtol"), [(1.0, np.float32, 1e-5), (1e7, np.float64, 1e-9)])
+@pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
+@pytest.mark.parametrize(("stiff", "real", "rtol"), [(1.0, np.float32, 1e-5), (1e9, np.float64, 1e-7)])
 def test_single_precision_is_taken_where_it_moves_the_interior_alike(back_end, stiff, real, rtol):
-    """A stiff chain on soft springs to the kept unknowns: as a whole it moves by what its pivots cancel."""
+    """A stiff chain on soft springs to the kept unknowns: as a whole it moves by what its pivots cancel, of
+    1e9 all seven digits, and in double precision all but seven.
+    """
     inner = np.setdiff1d(np.arange(40), KEPT)
     chain, springs = np.stack([inner[:-1], inner[1:]], axis=1), np.stack([inner, np.resize(KEPT, 34)], axis=1)
     cells = [stiff * np.array([[1.0, -1.0], [-1.0, 1.0]])] * 33 + [np.array([[2.0, 1.0], [1.0, 2.0]])] * 34

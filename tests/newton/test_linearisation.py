@@ -22,6 +22,7 @@ from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.surface.surfaces import Display, Sinusoid
 from evfem.terms.traction import Entries, PadTraction
+from evfem.tissue.kernels.blocks import loops
 
 #: voltages that no insulator stands, to see far attractions from near
 pytestmark = pytest.mark.filterwarnings("ignore:.* V make a field")
@@ -304,8 +305,8 @@ def test_in_vain_the_tangent_is_that_of_the_field(under_the_field):
     assert np.abs(field[np.ix_(unknowns, unknowns)] - by_columns).max() > 0.01 * np.abs(coupling).max()
 
 
-# PARDISO alone has factors of single precision
-@pytest.mark.parametrize(("bound", "refused"), [(0.0, True), (np.inf, False)] if mkl() else [])
+# SuperLU has no factors of single precision
+@pytest.mark.parametrize(("bound", "refused"), [(0.0, True), (np.inf, False)] if mkl() or loops() else [])
 def test_a_precision_that_was_not_accurate_is_not_tried_again(bound, refused, monkeypatch):
     """Nor by a run that is resumed, whose steps must be those of the whole run."""
     monkeypatch.setattr(constants, "LARGE_BODY", 1)

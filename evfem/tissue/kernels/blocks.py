@@ -67,15 +67,16 @@ def contact_loop() -> Any:
 
 @cache
 def sparse_cholesky() -> Any:
-    """The compiled sparse Cholesky factors, and the dense algebra of scipy that they take; None where they
-    were not built.
+    """The compiled sparse Cholesky factors, and by precision the dense algebra of scipy that they take; None
+    where they were not built.
     """
     try:
         kernel = import_module("evfem.tissue.kernels.cholesky")
     except ImportError:
         return None
-    names = ("dpotrf", "dtrsm", "dsyrk", "dgemv", "dtrsv")
-    return kernel, tuple(_address("lapack" if name == "dpotrf" else "blas", name) for name in names)
+    names = (("lapack", "potrf"), *(("blas", name) for name in ("trsm", "syrk", "gemv", "trsv")))
+    algebra = {kind: tuple(_address(library, kind + name) for library, name in names) for kind in "sd"}
+    return kernel, algebra
 
 
 def _address(library: str, name: str) -> int:

@@ -24,20 +24,12 @@ typedef struct {
 } supernode;
 
 typedef struct {
-    void (*potrf)(char *, int *, double *, int *, int *);
-    void (*trsm)(char *, char *, char *, char *, int *, int *, double *, double *, int *, double *, int *);
-    void (*syrk)(char *, char *, int *, int *, double *, double *, int *, double *, double *, int *);
-    void (*gemv)(char *, int *, int *, double *, double *, int *, double *, int *, double *, double *, int *);
-    void (*trsv)(char *, char *, char *, int *, double *, int *, double *, int *);
-} algebra;
-
-typedef struct {
-    algebra with;
-    int size, inner, count, *order, *place, *local; /* `inner` unknowns are eliminated, in `count` supernodes */
+    unsigned long long addresses[5]; /* of potrf, trsm, syrk, gemv, trsv */
+    int single, size, inner, count, *order, *place, *local; /* `inner` unknowns are eliminated, in `count` supernodes */
     int64_t entries, *begin, *source;               /* of each column the rows below, and their entries' values */
     int *row, *waiting;
     supernode *nodes;
-    double *panels, *stack, *update, *vector, *line;
+    void *panels, *stack, *update, *vector, *line;
 } plan;
 
 static int ascending(const void *a, const void *b) { return *(const int *)a - *(const int *)b; }
@@ -130,7 +122,7 @@ static int supernodes(plan *p, int *work) {
     return 1;
 }
 
-/* Whether a supernode may take in its child, for few zeros that are stored then (Davis 2006, section 4.9 and CHOLMOD). */
+/* Whether a supernode may take in its child, for few zeros that are stored then (as in CHOLMOD). */
 static int merges(const supernode *child, const supernode *s) {
     if (!child->below || child->rows[0] < s->first || child->rows[0] >= s->first + s->width) return 0;
     double width = child->width + s->width, all = width * (width + s->below) - 0.5 * width * (width - 1.0);
@@ -170,91 +162,19 @@ static void merge(plan *p, int *of, int64_t *numbers, int64_t *stack, int64_t *l
     }
 }
 
-/* Add the update matrix of a child to the panel and the update matrix of its parent. */
-static void extend(const plan *p, const supernode *child, const double *from, const supernode *s, double *panel) {
-    int t = child->below, end = s->first + s->width, height = s->width + s->below;
-    for (int j = 0; j < t; j++, from += t) {
-        int column = child->rows[j], inside = column < end;
-        double *to = inside ? panel + (int64_t)height * (column - s->first) : p->update + (int64_t)s->below * p->local[column];
-        for (int i = j; i < t; i++) {
-            int row = child->rows[i];
-            to[!inside ? p->local[row] : row < end ? row - s->first : s->width + p->local[row]] += from[i];
-        }
-    }
-}
-
-/* Entries of the matrix and update matrices of the children, in a supernode's panel and update matrix. */
-static double *assemble(plan *p, const supernode *s, const double *values, double *top, int *waiting) {
-    int k = s->width, t = s->below, height = k + t;
-    double *panel = p->panels + s->at;
-    memset(panel, 0, (size_t)k * height * sizeof(double));
-    memset(p->update, 0, (size_t)t * t * sizeof(double));
-    for (int i = 0; i < t; i++) p->local[s->rows[i]] = i;
-    for (int j = 0; j < k; j++, panel += height)
-        for (int64_t e = p->begin[s->first + j]; e < p->begin[s->first + j + 1]; e++) {
-            int row = p->row[e] - s->first;
-            panel[row < k ? row : k + p->local[p->row[e]]] = values[p->source[e]];
-        }
-    for (int c = 0; c < s->children; c++) {
-        const supernode *child = p->nodes + p->waiting[--*waiting];
-        top -= (int64_t)child->below * child->below;
-        extend(p, child, top, s, p->panels + s->at);
-    }
-    return top;
-}
-
-/* Factorise; S (m, m), its lower triangle by columns. 0 if the interior is not positive definite. */
-static int factorise(plan *p, const double *values, double *S) {
-    int m = p->size - p->inner, waiting = 0, failed = 0;
-    double one = 1.0, minus = -1.0, *top = p->stack;
-    memset(S, 0, (size_t)m * m * sizeof(double));
-    for (int j = 0; j < m; j++)
-        for (int64_t e = p->begin[p->inner + j]; e < p->begin[p->inner + j + 1]; e++)
-            S[(int64_t)m * j + p->row[e] - p->inner] = values[p->source[e]];
-    for (int n = 0; n < p->count; n++) {
-        const supernode *s = p->nodes + n;
-        int k = s->width, t = s->below, height = k + t;
-        double *panel = p->panels + s->at, *update = p->update;
-        top = assemble(p, s, values, top, &waiting);
-        p->with.potrf("L", &k, panel, &height, &failed);
-        if (failed) return 0;
-        if (!t) continue;
-        p->with.trsm("R", "L", "T", "N", &t, &k, &one, panel, &height, panel + k, &height);
-        p->with.syrk("L", "N", &t, &k, &minus, panel + k, &height, &one, update, &t);
-        if (s->rows[0] < p->inner) {
-            memcpy(top, update, (size_t)t * t * sizeof(double));
-            top += (int64_t)t * t, p->waiting[waiting++] = n;
-        } else
-            for (int j = 0; j < t; j++)
-                for (int i = j; i < t; i++)
-                    S[(int64_t)m * (s->rows[j] - p->inner) + s->rows[i] - p->inner] += update[(int64_t)t * j + i];
-    }
-    return 1;
-}
-
-/* Solve with L, or with its transpose, what is in `vector`; the kept unknowns get, or give, what B does. */
-static void solve(plan *p, int transposed) {
-    double one = 1.0, zero = 0.0, minus = -1.0, *line = p->line;
-    int step = 1;
-    for (int n = 0; n < p->count; n++) {
-        const supernode *s = p->nodes + (transposed ? p->count - 1 - n : n);
-        int k = s->width, t = s->below, height = k + t;
-        double *panel = p->panels + s->at, *x = p->vector + s->first;
-        if (transposed) {
-            for (int i = 0; i < t; i++) line[i] = p->vector[s->rows[i]];
-            if (t) p->with.gemv("T", &t, &k, &minus, panel + k, &height, line, &step, &one, x, &step);
-            p->with.trsv("L", "T", "N", &k, panel, &height, x, &step);
-        } else {
-            p->with.trsv("L", "N", "N", &k, panel, &height, x, &step);
-            if (t) p->with.gemv("N", &t, &k, &one, panel + k, &height, x, &step, &zero, line, &step);
-            for (int i = 0; i < t; i++) p->vector[s->rows[i]] -= line[i];
-        }
-    }
-}
+#define REAL double
+#define OF(name) name##_double
+#include "multifrontal.h"
+#undef REAL
+#undef OF
+#define REAL float
+#define OF(name) name##_single
+#include "multifrontal.h"
 
 static void drop(plan *p) {
     for (int s = 0; p->nodes && s < p->count; s++) free(p->nodes[s].rows);
-    void *all[] = {p->order, p->place, p->local, p->begin, p->source, p->row, p->waiting, p->nodes, p->panels, p->stack, p->update, p->vector, p->line, p};
+    void *all[] = {p->order, p->place,  p->local, p->begin,  p->source, p->row,  p->waiting,
+                   p->nodes, p->panels, p->stack, p->update, p->vector, p->line, p};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) free(all[i]);
 }
 
@@ -262,7 +182,7 @@ static void forget_plan(PyObject *capsule) { drop(PyCapsule_GetPointer(capsule, 
 
 /* Everything that does not depend on the values; 0 where memory ends. */
 static int analyse(plan *p, const int *indptr, const int *indices, const int *order) {
-    size_t n = p->size, numbers = n * sizeof(int);
+    size_t n = p->size, numbers = n * sizeof(int), real = p->single ? sizeof(float) : sizeof(double);
     int64_t panels, stack, largest;
     int *work = malloc(5 * numbers), fits = 0;
 #define ROOM(of, bytes) (p->of = malloc((bytes) + sizeof(double)))
@@ -274,8 +194,7 @@ static int analyse(plan *p, const int *indptr, const int *indices, const int *or
         postorder(p, indptr, indices, work);
         if (supernodes(p, work)) {
             merge(p, work, &panels, &stack, &largest);
-            fits = ROOM(panels, panels * sizeof(double)) && ROOM(stack, stack * sizeof(double)) &&
-                   ROOM(update, largest * sizeof(double));
+            fits = ROOM(panels, panels * real) && ROOM(stack, stack * real) && ROOM(update, largest * real);
         }
     }
     free(work);
@@ -296,20 +215,22 @@ static PyObject *call_analyse(PyObject *self, PyObject *args) {
     held all;
     PyObject *given[3], *capsule = NULL;
     unsigned long long at[5];
-    int n, kept, right = 0;
+    int n, kept, single, right = 0;
     Py_ssize_t entries;
     all.count = 0;
-    if (!PyArg_ParseTuple(args, "iin(OOO)(KKKKK)", &n, &kept, &entries, &given[0], &given[1], &given[2], &at[0], &at[1],
-                          &at[2], &at[3], &at[4]))
+    if (!PyArg_ParseTuple(args, "iinp(OOO)(KKKKK)", &n, &kept, &entries, &single, &given[0], &given[1], &given[2], &at[0],
+                          &at[1], &at[2], &at[3], &at[4]))
         return NULL;
-    if (kept < 0 || kept > n || n < 1 || entries < 0) return PyErr_Format(PyExc_ValueError, "%d of %d unknowns", kept, n);
-    const int *indptr = hold(&all, given[0], 'i', (Py_ssize_t)n + 1, 0), *indices = hold(&all, given[1], 'i', entries, 0);
+    if (kept < 0 || kept > n || n < 1 || entries < 0)
+        return PyErr_Format(PyExc_ValueError, "%d of %d unknowns", kept, n);
+    const int *indptr = hold(&all, given[0], 'i', (Py_ssize_t)n + 1, 0);
+    const int *indices = hold(&all, given[1], 'i', entries, 0);
     const int *order = hold(&all, given[2], 'i', n, 0);
     plan *p = order ? calloc(1, sizeof *p) : NULL;
     char *seen = order ? calloc(n, 1) : NULL;
     if (p && seen) {
-        p->size = n, p->inner = n - kept, p->entries = entries;
-        memcpy(&p->with, at, sizeof p->with);
+        p->size = n, p->inner = n - kept, p->entries = entries, p->single = single;
+        memcpy(p->addresses, at, sizeof at);
         if (!(right = sound(p, indptr, indices, order, seen)))
             PyErr_SetString(PyExc_IndexError, "no upper triangle, or no order of its unknowns");
         else if (analyse(p, indptr, indices, order))
@@ -334,10 +255,10 @@ static PyObject *call_factorise(PyObject *self, PyObject *args) {
     if (!p) return NULL;
     Py_ssize_t m = p->size - p->inner;
     const double *values = hold(&all, given[0], 'd', p->entries, 0);
-    double *S = hold(&all, given[1], 'd', m * m, 1);
+    void *S = hold(&all, given[1], p->single ? 'f' : 'd', m * m, 1);
     if (S) {
         Py_BEGIN_ALLOW_THREADS
-        done = factorise(p, values, S);
+        done = p->single ? factorise_single(p, values, S) : factorise_double(p, values, S);
         Py_END_ALLOW_THREADS
     }
     release(&all);
@@ -354,9 +275,7 @@ static PyObject *call_solve(PyObject *self, PyObject *args) {
     double *x = p ? hold(&all, given, 'd', p->size, 1) : NULL;
     if (x) {
         Py_BEGIN_ALLOW_THREADS
-        for (int i = 0; i < p->size; i++) p->vector[i] = x[p->order[i]];
-        solve(p, transposed);
-        for (int i = 0; i < p->size; i++) x[p->order[i]] = p->vector[i];
+        p->single ? solve_single(p, transposed, x) : solve_double(p, transposed, x);
         Py_END_ALLOW_THREADS
     }
     release(&all);
@@ -366,7 +285,7 @@ static PyObject *call_solve(PyObject *self, PyObject *args) {
 
 static PyMethodDef methods[] = {
     {"analyse", call_analyse, METH_VARARGS,
-     "analyse(unknowns, kept, entries, (indptr, indices, order), addresses of dpotrf, dtrsm, dsyrk, dgemv, dtrsv):\n"
+     "analyse(unknowns, kept, entries, single, (indptr, indices, order), addresses of potrf, trsm, syrk, gemv, trsv):\n"
      "a plan for the upper triangle of a matrix (CSR, int32), eliminated in `order`, the kept unknowns last."},
     {"factorise", call_factorise, METH_VARARGS,
      "factorise(plan, values, S): the lower triangle of the Schur complement, by columns; whether the interior\n"
