@@ -323,8 +323,8 @@ def other_solver() -> Iterator[bool]:
 
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
     """The first that is there: PARDISO from evfem[fast], Cholesky factors, SuperLU. With rows as short as in
-    the plane our own are faster than PARDISO's where both are of `single` precision (x 1.15 to 1.2 on L2), and
-    no slower else, but load scipy. SuperLU alone takes matrices all of whose unknowns are kept.
+    the plane our own are faster than PARDISO's where both are of `single` precision (x 1.15 to 1.2 on L2),
+    and no slower else, but load scipy. SuperLU alone takes matrices all of whose unknowns are kept.
     """
     kinds: list[type[Condensation]] = [Pardiso, Cholesky]
     if single and pattern.indices.size < SHORT_ROWS * pattern.size:
