@@ -13,8 +13,8 @@ static void OF(extend)(const plan *p, const supernode *child, const REAL *from, 
     int t = child->below, end = s->first + s->width, height = s->width + s->below;
     for (int j = 0; j < t; j++, from += t) {
         int column = child->rows[j], inside = column < end;
-        REAL *beside = (REAL *)p->update + (int64_t)s->below * p->local[column];
-        REAL *to = inside ? panel + (int64_t)height * (column - s->first) : beside;
+        int64_t begin = inside ? (int64_t)height * (column - s->first) : (int64_t)s->below * p->local[column];
+        REAL *to = (inside ? panel : (REAL *)p->update) + begin;
         for (int i = j; i < t; i++) {
             int row = child->rows[i];
             to[!inside ? p->local[row] : row < end ? row - s->first : s->width + p->local[row]] += from[i];
