@@ -133,7 +133,7 @@ def draw(series: list[Series], speeds: tuple[float, ...]) -> Figure:
     size.axhline(math.sqrt(0.5), color=COLOURS["neutral"], lw=0.6)
     size.set(xlabel="frequency (Hz)", ylabel="friction that follows")
     size.plot([], [], ":", color=COLOURS["neutral"], lw=0.8, label="published cut-off")
-    phase.legend(*size.get_legend_handles_labels(), fontsize=7, loc="lower left")  # where nothing is drawn
+    figure.legend(*size.get_legend_handles_labels(), fontsize=7, loc="outside lower center", ncols=4)
     phase.set(xlabel="frequency (Hz)", ylabel="phase (degrees)")
     for name, said, colour in (("memory", "slip memory", FIRST[0]), ("coulomb", "Coulomb", FIRST[1])):
         begin.plot(kept[f"onset.{name}"].x, kept[f"onset.{name}"].y, color=colour, label=said)
