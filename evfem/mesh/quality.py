@@ -96,7 +96,7 @@ def _extent(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _nodes(mesh: Mesh, refuse: Refuse) -> None:
-    unused = np.setdiff1d(np.arange(len(mesh.points)), mesh.cells)
+    unused = np.flatnonzero(np.bincount(mesh.cells.ravel(), minlength=len(mesh.points)) == 0)
     if len(unused):
         refuse(f"{len(unused)} nodes that no cell uses (node {some(unused)})", "only nodes of cells")
     radius = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
