@@ -18,7 +18,7 @@ from tools.meshes import square_mesh
 from tools.refusals import refuses
 
 import evfem as ev
-from evfem.common import tables
+from evfem.common import foreign, tables
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import check
@@ -167,13 +167,78 @@ MSH = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n1 0 0 0\n$EndNodes\n$El
 HOSTILE = {
     "entities.vtu": (LAUGHS.encode(), "document type"),
     "utf-16.vtu": (LAUGHS.encode("utf-16"), "document type"),
-    "nodes.msh": (MSH.format(10**12, "1\n1 15 2 1 1 1"), "allocate"),
-    "elements.msh": (MSH.format(1, f"{10**12}\n1 15 2 1 1 1"), r"\$EndElements"),
+    "nodes.msh": (MSH.format(10**12, "1\n1 15 2 1 1 1"), "declares more nodes"),
+    "elements.msh": (MSH.format(1, f"{10**12}\n1 15 2 1 1 1"), "declares more nodes"),
+    "nodes.vtk": (
+        b"# vtk DataFile Version 4.2\nx\nBINARY\nDATASET POLYDATA\nPOINTS 100000000 double\n",
+        "declares",
+    ),
     "tag.msh": (MSH.format(1, f"1\n1 15 2 1 1 {2**62}"), "out of bounds|too large"),
     "absent.msh": (MSH.format("2\n3 1 0 0", "1\n1 1 2 1 1 1 2"), "nodes that do not exist"),
     "none.msh": (MSH.format(0, "0"), "."),
     "words.msh": (MSH.replace("0 0 0", "0 0 x").format(1, "1\n1 15 2 1 1 1"), "could not be read|reshape"),
 }
+
+
+def of_hdf5(path):
+    """The arrays `points` and `cells` of 100 million rows, of which nothing was written."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.create_dataset("points", (10**8, 2), "f8", chunks=(10**6, 2))
+        file.create_dataset("ENS_MAA/m/MAI/QU4/NOD", (4 * 10**8,), "i4", chunks=(10**6,))
+
+
+def of_xdmf(path):
+    of_hdf5(path.parent / "heavy.h5")
+    item = '<DataItem Dimensions="100000000 2" Format="HDF">heavy.h5:/points</DataItem>'
+    body = f'<Grid GridType="Uniform"><Geometry GeometryType="XY">{item}</Geometry></Grid>'
+    path.write_text(f"<Xdmf><Domain>{body}</Domain></Xdmf>")
+
+
+def of_netcdf(path):
+    import netCDF4
+
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("num_nodes", 10**8)
+        for axis in "xy":
+            file.createVariable(f"coord{axis}", "f8", ("num_nodes",), chunksizes=(10**6,))
+
+
+@pytest.mark.parametrize(("name", "make"), [("a.med", of_hdf5), ("a.xdmf", of_xdmf), ("a.e", of_netcdf)])
+def test_arrays_that_nobody_wrote_are_not_read(name, make, tmp_path):
+    """HDF5 and netCDF take room for chunks that are written alone, and fill the others when they are read."""
+    make(tmp_path / name)
+    assert sum(path.stat().st_size for path in tmp_path.iterdir()) < 50_000
+    with little_memory(20):
+        refuses(r"declares (1.6|3.2) GB of numbers", meshfile.read, tmp_path / name)
+
+
+def of_matlab(path):
+    from scipy.io import savemat
+
+    savemat(path, {"x": np.zeros(2 * 10**5), "height": np.zeros(2 * 10**5)}, do_compression=True)
+
+
+def of_excel(path):
+    from openpyxl import Workbook
+
+    book = Workbook()
+    book.active.append(["x", "height"])
+    for k in range(300):
+        book.active.append([k, " " * 10_000])
+    book.save(path)
+
+
+@pytest.mark.parametrize(("name", "make", "megabytes"), [("a.mat", of_matlab, 10), ("a.xlsx", of_excel, 2)])
+def test_tables_longer_than_what_is_read_of_them_are_not_read(name, make, megabytes, tmp_path, monkeypatch):
+    """scipy inflates 128 kB of a variable to see its shape."""
+    make(tmp_path / name)
+    table = tables.csv_rows(tmp_path / name, "file", "a table")
+    assert len(table) > 300
+    monkeypatch.setattr(foreign, "MOST_DECLARED", 3 * 10**6)
+    with little_memory(megabytes):
+        refuses("too long", tables.csv_rows, tmp_path / name, "file", "a table")
 
 
 @pytest.mark.parametrize("name", HOSTILE)

@@ -8,8 +8,9 @@ unless it is told not to, and knows values of formulas only where the writer has
 from __future__ import annotations
 
 import itertools
+import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,17 @@ from evfem.errors import InputError
 MOST_BYTES = 64_000_000
 #: endings of tables that are no text, and how many rows of one are read
 BOOKS, MOST_ROWS = (".xlsx", ".xlsm", ".mat"), 1_000_001
+#: bytes of numbers and texts that a file may declare: what nobody wrote, or is alike, takes no room in it
+MOST_DECLARED = 10**9
 #: tag of TIFF that says whether 0 is white
 PHOTOMETRIC = 262
+
+
+def check_declared(sizes: Iterable[int]) -> None:
+    """Raise ValueError for parts of these sizes (bytes) that together are longer than is read."""
+    declared = sum(sizes)
+    if declared > MOST_DECLARED:
+        raise ValueError(f"it declares {declared / 1e9:.3g} GB of numbers or texts; 1 GB is read")
 
 
 def read_grey(
@@ -100,13 +110,17 @@ def cells_of(path: Path, key: str, allowed: str) -> list[list[str]]:
         problem, rule = f"{path.name}, of version 7.3", 'save("-v7", ...) in MATLAB, or a csv file'
         raise InputError(key, problem, rule) from None
     except Exception as error:  # whatever the decoders raise for a damaged file
-        reason = getattr(error, "strerror", None) or "damaged or of another kind"
+        reason = getattr(error, "strerror", None) or "damaged, too long or of another kind"
         raise InputError(key, f"{path.name} ({reason})", allowed) from None
 
 
 def _workbook(path: Path, key: str) -> list[list[str]]:
+    from zipfile import ZipFile
+
     from openpyxl import load_workbook
 
+    with ZipFile(path) as parts:
+        check_declared(one.file_size for one in parts.infolist())
     book, found = load_workbook(path, read_only=True, data_only=True), {}
     try:
         for sheet in book.worksheets:
@@ -143,8 +157,9 @@ def _said(cell: Any) -> str:
 
 
 def _matlab(path: Path, key: str) -> list[list[str]]:
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
+    check_declared(8 * math.prod(shape) for _, shape, _ in whosmat(path))
     arrays: dict[str, Any] = {}
     for name, array in _arrays(loadmat(path, simplify_cells=True)):
         if name in arrays and array.dtype.kind in "iuf" and array.size > 1:

@@ -68,6 +68,8 @@ FORMATS: Mapping[str, str] = {
 }
 #: the document type of FEniCSx, which declares nothing
 DOCTYPE = re.compile(rb'<!DOCTYPE\s+Xdmf\s+SYSTEM\s+"Xdmf\.dtd"\s*(\[\s*\]\s*)?>')
+#: counts of nodes and cells that Gmsh and VTK take memory for before they read on; each has a byte at least
+COUNTS = re.compile(rb"^(?:\$(?:Nodes|Elements)\s+|POINTS |CELLS |CELL_TYPES )(\d{1,20})\s", re.MULTILINE)
 #: how a file begins that Git LFS (version 1 of its pointers) has not fetched
 POINTER = b"version https://git-lfs"
 #: kinds that are refused for what they lack
@@ -183,11 +185,13 @@ def parts(path: Path) -> meshio.Mesh:
 
 
 def _guard(content: bytes) -> None:
-    """Refuse XML that declares a type of document or entities, wherever it does, in every coding, and what
-    stands for a file in a repository.
+    """Refuse XML that declares a type of document or entities, wherever it does, in every coding, what stands
+    for a file in a repository, and counts that no file of this length has.
     """
     if content.startswith(POINTER):
         raise ValueError("a pointer of Git LFS, not the file: git lfs pull")
+    if max(map(int, COUNTS.findall(content)), default=0) > len(content):
+        raise ValueError("it declares more nodes or cells than it has bytes")
     declared = b"<!ENTITY" in content or b"<!DOCTYPE" in DOCTYPE.sub(b"", content, count=1)
     if declared or content.startswith((b"\xff\xfe", b"\xfe\xff", b"<\0", b"\0<")):
         raise ValueError("a document type, or no UTF-8 text")

@@ -22,8 +22,8 @@ from evfem.textures.importing import line_of
 if TYPE_CHECKING:
     import zipfile
 
-#: bytes of a part of an x3p, and of a tmd
-MOST_BYTES = 512_000_000
+#: bytes of a part of an x3p, and of a tmd; of XML, which takes ten times the memory
+MOST_BYTES, MOST_XML = 512_000_000, 64_000_000
 #: types of numbers in an x3p
 TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 #: of a tmd: what it begins with, 32 bytes with zeros, before a comment that ends with one
@@ -72,7 +72,7 @@ def _x3p(path: Path, row: float) -> Line:
     from zipfile import ZipFile
 
     with ZipFile(path) as parts:
-        main = _part(parts, "main.xml")
+        main = _part(parts, "main.xml", MOST_XML)
         if b"<!DOCTYPE" in main or b"<!ENTITY" in main:
             raise ValueError("a document type")
         tree = ElementTree.fromstring(main)
@@ -116,8 +116,8 @@ def _linked(parts: zipfile.ZipFile, tree: Any) -> list[str]:
     return [repr(one) if bit else "" for one, bit in zip(found, bits, strict=False)]
 
 
-def _part(parts: zipfile.ZipFile, name: str) -> bytes:
-    if parts.getinfo(name).file_size > MOST_BYTES:
+def _part(parts: zipfile.ZipFile, name: str, most: int = MOST_BYTES) -> bytes:
+    if parts.getinfo(name).file_size > most:
         raise ValueError("a part that is too long")
     with parts.open(name) as file:
-        return file.read(MOST_BYTES)
+        return file.read(most)

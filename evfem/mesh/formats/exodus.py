@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.foreign import check_declared
 from evfem.mesh.groups import Group, Name
 from evfem.mesh.mesh import sides_of
 
@@ -51,6 +52,8 @@ def read(path: Path) -> meshio.Mesh:
 
     with netCDF4.Dataset(path) as file:
         file.set_auto_mask(False)
+        read = [one for name, one in file.variables.items() if not name.startswith("vals_")]
+        check_declared(one.size * np.dtype(one.dtype).itemsize for one in read)
         points = _points(file)
         cells, sides, groups = list[tuple[str, Ints]](), list[list[Ints]](), list[Group]()
         for k, (name, number) in enumerate(_labels(file, "eb", "num_el_blk"), 1):

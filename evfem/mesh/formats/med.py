@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Ints
+from evfem.common.foreign import check_declared
 from evfem.mesh.groups import Group
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def read(path: Path) -> meshio.Mesh:
     import meshio
 
     with h5py.File(path, "r") as file:
+        _check_sizes(file)
         name, head, mesh = _only_mesh(file)
         cells = [(_kind(key), _columns(block["NOD"]) - 1) for key, block in mesh["MAI"].items()]
         cells = [(kind, one[:, ORDER] if kind == "hexahedron27" else one) for kind, one in cells]
@@ -62,6 +64,12 @@ def read(path: Path) -> meshio.Mesh:
         for one in of_cells.get(int(family), ())
     ]
     return raw
+
+
+def _check_sizes(file: Any) -> None:
+    sizes: list[int] = []
+    file.visititems(lambda _, one: sizes.append(getattr(one, "nbytes", 0)))
+    check_declared(sizes)
 
 
 def _only_mesh(file: Any) -> tuple[str, Any, Any]:

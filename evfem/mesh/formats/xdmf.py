@@ -6,6 +6,7 @@ A tag is a number and has no name. Files of one grid are read by meshio. Source:
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
@@ -13,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from evfem.common.arrays import Ints
+from evfem.common.foreign import check_declared
 from evfem.mesh.groups import Group, dimension_of
 
 if TYPE_CHECKING:
@@ -40,6 +42,11 @@ def read(path: Path) -> meshio.Mesh:
 
     root = ElementTree.parse(path).getroot()
     grids = list(_grids(root))
+    read = [one for one in (*grids, root.find(".//Geometry")) if one is not None]
+    items = [item for one in read for item in one.iter("DataItem") if item.get("Format") == "HDF"]
+    with ExitStack() as files:
+        names = {(one.text or "").strip() for one in items}
+        check_declared(_array(files, path.parent, name).nbytes for name in names)
     if len(grids) < 2:
         return meshio.read(path)
     reader = meshio.xdmf.main.XdmfReader(path)
@@ -62,6 +69,14 @@ def read(path: Path) -> meshio.Mesh:
         for number in np.unique(numbers).astype(int).tolist()
     ]
     return raw
+
+
+def _array(files: ExitStack, folder: Path, name: str) -> Any:
+    """The array `file:place`, of an HDF5 that is closed with `files`."""
+    import h5py
+
+    file, _, place = name.partition(":")
+    return files.enter_context(h5py.File(folder / file, "r"))[place]
 
 
 def _grids(root: Element) -> Iterator[Element]:
