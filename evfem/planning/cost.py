@@ -63,8 +63,10 @@ def _attraction(scene: Scene, mesh: Mesh) -> float:
 
 
 def needs(scene: Scene, mesh: Mesh) -> str:
-    """Memory, in space, and time of a run in a sentence."""
+    """Memory and time of a run in a sentence."""
     least, most = (f"{float(f'{seconds:.1g}'):g}" for seconds in needed_time(scene, mesh))
-    memory = f"{needed_memory(mesh) / 1e9:.2g} GB of memory and " if mesh.dim == 3 else ""
     snaps = ", most where contact snaps" if _attraction(scene, mesh) >= STRONG else ""
-    return f"a run takes about {memory}{least} to {most} s of CPU time with PARDISO{snaps}"
+    memory = needed_memory(mesh) / 1e9
+    return (
+        f"a run takes about {memory:.2g} GB of memory and {least} to {most} s of CPU time with PARDISO{snaps}"
+    )

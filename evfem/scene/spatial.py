@@ -14,10 +14,11 @@ from evfem.scene.scene import IN_SPACE, Scene
 from evfem.surface.skin import make_skin
 
 SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
-#: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, which grow with the
-#: nodes; of the dense matrices of contact, which grow with the square of the skin's nodes, of which a
-#: fifth may touch. Fitted to peaks of fingers with 5,000 to 53,000 nodes pressed to 0.5 or 1 N.
-PACKAGES, BODY, BODY_GROWTH, CONTACT = 0.13e9, 0.0226e9, 1.1, 27.0
+#: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, by dimension, which grow
+#: with the power of a thousand nodes; in space of the dense matrices of contact, which grow with the square
+#: of the skin's nodes, of which a fifth may touch. Fitted to peaks of pads and benchmarks with 3,000 to
+#: 495,000 nodes (factors in double precision take more), and of fingers with 5,000 to 53,000 nodes.
+PACKAGES, BODY, CONTACT = {2: 0.095e9, 3: 0.13e9}, {2: (6.5e6, 1.0), 3: (0.0226e9, 1.1)}, {2: 0.0, 3: 27.0}
 
 
 def check_space(scene: Scene, mesh: Mesh) -> None:
@@ -52,21 +53,20 @@ def _beyond_space(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, str, str]]:
 
 
 def needed_memory(mesh: Mesh) -> float:
-    """Memory (bytes) that a run with a finger of hexahedra takes at most, within 30 % where its
-    tissue is not nearly incompressible and PARDISO is there.
+    """Memory (bytes) that a run takes at most, within 40 %; in space where its tissue is not nearly
+    incompressible and PARDISO is there.
 
     >>> from evfem.finger.fingertip import Fingertip
     >>> f"{needed_memory(Fingertip(resolution='coarse').mesh()) / 1e9:.1f} GB"
     '1.1 GB'
     """
-    body = BODY * (len(mesh.points) / 1000.0) ** BODY_GROWTH
-    return float(PACKAGES + body + CONTACT * float(len(mesh.node_sets["pad"])) ** 2)
+    each, growth = BODY[mesh.dim]
+    skin = float(len(mesh.node_sets["pad"]))
+    return PACKAGES[mesh.dim] + each * (len(mesh.points) / 1000.0) ** growth + CONTACT[mesh.dim] * skin**2
 
 
 def check_memory(mesh: Mesh) -> None:
-    """Raise InputError where a finger in three dimensions needs more memory than there is."""
-    if mesh.dim != 3:
-        return
+    """Raise InputError where a finger needs more memory than there is."""
     needed, there = needed_memory(mesh), physical_memory()
     if needed > there:
         given = f"{len(mesh.points)} nodes, whose direct solver needs about {needed / 1e9:.2g} GB of memory"

@@ -7,6 +7,7 @@ from tools.refusals import refuses
 
 import evfem as ev
 from evfem.errors import InputError
+from evfem.meshes.benchmark import divided_mesh
 from evfem.planning.plan import plan
 from evfem.scene import spatial
 from evfem.scene.file import dump, loads
@@ -100,6 +101,23 @@ def test_the_memory_said_is_that_of_runs(resolution, ridges, peak):
     """Peaks (GB) of presses to 1 N under 1000 V and 3 mm of slide, measured once (fine: 0.3 N)."""
     mesh = ev.Fingertip(resolution=resolution, ridges=ridges).mesh()
     assert needed_memory(mesh) == pytest.approx(1e9 * peak, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "peak"),
+    [
+        (lambda: ev.FingerPad(resolution="coarse", ridges=False).mesh(), 0.119),
+        (lambda: ev.FingerPad(resolution="medium").mesh(), 0.193),
+        (lambda: ev.FingerPad(resolution="fine").mesh(), 0.533),
+        (lambda: divided_mesh((240, 40, 8)), 0.144),
+        (lambda: divided_mesh((480, 80, 16)), 0.293),
+        (lambda: divided_mesh((1000, 166, 34)), 1.04),
+        (lambda: divided_mesh((1560, 260, 56)), 2.54),
+    ],
+)
+def test_the_memory_said_is_that_of_runs_in_the_plane(mesh, peak):
+    """Peaks (GB) of a press and a slide, of pads under 1000 V and of the benchmark, measured once."""
+    assert 1.0 / 1.4 < needed_memory(mesh()) / (1e9 * peak) < 1.4
 
 
 def test_a_finger_that_no_memory_holds_is_refused_before_it_is_solved(monkeypatch):
