@@ -101,3 +101,20 @@ def test_a_limit_that_begins_within_a_run_leaves_the_threads_of_its_factorisatio
         "print('done')"
     )
     assert fresh(code, tmp_path) == "done"
+
+
+def test_the_threads_of_a_scene_are_those_of_its_factorisations_alone(tmp_path):
+    """Threads of the BLAS that spin beside them took twice the CPU time, and longer."""
+    code = (
+        "import evfem as ev\n"
+        "from evfem.common.arrays import linalg\n"
+        "from tools.workers import blas_threads\n"
+        "class Looks:\n"
+        "    def step(self, *said): linalg(); print(blas_threads(None))\n"
+        "tip, two = ev.Fingertip(resolution='coarse', ridges=False), ev.Solver(threads=2)\n"
+        "scene = ev.Scene(tip, ev.Flat(), motion=ev.Press(indentation=0.05, steps=1), solver=two)\n"
+        "ev.simulate(scene, observers=[Looks()])\n"
+        "ev.loop(scene, observers=[Looks()])\n"
+        "import os; print(os.environ['KMP_BLOCKTIME'])"
+    )
+    assert fresh(code, tmp_path).splitlines() == ["[1, 1]", "[1, 1]", "0"]

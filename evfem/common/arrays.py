@@ -262,6 +262,7 @@ def mkl() -> Any:
     """MKL, or None without pypardiso; that loads scipy.sparse, and is asked only if `mkl` is no package."""
     if find_spec("pypardiso") is None:
         return None
+    os.environ.setdefault("KMP_BLOCKTIME", "0")  # its threads sleep, not spin, while Python works
     if MKL not in os.environ and (path := mkl_library()) is not None:
         os.environ[MKL] = path
     if MKL in os.environ:

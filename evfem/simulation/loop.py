@@ -342,8 +342,8 @@ class Loop:
         self._largest = max(voltage, self._largest)
 
     def _threads(self) -> Any:
-        """The BLAS has the scene's threads in three dimensions, else one: as in `simulate`."""
-        return self._blas.limit(limits=self.scene.solver.threads if self._run.model.mesh.dim == 3 else 1)
+        """The BLAS has one, as in `simulate`."""
+        return self._blas.limit(limits=1)
 
     def _tell(self, event: str, *arguments: Any) -> list[str]:
         return notices.tell_observers(self._observers, event, *arguments)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -130,8 +129,8 @@ def simulate(
         The scene cannot be run.
     """
     scene = scene_at(scene)
-    # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
-    # scene's threads are those of the factorisation
+    # dense solves lose more by sharing than they gain, as idle threads of the BLAS spin, those of large ones
+    # too where other processes run: the scene's threads are PARDISO's
     with blas_limits(), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
 
@@ -147,16 +146,14 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         run = Run(scene, resume)
         notices.tell_observers(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
-        # the dense compliance of a skin in three dimensions has thousands of rows, which pay for threads
-        with blas_limits(scene.solver.threads) if run.model.mesh.dim == 3 else nullcontext():
-            for request in run.requests():
-                frame = run.advance(request)
-                reasons = notices.tell_observers(observers, "step", run.rows[-1], frame, run.checkpoint)
-                bar.update(1)
-                LOG.debug("step %d of %d", len(run.rows), total)
-                if reasons:
-                    run.keep_last_frame()
-                    break
+        for request in run.requests():
+            frame = run.advance(request)
+            reasons = notices.tell_observers(observers, "step", run.rows[-1], frame, run.checkpoint)
+            bar.update(1)
+            LOG.debug("step %d of %d", len(run.rows), total)
+            if reasons:
+                run.keep_last_frame()
+                break
     finally:
         bar.close()
     result = run.result()
