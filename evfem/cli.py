@@ -43,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = parser(sys.argv if arguments is None else arguments).parse_args(arguments)
     except SystemExit as done:
         return int(done.code or 0)
+    except KeyboardInterrupt:
+        return _say("interrupted", INTERRUPTED)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         for number in before:

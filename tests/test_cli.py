@@ -467,6 +467,16 @@ def test_an_interrupted_run_keeps_what_has_converged_and_goes_on_to_the_same_end
             assert float(resumed[name]) == pytest.approx(float(row[name]), rel=1e-6, abs=1e-9)
 
 
+def test_an_interruption_while_the_options_are_made_is_one_line(place, monkeypatch):
+    """`evfem texture` loads its laws for that, half a second."""
+
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "parser", interrupted)
+    assert called(place, "texture", "list") == (130, "", "evfem: interrupted\n")
+
+
 def test_an_interruption_that_is_dropped_ends_the_run_with_the_step(place, monkeypatch):
     """As Python drops what is raised in a `__del__`."""
     step = RunFolder.step

@@ -8,12 +8,14 @@ pool early, as by Ctrl-C, ends all processes in the middle of their work.
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from itertools import islice
 from multiprocessing import Pipe, current_process, get_context, parent_process
 from multiprocessing.connection import Connection, wait
@@ -173,6 +175,12 @@ class _Processes:
         return key, found
 
 
+def _end_at_once(cluster: Any, error: type[BaseException] | None, *told: Any) -> None:
+    """Where a sweep is interrupted, kill the workers of its own cluster, which waits for them else."""
+    for nanny in cluster.workers.values() if error is not None else ():
+        cluster.sync(nanny.kill, timeout=0.1)
+
+
 @contextmanager
 def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
     if workers is not None and scheduler != "local":
@@ -187,8 +195,10 @@ def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
         address: Any = scheduler
         if scheduler == "local":
             n, port = workers or cores(), "127.0.0.1:0"  # the usual port may belong to another cluster
-            cluster = LocalCluster(n_workers=n, threads_per_worker=1, dashboard_address=port)
+            how: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": port}
+            cluster = LocalCluster(n_workers=n, silence_logs=logging.ERROR, **how)
             address = stack.enter_context(cluster)
+            stack.push(partial(_end_at_once, cluster))
         try:
             client = stack.enter_context(Client(address))
         except (OSError, ValueError) as error:
