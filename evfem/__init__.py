@@ -160,7 +160,8 @@ def __getattr__(name: str) -> Any:
     elif name in _GONE:
         raise AttributeError(f"{name}: {_GONE[name]}")
     else:
-        close = _import_module(f"{__name__}.errors").closest_name(name, __all__)
+        # tools ask every module for `__wrapped__` and the like: nobody misspelt these
+        close = not name.startswith("_") and _import_module(f"{__name__}.errors").closest_name(name, __all__)
         meant = f"; did you mean {close[0]}?" if close else ""
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
     globals()[name] = value
