@@ -192,7 +192,7 @@ class Scene:
         told = ("finger", "surface", "law", "voltage", "motion", "name")
         return {key: value for key, value in changed(self).items() if key not in told}
 
-    @property
+    @cached_property
     def ground(self) -> CompleteSurface:
         """The surface with all that contact asks of it, derived where it is the user's own."""
         return completed(self.surface)
