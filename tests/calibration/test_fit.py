@@ -42,6 +42,7 @@ distance = 0.5
 steps = 3
 hold = "force"
 """
+PRESS = SCENE[: SCENE.index('[[motion]]\nkind = "slide"')]
 HOVER = SCENE[: SCENE.index("[[motion]]")] + (
     '[electrostatics]\nlaw = "strong_troxel"\nvoltage = 100.0\ninsulator_thickness = 0.1\n'
     'insulator_eps_r = 3.0\n[[motion]]\nkind = "hover"\ngap = 0.2\n'
@@ -54,6 +55,7 @@ def path(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fit")
     meshfile.write(block(), folder / "block.vtu")
     (folder / "hover.toml").write_text(HOVER)
+    (folder / "press.toml").write_text(PRESS)
     (folder / "scene.toml").write_text(SCENE)
     return folder / "scene.toml"
 
@@ -61,6 +63,12 @@ def path(tmp_path_factory):
 @pytest.fixture(scope="module")
 def hover(path):
     return path.with_name("hover.toml")
+
+
+@pytest.fixture(scope="module")
+def press(path):
+    """Without the slide, for what one number shows."""
+    return path.with_name("press.toml")
 
 
 @pytest.fixture(scope="module")
@@ -174,20 +182,20 @@ def test_offsets_and_factors_act_on_what_the_data_set(hover):
     assert "motion.0.gap = 0.05 as offset (0.05 to 0.05 with 95 % confidence)" in repr(found)
 
 
-def test_a_parameter_at_its_bound_is_said(path):
-    found = ev.fit(path, measured(path, friction=0.3)[0], {E: (0.02, 0.06)}, workers=1)
+def test_a_parameter_at_its_bound_is_said(press):
+    found = ev.fit(press, measured(press, friction=0.3)[0], {E: (0.02, 0.06)}, workers=1)
     assert found[E] == pytest.approx(0.06, rel=1e-3)
     assert f"{E} is at its bound 0.06: its interval says nothing beyond it" in found.warnings
 
 
-def test_residuals_beyond_their_sd_are_said(path):
-    found = ev.fit(path, measured(path, noise=0.1, sd=1e-5)[0], {E: BOUNDS[E]}, workers=1)
+def test_residuals_beyond_their_sd_are_said(press):
+    found = ev.fit(press, measured(press, noise=0.1, sd=1e-5)[0], {E: BOUNDS[E]}, workers=1)
     (warning,) = found.warnings
     assert warning.endswith("times the measured sd: the scene does not explain the data")
     assert f"residuals are {found.rms * np.sqrt(3 / 2):.2g} times" in warning
     assert "rms residual" in repr(found).splitlines()[0]
     assert repr(found).splitlines()[0].endswith(" sd")
-    again = ev.fit(path, measured(path, noise=0.01, sd=2e-4)[0], {E: BOUNDS[E]}, workers=1)
+    again = ev.fit(press, measured(press, noise=0.01, sd=2e-4)[0], {E: BOUNDS[E]}, workers=1)
     assert again.warnings == ()
 
 
@@ -237,23 +245,23 @@ def test_an_interrupted_fit_goes_on_where_it_was(path, exact, tmp_path, monkeypa
         ev.fit(path, data, {E: (0.02, 0.4)}, out=out, workers=1)
 
 
-def test_a_broken_pool_is_opened_again(path, tmp_path, monkeypatch):
+def test_a_broken_pool_is_opened_again(press, tmp_path, monkeypatch):
     monkeypatch.setattr(runs, "work", die_once)
     monkeypatch.setenv("DIE_ONCE", str(tmp_path / "died"))
-    found = ev.fit(path, measured(path, friction=0.3)[0], {E: (0.02, 0.5)}, workers=2)
+    found = ev.fit(press, measured(press, friction=0.3)[0], {E: (0.02, 0.5)}, workers=2)
     assert (tmp_path / "died").exists()
     assert found[E] == pytest.approx(0.07, rel=0.01)
 
 
-def test_progress_is_a_line_for_each_step(path, capsys):
-    ev.fit(path, measured(path)[0], {E: BOUNDS[E]}, workers=1, progress=True)
+def test_progress_is_a_line_for_each_step(press, capsys):
+    ev.fit(press, measured(press)[0], {E: BOUNDS[E]}, workers=1, progress=True)
     lines = capsys.readouterr().err.splitlines()
     assert lines[0].startswith(f"evfem: fit: {E} 0.1: rms residual 0.")
     assert lines[0].endswith(", 1 runs so far")
     assert 2 < len(lines) < 12
 
 
-def test_a_trial_that_is_not_solved_is_stepped_back_from(path, monkeypatch):
+def test_a_trial_that_is_not_solved_is_stepped_back_from(press, monkeypatch):
     """Above a modulus of 0.09 nothing converges, and nothing has derivatives: a fit that starts there makes
     its first differences on the other side.
     """
@@ -267,15 +275,17 @@ def test_a_trial_that_is_not_solved_is_stepped_back_from(path, monkeypatch):
         return work((*job[:3], ()))
 
     monkeypatch.setattr(runs, "work", fragile)
-    found = ev.fit(path, measured(path, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1)
+    found = ev.fit(
+        press, measured(press, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1
+    )
     assert found[E] == pytest.approx(0.07, rel=1e-3)
     assert failed
     monkeypatch.setattr(runs, "work", lambda job: Answer("not_converged", 0.0, "none", {}))
     with pytest.raises(InputError, match="cannot be run at the start: none"):
-        ev.fit(path, measured(path, friction=0.3)[0], {E: (0.02, 0.5)}, workers=1)
+        ev.fit(press, measured(press, friction=0.3)[0], {E: (0.02, 0.5)}, workers=1)
 
 
-def test_outputs_that_are_counted_are_said(path, monkeypatch):
+def test_outputs_that_are_counted_are_said(press, monkeypatch):
     """Forces in whole multiples of half a per cent of .01 N/mm: ten steps of a difference cross some."""
     work = runs.work
 
@@ -285,7 +295,9 @@ def test_outputs_that_are_counted_are_said(path, monkeypatch):
         return Answer(answer.status, answer.seconds, answer.message, outputs)
 
     monkeypatch.setattr(runs, "work", counted)
-    found = ev.fit(path, measured(path, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1)
+    found = ev.fit(
+        press, measured(press, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1
+    )
     assert [text for text in found.warnings if text.startswith(f"what is compared is not smooth in {E}")]
 
 
