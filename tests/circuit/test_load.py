@@ -22,7 +22,7 @@ PRESS = ev.Press(force=0.05, steps=1)
 ROUGH = 0.003
 
 
-def scene(drive=DRY, voltage=50.0, motion=PRESS, finger=PAD, surface=SCREEN, **more):
+def scene(drive=DRY, voltage=50.0, motion=PRESS, finger=SMALL, surface=SCREEN, **more):
     law = more.pop("law", ev.StrongTroxel())
     return ev.Scene(finger, surface, law, voltage, motion, drive=drive, **more)
 
@@ -32,7 +32,7 @@ def pressed():
     return ev.simulate(scene(roughness_gap=ROUGH, depth=10.0))
 
 
-def plates(result, frequency, finger=PAD):
+def plates(result, frequency):
     """Admittance (S/mm, in space S) of plates that the end of a run is cut into: positions from its frame."""
     run = Run(result.scene, None)
     for request in run.requests():
@@ -124,7 +124,7 @@ CYCLES = (ev.Press(indentation=0.3, steps=1), ev.Wait(duration=2e-3, steps=80))
 @pytest.fixture(scope="module")
 def swinging():
     sine = ev.Sine(1000.0, 50.0 * 2**0.5)
-    return ev.simulate(scene(RESOLVED, sine, CYCLES, SMALL, roughness_gap=ROUGH))
+    return ev.simulate(scene(RESOLVED, sine, CYCLES, roughness_gap=ROUGH))
 
 
 def test_power_and_current_of_a_resolved_drive_are_those_of_its_source(swinging):
@@ -136,7 +136,7 @@ def test_power_and_current_of_a_resolved_drive_are_those_of_its_source(swinging)
     assert swinging.current_rms[last] == pytest.approx(np.abs(rate), rel=1e-9, abs=1e-12)
     # with the mean over the cycle: 40 steps of a period, and the start has decayed to a part
     press = ev.Press(indentation=0.3, steps=1)
-    mean = ev.simulate(scene(motion=press, finger=SMALL, roughness_gap=ROUGH))
+    mean = ev.simulate(scene(motion=press, roughness_gap=ROUGH))
     rms = np.sqrt((swinging.current_rms[last] ** 2).mean())
     assert rms == pytest.approx(mean.current_rms[-1], rel=5e-3)
     assert swinging.power[last].mean() == pytest.approx(mean.power[-1], rel=2e-2)
@@ -199,25 +199,29 @@ def test_a_scene_pays_only_for_what_is_in_it():
 
 @pytest.mark.parametrize("direction", ["vertical", "normal"])
 def test_a_limited_law_pulls_less_and_closes_the_balance(direction):
-    film = {"drive": None, "voltage": 1777.0, "surface": ev.Display(friction=0.3), "direction": direction}
-    motion = ev.Press(indentation=0.2, steps=3)
-    free, held = (ev.simulate(scene(**film, motion=motion, breakdown=one)) for one in ("warn", "limit"))
+    film = {"drive": None, "finger": PAD, "surface": ev.Display(friction=0.3), "direction": direction}
+
+    def runs(voltage, steps):
+        motion = ev.Press(indentation=0.2, steps=steps)
+        one = scene(voltage=voltage, motion=motion, **film)
+        return [ev.simulate(replace(one, breakdown=kind)) for kind in ("warn", "limit")]
+
+    free, held = runs(1777.0, 2)
     assert 0.7 < held.electrostatic_force[-1] / free.electrostatic_force[-1] < 0.99
     assert held.breakdown[-1] > 1.0
     assert [one for one in held.warnings if "the law holds the field" in one]
     lost = [abs(one.integrator_dissipation[-1]) / one.external_work[-1] for one in (free, held)]
     assert lost[1] < 1.2 * lost[0]
-    low = {**film, "voltage": 700.0}
-    free, held = (ev.simulate(scene(**low, motion=motion, breakdown=one)) for one in ("warn", "limit"))
+    free, held = runs(700.0, 1)
     assert held.electrostatic_force == pytest.approx(free.electrostatic_force, rel=1e-9)
 
 
 def test_files_know_breakdown_and_refuse_what_has_no_limit(tmp_path):
-    limited = scene(drive=None, voltage=900.0, surface=ev.Display(friction=0.3), breakdown="limit")
+    limited = scene(None, 900.0, PRESS, PAD, surface=ev.Display(friction=0.3), breakdown="limit")
     text = ev.scenefile.dump(limited)
     assert 'breakdown = "limit"' in text
     assert ev.scenefile.loads(text) == limited
-    assert "breakdown" not in ev.scenefile.dump(scene())
+    assert "breakdown" not in ev.scenefile.dump(scene(finger=PAD))
     refuses('electrostatics.breakdown: given "sparks"', scene, breakdown="sparks")
     refuses("electrostatics.breakdown: given limit in a resolved drive", scene, RESOLVED, breakdown="limit")
     square = ev.Drive(frequency=100.0, waveform="square")
