@@ -26,8 +26,8 @@ DISPLAY = ev.Display(ev.Layer(0.01, 3.0), friction=0.3, y=0.0)
 ATTRACTED = {"surface": DISPLAY, "law": ev.StrongTroxel(), "voltage": 100.0}
 
 
-#: steps of press, slide and slide back
-FEW, TABLED = (2, 4, 2), (3, 8, 4)
+#: steps of press, slide and slide back: some, with statuses that change near by, and those of the table
+FEW, NEAR, TABLED = (1, 3, 1), (2, 4, 2), (3, 8, 4)
 
 
 def block(hold="indentation", law=None, steps=FEW, **changed):
@@ -139,11 +139,12 @@ def statuses(scene, step):
 @pytest.mark.parametrize("key", ["surface.friction", THICKNESS])
 def test_a_status_changes_where_valid_to_says_and_not_before(key):
     """In the step with the shortest reach: what is left is asked for again and again on the way there."""
-    found = ev.sensitivities(block(), key, FORCES)
+    scene = block(steps=NEAR)
+    found = ev.sensitivities(scene, key, FORCES)
     reaches = found.valid_to[key]
     step, left, change = int(np.argmin(reaches)), reaches.min(), 0.0
-    here = lambda change: changed(block(), key, found.parameters[key] + change)  # noqa: E731
-    before = statuses(block(), step)
+    here = lambda change: changed(scene, key, found.parameters[key] + change)  # noqa: E731
+    before = statuses(scene, step)
     way = 1.0 if statuses(here(1.5 * left), step) != before else -1.0
     for _ in range(4):
         change += 0.9 * way * left
@@ -270,7 +271,8 @@ CASES = {
     "inertia": (lambda: block(solver=replace(block().solver, dynamics="inertial")), TISSUE + "E"),
     "jump of friction": (
         lambda: block(
-            surface=ev.Display(ev.Layer(0.01, 3.0), [[-9.0, 0.2], [0.3, 0.2], [0.3, 0.5], [9.0, 0.5]], 0.0)
+            steps=NEAR,
+            surface=ev.Display(ev.Layer(0.01, 3.0), [[-9.0, 0.2], [0.3, 0.2], [0.3, 0.5], [9.0, 0.5]], 0.0),
         ),
         "surface.friction.2.1",
     ),
