@@ -75,7 +75,7 @@ def test_a_recording_becomes_a_signal_in_one_command(tmp_path, capsys):
     np.savetxt("rec.csv", np.column_stack([time, np.sin(80.0 * np.pi * time)]), delimiter=",",
                header="time,friction", comments="")  # fmt: skip
     size = ("--friction-mean", "0.4", "--friction-rms", "0.05", "--load", "0.02")
-    whole = ("rec.csv", *size, "--speed", "20", "--length", "4")
+    whole = ("rec.csv", *size, "--speed", "20", "--length", "2")
     assert run("import", "rec.csv", "--licence", "CC0-1.0", "--speed", "20", "--out", "rec.json") == 2
     assert "would replace rec.csv, which is no texture's; allowed: another name, as rec-texture.json" in (
         capsys.readouterr().err

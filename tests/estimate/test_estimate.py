@@ -1,6 +1,7 @@
 """Estimates of textures: how they are reduced, what is said of them, and the shipped database."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,12 @@ from evfem.textures.library import REFERENCES, reference
 from evfem.textures.texture import Texture
 
 WAVE = make("sinusoids", Knobs(0.5, 0.02, second=0.3, phase=0.4))
+
+
+@cache
+def touched(name, ridged):
+    """The estimate of a reference texture."""
+    return estimate(reference(name), Touch(ridged))
 
 
 def moved(texture, by):
@@ -101,7 +108,7 @@ def test_a_reference_texture_that_is_estimated_badly_has_a_note(ridged):
     bad = [name for name in ("eq-25", "paper", "grating-1mm", "stone") if known_error(name, ridged) > 0.15]
     assert {"eq-25", "paper"} <= set(bad)
     for name in bad:
-        assert estimate(reference(name), Touch(ridged)).notes, name
+        assert touched(name, ridged).notes, name
 
 
 @pytest.mark.parametrize("ridged", [False, True])
@@ -117,7 +124,7 @@ def test_reference_textures_are_estimated_as_well_as_points_left_out(ridged):
     assert np.median(list(errors.values())) < 0.1
     name = "grating-2mm"
     x, friction = reference_curves(ridged)[name]
-    found = estimate(reference(name), Touch(ridged)).curve
+    found = touched(name, ridged).curve
     difference = np.interp(x, found.x, found.friction) - friction
     size = np.sqrt(np.mean(difference**2)) / np.ptp(friction)
     assert known_error(name, ridged) == pytest.approx(size)
@@ -169,7 +176,7 @@ def test_every_reference_texture_that_has_an_error_is_within_it_and_the_others_h
     known = reference_curves(ridged)
     covered = 0
     for name in REFERENCES:
-        found = estimate(reference(name), Touch(ridged))
+        found = touched(name, ridged)
         x, friction = known[name]
         if (error := found.curve.error) is not None:
             covered += 1

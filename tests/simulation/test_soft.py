@@ -237,7 +237,7 @@ def test_a_clutch_of_two_strips():
     """Strips of EA 0.5 and 0.3 N per mm of width, 12 mm long, drawn apart under a drag t = mu p: both slip
     from their loaded ends over F EA2/((EA1 + EA2) t) and F EA1/((EA1 + EA2) t), and all slip at F = t L.
     """
-    first, second, length, number, drag = 0.5, 0.3, 12.0, 48, 0.3 * 0.005
+    first, second, length, number, drag = 0.5, 0.3, 12.0, 32, 0.3 * 0.005
 
     class Strip:
         def compliance(self, x, lengths):
