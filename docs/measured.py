@@ -38,6 +38,7 @@ TIMES = ROOT / "studies" / "seconds.csv"
 BLOCK = re.compile(r"(<!-- measured: ([\w-]+) -->\n\n).*?(\n<!-- end -->)", re.S)
 PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
 PACKAGES = {"evfem": "evfem", "fenicsx": "FEniCSx", "felupe": "FElupe", "getfem": "GetFEM"}
+PACKAGES |= {"ngsolve": "NGSolve"}
 #: cells by name: evfem's element and the others'
 CELLS = {"linear": ("q1", "q1"), "quadratic": ("q2p1", "q2")}
 LEVELS = ("L0", "L1", "L2")

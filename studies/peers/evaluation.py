@@ -15,7 +15,7 @@ from ..common import Series
 from .problem import GIVEN, Way, errors, quantities
 
 #: with whom evfem is compared
-PEERS = ("felupe", "fenicsx", "getfem")
+PEERS = ("felupe", "fenicsx", "getfem", "ngsolve")
 #: elements that are compared with each other: evfem's and the peers'
 ELEMENTS = {"q1": "q1", "q2p1": "q2"}
 #: package and element, in the order in which they take turns

@@ -1,7 +1,7 @@
 """Where the packages of the study `peers` live, and one measured run of one of them in a process of its own.
 
-evfem and FElupe run in this interpreter; FEniCSx and GetFEM in the first that has them: this one, the
-system's, or another `python3` of the PATH. Distributions install those two outside virtual environments.
+evfem and FElupe run in this interpreter; FEniCSx, GetFEM and NGSolve each in the first that has it: this one,
+the system's, or another `python3` of the PATH, so that each can have an environment of its own.
 """
 
 import json
@@ -30,8 +30,9 @@ class Package:
 PACKAGES = {
     "evfem": Package((), ""),
     "felupe": Package(("felupe", "pypardiso"), "pip install evfem[peers]"),
-    "fenicsx": Package(("dolfinx", "petsc4py"), "apt install python3-dolfinx", "with_fenicsx.py"),
+    "fenicsx": Package(("dolfinx_solver",), "pip install dolfinx-solver-real", "with_fenicsx.py"),
     "getfem": Package(("getfem",), "apt install python3-getfem", "with_getfem.py"),
+    "ngsolve": Package(("ngsolve",), "pip install ngsolve mkl", "with_ngsolve.py"),
 }
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"

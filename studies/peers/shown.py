@@ -23,6 +23,7 @@ STYLE = {
     "felupe": ("FElupe", COLOURS["strong_troxel"], "s"),
     "fenicsx": ("FEniCSx", COLOURS["fe"], "^"),
     "getfem": ("GetFEM", COLOURS["measured"], "D"),
+    "ngsolve": ("NGSolve", COLOURS["neutral"], "v"),
 }
 
 

@@ -1,4 +1,4 @@
-"""evfem beside FElupe, FEniCSx and GetFEM: time, iterations, memory, error in the press-and-slide benchmark.
+"""evfem beside FElupe, FEniCSx, GetFEM and NGSolve: time, memory, error in the press-and-slide benchmark.
 
 Same nodes, laws, steps and tolerance (the largest free residual over the largest force on the bone), one
 thread. Every run has a process of its own, in the interpreter that has the package; the packages alternate,
@@ -41,13 +41,14 @@ ASSUMPTIONS = {
     "contact": "evfem exact; peers: penalty of 1000 N/mm per mm at every node, below 0.1 um of penetration, "
     "the same spring for sticking friction; GetFEM's own brick, an augmented Lagrangian, takes as many "
     "iterations in A on larger matrices, and full Newton steps with it did not converge in B",
-    "solver": "evfem and FElupe PARDISO; FEniCSx MUMPS by PETSc (in A on L2 CHOLMOD is as fast, "
-    "PETSc's own Cholesky slower but faster on L1; in B on L1 UMFPACK and SuperLU are slower); GetFEM its "
-    "own interface to MUMPS, which analyses every matrix anew; symmetric where the tangent is (A); MUMPS "
-    "uses the system's BLAS, which should be an optimised one (libopenblas0-pthread)",
+    "solver": "evfem and FElupe PARDISO; FEniCSx MUMPS with the ordering PORD (A on L2 12 CPU s, with what "
+    "MUMPS chooses 16, with PETSc's own Cholesky 24, SuperLU_DIST 39; B 46 and 51); NGSolve PARDISO of the "
+    "wheel mkl (A on L2 21 CPU s, with its own sparse Cholesky 30, UMFPACK 45); GetFEM its own interface to "
+    "MUMPS, which analyses every matrix anew, with the system's BLAS, which should be an optimised one "
+    "(libopenblas0-pthread); symmetric where the tangent is (A)",
     "elements": "q1: 2 x 2 points; q2, q2p1: cells of 2 x 2 linear ones through the same nodes, 3 x 3 points",
-    "pull": "C: FEniCSx and GetFEM integrate with the nodes as points, so q1 is the same sum as evfem's; on "
-    "quadratic edges evfem and FElupe project the chord, they the edge at its nodes",
+    "pull": "C: FEniCSx, GetFEM and NGSolve integrate with the nodes as points, so q1 is the same sum as "
+    "evfem's; on quadratic edges evfem and FElupe project the chord, they the edge at its nodes",
     "Ft_mean_2_to_3": "plain mean of the eleven values at 2.0 ... 3.0 mm; the source does not say which "
     "mean. Of four readings (trapezoidal rule +0.4 %, without the first value +1.5 %, without the last "
     "-0.6 %) it is the one that quadratic cells on L2 reproduce (-0.02 %): its error is no independent check",

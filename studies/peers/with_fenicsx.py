@@ -1,13 +1,17 @@
-"""The press-and-slide benchmark with FEniCSx (DOLFINx 0.5): `python3 with_fenicsx.py PROBLEM.npz`.
+"""The press-and-slide benchmark with FEniCSx (DOLFINx 0.11): `python3 with_fenicsx.py PROBLEM.npz`.
 
 Lagrange elements of the mesh's own order; Newton's method on PETSc's matrices, factorised by MUMPS, Cholesky
 where the tangent is symmetric (scene A). Contact is a penalty in the form language, integrated with the
 Gauss-Lobatto rule whose points are the nodes; which way a node slides is kept beside the form, because plain
-return mapping jumps between two states. Needs DOLFINx and numpy only.
+return mapping jumps between two states. Needs the wheel `dolfinx-solver-real` only.
 """
 
 from typing import Any
 
+import dolfinx_solver  # noqa: F401 - loads the wheel's MPI, without which the others cannot be imported
+
+# isort: split
+import basix.ufl
 import dolfinx
 import numpy as np
 import ufl
@@ -17,6 +21,7 @@ from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
+PORD = 4  # the fastest of MUMPS' orderings here
 COMPILER = {"cffi_extra_compile_args": ["-O3", "-march=native", "-g0"]}
 
 
@@ -26,8 +31,8 @@ class Peer:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.mesh = make_mesh(problem)
-        family = ("Lagrange", problem.order)
-        vectors, scalars = fem.VectorFunctionSpace(self.mesh, family), fem.FunctionSpace(self.mesh, family)
+        vectors = fem.functionspace(self.mesh, ("Lagrange", problem.order, (2,)))
+        scalars = fem.functionspace(self.mesh, ("Lagrange", problem.order))
         self.u = fem.Function(vectors)
         self.contact = PenaltyContact(problem.points[problem.free_pad, 0], problem.plane, problem.friction)
         self.pad = dofs_of(vectors, problem.free_pad)
@@ -52,18 +57,18 @@ class Peer:
             1
         )
         start = cpu_seconds()
-        share = fem.form(ufl.TestFunction(scalars) * ds, jit_params=COMPILER)
+        share = fem.form(ufl.TestFunction(scalars) * ds, jit_options=COMPILER)
         residual = self._solid(test) + self._touch(test, ds)
         if self.problem.pull:
             residual += self._attract(test, ds)
-        self.residual = fem.form(residual, jit_params=COMPILER)
-        self.tangent = fem.form(ufl.derivative(residual, self.u, trial), jit_params=COMPILER)
+        self.residual = fem.form(residual, jit_options=COMPILER)
+        self.tangent = fem.form(ufl.derivative(residual, self.u, trial), jit_options=COMPILER)
         self.form_cpu_s = cpu_seconds() - start
         of_node = fem.assemble_vector(share).array[self.scalar_pad]
         self.stiffness.x.array[self.scalar_pad] = PENALTY / of_node
 
     def _solid(self, test: Any) -> Any:
-        constants = fem.FunctionSpace(self.mesh, ("DG", 0))
+        constants = fem.functionspace(self.mesh, ("DG", 0))
         mu, lmbda = fem.Function(constants), fem.Function(constants)
         original = self.mesh.topology.original_cell_index
         mu.x.array[:], lmbda.x.array[:] = self.problem.mu[original], self.problem.lmbda[original]
@@ -93,12 +98,12 @@ class Peer:
         along = ufl.as_vector([-normal[1], normal[0]])
         width = ufl.max_value(along[0] + ufl.dot(ufl.grad(self.u[0]), along), 0.0)
         pull = self.problem.pull / ((gap + near) * (gap + far)) * width
-        self.pull = fem.form(pull * ds, jit_params=COMPILER)
+        self.pull = fem.form(pull * ds, jit_options=COMPILER)
         return pull * test[1] * ds
 
     def _make_solver(self) -> None:
         symmetric = not (self.problem.friction or self.problem.pull)
-        self.A, self.b = petsc.create_matrix(self.tangent), petsc.create_vector(self.residual)
+        self.A, self.b = petsc.create_matrix(self.tangent), petsc.create_vector(self.u.function_space)
         self.A.setOption(PETSc.Mat.Option.SPD, symmetric)
         self.step = self.b.duplicate()
         self.solver = PETSc.KSP().create(MPI.COMM_SELF)
@@ -106,6 +111,7 @@ class Peer:
         self.solver.setType("preonly")
         self.solver.getPC().setType("cholesky" if symmetric else "lu")
         self.solver.getPC().setFactorSolverType("mumps")
+        PETSc.Options()["mat_mumps_icntl_7"] = PORD
 
     def assemble_residual(self) -> float:
         """Residual at the current state; the largest free one over the largest force on the bone."""
@@ -126,10 +132,10 @@ class Peer:
         petsc.assemble_matrix(self.A, self.tangent, self.held)
         self.A.assemble()
         if first:
-            petsc.apply_lifting(self.b, [self.tangent], [self.held], [self.u.vector], -1.0)
-        petsc.set_bc(self.b, self.held, self.u.vector, -1.0)
+            petsc.apply_lifting(self.b, [self.tangent], [self.held], [self.u.x.petsc_vec], -1.0)
+        petsc.set_bc(self.b, self.held, self.u.x.petsc_vec, -1.0)
         self.solver.solve(self.b, self.step)
-        self.u.vector.axpy(-1.0, self.step)
+        self.u.x.petsc_vec.axpy(-1.0, self.step)
 
     def move(self, position: float, indentation: float) -> int:
         """Move the bone and find the equilibrium; the number of iterations."""
@@ -146,19 +152,18 @@ class Peer:
 
 def make_mesh(problem: Problem) -> Any:
     """The mesh, cells in the order of nodes that DOLFINx uses."""
-    cell = ufl.Cell("quadrilateral", geometric_dimension=2)
-    domain = ufl.Mesh(ufl.VectorElement("Lagrange", cell, problem.order))
+    element = basix.ufl.element("Lagrange", "quadrilateral", problem.order, shape=(2,))
     order = dolfinx.cpp.io.perm_vtk(dolfinx.mesh.CellType.quadrilateral, problem.cells.shape[1])
     cells = np.ascontiguousarray(problem.cells[:, order])
-    return dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells, problem.points, domain)
+    return dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells, element, problem.points)
 
 
 def dofs_of(space: Any, nodes: Any) -> Any:
     """The (blocked) unknowns of a space at nodes of the problem's mesh."""
     geometry = space.mesh.geometry
     dof = np.empty(len(geometry.x), dtype=np.int64)
-    of_cells = geometry.dofmap.array
-    dof[np.asarray(geometry.input_global_indices)[of_cells]] = space.dofmap.list.array
+    of_cells = geometry.dofmaps[0]
+    dof[np.asarray(geometry.input_global_indices)[of_cells]] = space.dofmap.list
     return dof[nodes]
 
 

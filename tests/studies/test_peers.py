@@ -29,6 +29,8 @@ def test_quick_comparison_without_peers(monkeypatch, tmp_path, capsys):
     said = capsys.readouterr().err
     assert "felupe is not installed (pip install evfem[peers])" in said
     assert "getfem is not installed (apt install python3-getfem)" in said
+    assert "fenicsx is not installed (pip install dolfinx-solver-real)" in said
+    assert "ngsolve is not installed (pip install ngsolve mkl)" in said
     assert result["assumptions"]["missing"] == list(numbers.PEERS)
     assert result["assumptions"]["failed"] == {}
     found = result["numbers"]
