@@ -193,9 +193,9 @@ class SuperLU:
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         linalg()  # whose BLAS SuperLU uses
         self.pattern, self.kept = pattern, kept
-        inner = np.ones(pattern.size, dtype=bool)
-        inner[kept] = False
-        self._interior = np.flatnonzero(inner)
+        eliminated = np.ones(pattern.size, dtype=bool)
+        eliminated[kept] = False
+        self._interior = np.flatnonzero(eliminated)
         self._ordering: Ints | None = None
         self.schur: Any = np.zeros((kept.size, kept.size))
 
