@@ -20,6 +20,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cached_property
 from itertools import islice
 from typing import Any
 
@@ -30,8 +31,6 @@ from evfem.common.constants import ACCURATE
 from evfem.tissue.body import Pattern
 from evfem.tissue.kernels.blocks import sparse_cholesky
 
-#: entries of a row of the upper triangle: 8 to 16 in the plane, 40 to 90 in space
-SHORT_ROWS = 30
 #: index of PARDISO's count of perturbed pivots among its parameters
 PERTURBED = 13
 
@@ -188,15 +187,23 @@ class Pardiso:
 
 
 class SuperLU:
-    """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc."""
+    """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc; in the `ordering`
+    (n,), else in one of its own.
+    """
 
-    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
+    def __init__(
+        self,
+        pattern: Pattern,
+        kept: Ints,
+        threads: int = 1,
+        single: bool = False,
+        ordering: Ints | None = None,
+    ) -> None:
         linalg()  # whose BLAS SuperLU uses
-        self.pattern, self.kept = pattern, kept
+        self.pattern, self.kept, self._ordering = pattern, kept, ordering
         eliminated = np.ones(pattern.size, dtype=bool)
         eliminated[kept] = False
         self._interior = np.flatnonzero(eliminated)
-        self._ordering: Ints | None = None
         self.schur: Any = np.zeros((kept.size, kept.size))
 
     def factorise(self, upper: Floats) -> None:
@@ -244,16 +251,17 @@ class SuperLU:
         return state + self._solve(b)
 
 
-class Cholesky(SuperLU):
-    """Condensation by Cholesky factors of our own (`cholesky.c`); by SuperLU where the interior is not
+class Cholesky:
+    """Condensation by Cholesky factors of our own (`cholesky.c`); by another solver where the interior is not
     positive definite. Those of `single` precision are replaced by double ones where they are not accurate.
     """
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
-        super().__init__(pattern, kept, threads, single)
+        self.pattern, self.kept, self._threads = pattern, kept, threads
         order, mark = pattern.elimination_order, np.zeros(pattern.size, dtype=bool)
         mark[kept] = True
-        self._order = np.concatenate([order[~mark[order]], kept]).astype(np.int32)
+        self._order: Ints = np.concatenate([order[~mark[order]], kept]).astype(np.int32)
+        self.schur: Any = np.zeros((0, 0))
         self._plan_for(np.float32 if single else np.float64)
 
     def _plan_for(self, real: type[np.float32] | type[np.float64]) -> None:
@@ -265,8 +273,15 @@ class Cholesky(SuperLU):
             *sizes, pattern.indices.size, single, arrays, algebra["s" if single else "d"]
         )
 
+    @cached_property
+    def _indefinite(self) -> Pardiso | SuperLU:
+        """What factorises matrices that are not positive definite: PARDISO, else SuperLU in our order."""
+        if _is_there(Pardiso):
+            return Pardiso(self.pattern, self.kept, self._threads)
+        return SuperLU(self.pattern, self.kept, ordering=self._order)
+
     def factorise(self, upper: Floats) -> None:
-        """Factorise new values of the pattern; raises `Singular` if that fails."""
+        """Factorise new values of the pattern, which are used up; raises `Singular` if that fails."""
         self._definite = self._factorised(upper)
         if self._definite and is_accurate(self, upper):
             return
@@ -274,7 +289,8 @@ class Cholesky(SuperLU):
             self._plan_for(np.float64)
             self.factorise(upper)
         else:
-            super().factorise(upper)
+            self._indefinite.factorise(upper)
+            self.schur = self._indefinite.schur
 
     def _factorised(self, upper: Floats) -> bool:
         columns = np.empty(2 * (self.kept.size,), self.real)
@@ -285,16 +301,18 @@ class Cholesky(SuperLU):
         return True
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
+        """As `Pardiso.forward`."""
         if not self._definite:
-            return super().forward(b)
+            return self._indefinite.forward(b)
         x = b.copy()
         x[self.kept] = 0.0  # go past the factor, as in `Pardiso`
         self._kernel.solve(self._plan, False, x)
         return x, b[self.kept] + x[self.kept]
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
+        """As `Pardiso.backward`."""
         if not self._definite:
-            return super().backward(state, kept)
+            return self._indefinite.backward(state, kept)
         x = state.copy()
         x[self.kept] = kept
         self._kernel.solve(self._plan, True, x)
@@ -303,7 +321,7 @@ class Cholesky(SuperLU):
 
 
 #: a factorised matrix: its Schur complement, and solves in two halves
-Condensation = Pardiso | SuperLU
+Condensation = Cholesky | Pardiso | SuperLU
 #: whether the sparse solver is the one that is not chosen by itself
 _OTHER = ContextVar("_OTHER", default=False)
 
@@ -324,12 +342,12 @@ def other_solver() -> Iterator[bool]:
 
 
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
-    """The first that is there: PARDISO from evfem[fast], Cholesky factors, SuperLU. With rows as short as in
-    the plane our own are faster than PARDISO's where both are of `single` precision (x 1.15 to 1.2 on L2),
-    and no slower else, but load scipy. SuperLU alone takes matrices all of whose unknowns are kept.
+    """The first that is there: PARDISO, Cholesky factors, SuperLU. On one thread Cholesky factors come first
+    in space and where they may be `single`; else they are no slower, but load scipy. SuperLU alone takes
+    matrices all of whose unknowns are kept.
     """
     kinds: list[type[Condensation]] = [Pardiso, Cholesky]
-    if single and pattern.indices.size < SHORT_ROWS * pattern.size:
+    if threads == 1 and (single or pattern.dim == 3):
         kinds.reverse()
     there = (kind for kind in kinds if kept.size < pattern.size and _is_there(kind))
     return next(islice(there, int(_OTHER.get()), None), SuperLU)(pattern, kept, threads, single)

@@ -58,7 +58,7 @@ from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.contact.signorini import OPEN
 from evfem.errors import InputError, describe_value, readable, unknown
-from evfem.newton.condensation import Pardiso, Singular, SuperLU, make_condensation
+from evfem.newton.condensation import Condensation, Singular, make_condensation
 from evfem.newton.control import Target, Unsupported
 from evfem.newton.state import State
 from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
@@ -109,7 +109,7 @@ class _Differentiated:
         self._calls: list[tuple[float, float]] = []
         self._taken = 0
         self._known: tuple[bytes, Callable[[Floats], Floats]] = (b"", np.zeros_like)
-        self._factor: Pardiso | SuperLU | None = None
+        self._factor: Condensation | None = None
         self.stopped = ""
 
     def _check(self, line: Line) -> None:

@@ -31,7 +31,7 @@ class Pattern:
 
     def __init__(self, nodes: Ints, dim: int) -> None:
         """`nodes` (E, n): the cells' nodes by their numbers in the reduced system, from 0 on."""
-        nodes = nodes.astype(np.int32)
+        self._nodes = nodes = nodes.astype(np.int32, order="C")
         count = int(nodes.max()) + 1
         self.dim, self.size = dim, dim * count
         self._first, self._second = np.triu_indices(nodes.shape[1])
@@ -124,17 +124,14 @@ class Pattern:
 
     @cached_property
     def elimination_order(self) -> Ints:
-        """The unknowns in an order of little fill, those of a node together: minimum degree on the graph of
-        the nodes, which SuperLU finds with a matrix that fills nothing.
+        """The unknowns in an order of little fill, those of a node together, by nested dissection (compiled,
+        `dissection.h`); those of the last node, the bone, come last.
         """
-        import scipy.sparse as sparse
-        from scipy.sparse.linalg import splu
+        from evfem.tissue.kernels.blocks import sparse_cholesky
 
-        itself = self._neighbours == np.repeat(np.arange(self._pairs.size - 1), np.diff(self._pairs))
-        graph = sparse.csc_matrix((np.where(itself, 1.0, 1e-3), self._neighbours, self._pairs))
-        options = {"SymmetricMode": True, "Equil": False}
-        found = splu(graph, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-        order = np.argsort(found.perm_c)
+        order = np.empty(self.size // self.dim, dtype=np.int32)
+        kernel, _ = sparse_cholesky()
+        kernel.dissect(max(self.dim - 1, 1), self._nodes.shape[1], self._nodes, order)
         return np.asarray(self.dim * order[:, None] + np.arange(self.dim)).ravel()
 
     def full(self, upper: Floats) -> Any:

@@ -1,5 +1,7 @@
 """Small meshes and a plain Newton solver for tests of the tissue: nothing here knows contact or steps."""
 
+from itertools import product
+
 import numpy as np
 import scipy.sparse as sparse
 import skfem
@@ -32,6 +34,14 @@ def columns_of(forces, u, step=1e-5):
     """The matrix of central differences of `forces` (N, dim) by every component of u (N, dim)."""
     steps = step * np.eye(u.size).reshape(u.size, *u.shape)
     return np.column_stack([(forces(u + s) - forces(u - s)).ravel() / (2.0 * step) for s in steps])
+
+
+def box(*divisions):
+    """Cells (E, 2^dim) of a grid in the plane or in space, and the places (N, dim) of its nodes."""
+    sizes = np.array(divisions) + 1
+    places, corners = (np.array(list(product(*map(range, ends)))) for ends in (sizes, [2] * sizes.size))
+    first = places[(places < divisions).all(axis=1)]
+    return np.ravel_multi_index((first[:, None] + corners).T, sizes).T, places
 
 
 def rectangle(element, divisions, size=(1.0, 1.0), warp=None, jitter=0.0, split=None):

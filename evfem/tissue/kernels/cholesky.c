@@ -11,10 +11,12 @@
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030b0000
 #include <Python.h>
+#include <limits.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "arrays.h"
+#include "dissection.h"
 
 #define PLAN "evfem plan of a factorisation"
 
@@ -283,7 +285,35 @@ static PyObject *call_solve(PyObject *self, PyObject *args) {
     Py_RETURN_NONE;
 }
 
+static PyObject *call_dissect(PyObject *self, PyObject *args) {
+    held all;
+    PyObject *given, *order;
+    int n, directions, done = 0;
+    all.count = 0;
+    if (!PyArg_ParseTuple(args, "iiOO", &directions, &n, &given, &order)) return NULL;
+    const int *cells = hold(&all, given, 'i', -1, 0);
+    int *found = hold(&all, order, 'i', -1, 1);
+    Py_ssize_t size = found ? all.views[0].len / (Py_ssize_t)sizeof(int) : 0;
+    Py_ssize_t count = found ? all.views[1].len / (Py_ssize_t)sizeof(int) : 0;
+    int right = found && n > 0 && size % n == 0 && size <= INT_MAX && count > 0 && count <= INT_MAX / 8;
+    for (Py_ssize_t i = 0; right && i < size; i++) right = cells[i] >= 0 && cells[i] < count;
+    if (right) {
+        Py_BEGIN_ALLOW_THREADS
+        found[count - 1] = (int)count - 1;
+        done = dissect(whole((int)count - 1, cells, (int)(size / n), n), directions, found);
+        Py_END_ALLOW_THREADS
+        if (!done) PyErr_NoMemory();
+    } else if (found)
+        PyErr_Format(PyExc_IndexError, "no cells of %d among %zd nodes", n, count);
+    release(&all);
+    if (!done) return NULL;
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef methods[] = {
+    {"dissect", call_dissect, METH_VARARGS,
+     "dissect(directions, n, cells, order): an order of elimination of little fill for the nodes of cells of n nodes each;\n"
+     "the last node comes last."},
     {"analyse", call_analyse, METH_VARARGS,
      "analyse(unknowns, kept, entries, single, (indptr, indices, order), addresses of potrf, trsm, syrk, gemv, trsv):\n"
      "a plan for the upper triangle of a matrix (CSR, int32), eliminated in `order`, the kept unknowns last."},

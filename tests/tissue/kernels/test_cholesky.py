@@ -2,48 +2,79 @@
 
 import numpy as np
 import pytest
+from tools.grids import box
 
 from evfem.common.arrays import mkl
+from evfem.newton import condensation
 from evfem.newton.condensation import Cholesky, SuperLU, make_condensation, other_solver
 from evfem.tissue.kernels.blocks import sparse_cholesky
 from evfem.tissue.pattern import Pattern
 
 
-@pytest.mark.parametrize("kept", [[0, 5, 700], range(300, 420), [9]], ids=["few", "many", "one"])
-def test_cholesky_factors_are_those_of_superlu(kept):
-    """A grid of cells beside another one, with supernodes of all sizes, on two unknowns a node."""
-    rng, n = np.random.default_rng(3), 18
-    i, j = np.divmod(np.arange(n * (n - 1)), n - 1)
-    left = (n * i + j)[i < n - 1]
-    grid = np.stack([left, left + 1, left + n, left + n + 1], axis=1)
-    pattern = Pattern(np.concatenate([grid, grid + n * n]), 2)
-    roots = rng.normal(size=(2 * len(grid), 8, 8))
+def beside(*divisions):
+    """A grid of cells in the plane or in space, twice, with as many unknowns a node as it has dimensions, and
+    entries of random positive definite cell matrices.
+    """
+    cells, places = box(*divisions)
+    pattern = Pattern(np.concatenate([cells, cells + len(places)]), dim := len(divisions))
+    roots = np.random.default_rng(3).normal(size=(2 * len(cells), dim * cells.shape[1], dim * cells.shape[1]))
     data = pattern.zeros()
     pattern.add(roots @ roots.swapaxes(1, 2), np.arange(len(roots)), data)
-    upper, kept = pattern.finish(data), np.array(kept, dtype=np.int64)
+    return pattern, pattern.finish(data)
+
+
+@pytest.mark.parametrize("divisions", [(17, 17), (3, 4, 5)], ids=["plane", "space"])
+@pytest.mark.parametrize("kept", [[0, 5, 700], range(300, 420), [9]], ids=["few", "many", "one"])
+def test_cholesky_factors_are_those_of_superlu(divisions, kept):
+    """Supernodes of all sizes."""
+    pattern, upper = beside(*divisions)
+    rng, kept = np.random.default_rng(4), np.array(kept, dtype=np.int64)
     b, x = rng.normal(size=pattern.size), rng.normal(size=kept.size)
     found = []
     for back_end in (Cholesky, SuperLU):
         factor = back_end(pattern, kept)
-        factor.factorise(upper)
+        factor.factorise(upper.copy())
         state, condensed = factor.forward(b)
         found.append([factor.schur, condensed, factor.backward(state, x)])
     assert np.abs(found[1][2]).max() > 0.0
     for own, other in zip(*found, strict=True):
-        np.testing.assert_allclose(own, other, rtol=1e-9, atol=1e-9 * np.abs(other).max(initial=0.0))
+        np.testing.assert_allclose(own, other, rtol=1e-9, atol=1e-12 * np.abs(other).max(initial=0.0))
 
 
-@pytest.mark.parametrize(("nodes", "single", "own"), [(9, True, True), (9, False, False), (27, True, False)])
-def test_own_factors_come_first_where_they_are_faster(nodes, single, own):
-    """Two cells with 9 nodes in the plane, or with 27 in space."""
-    cells, dim = np.stack([np.arange(nodes), np.arange(nodes) + nodes // 3]), 2 + nodes // 27
-    pattern, kept = Pattern(cells, dim), np.arange(dim)
-    usual = make_condensation(pattern, kept, single=single)
+@pytest.mark.parametrize("with_mkl", [True, False] if mkl() else [False])
+def test_an_indefinite_interior_goes_to_another_solver(with_mkl, monkeypatch):
+    """To PARDISO, else to SuperLU in the same order; and back to our own factors with the next matrix."""
+    if not with_mkl:
+        monkeypatch.setattr(condensation, "mkl", lambda: None)
+    pattern, definite = beside(2, 2, 2)
+    kept, turned = np.array([7, 3, 150]), definite.copy()
+    turned[pattern.diagonal[40]] *= -1.0
+    own, twin = Cholesky(pattern, kept), SuperLU(pattern, kept)
+    for upper, positive in ((definite, True), (turned, False), (definite, True)):
+        for factor in (own, twin):
+            factor.factorise(upper.copy())
+        assert own._definite is positive
+        scale = np.abs(twin.schur).max()
+        np.testing.assert_allclose(own.schur, twin.schur, rtol=1e-9, atol=1e-12 * scale)
+        b, x = np.arange(1.0, pattern.size + 1), np.array([1.0, -2.0, 3.0])
+        solved = [factor.backward(factor.forward(b)[0], x) for factor in (own, twin)]
+        np.testing.assert_allclose(*solved, rtol=1e-8, atol=1e-10 * np.abs(solved[1]).max())
+    assert type(own._indefinite) is (condensation.Pardiso if with_mkl else SuperLU)
+
+
+@pytest.mark.parametrize(
+    ("dim", "single", "threads", "own"),
+    [(2, True, 1, True), (2, False, 1, False), (3, True, 1, True), (3, False, 1, True), (3, True, 2, False)],
+)
+def test_own_factors_come_first_where_they_are_faster(dim, single, threads, own):
+    """Two cells in the plane or in space."""
+    pattern, kept = Pattern(box(*[2, 1, 1][:dim])[0], dim), np.arange(dim)
+    usual = make_condensation(pattern, kept, threads, single)
     assert isinstance(usual, Cholesky) is (own or mkl() is None)
     assert isinstance(make_condensation(pattern, np.arange(pattern.size), single=single), SuperLU)
     with other_solver() as there:
         assert there
-        assert type(make_condensation(pattern, kept, single=single)) is not type(usual)
+        assert type(make_condensation(pattern, kept, threads, single)) is not type(usual)
 
 
 @pytest.mark.parametrize(
