@@ -252,8 +252,9 @@ class SuperLU:
 
 
 class Cholesky:
-    """Condensation by Cholesky factors of our own (`cholesky.c`); by another solver where the interior is not
-    positive definite. Those of `single` precision are replaced by double ones where they are not accurate.
+    """Condensation by Cholesky factors of our own (`factors/cholesky.c`); by another solver where the
+    interior is not positive definite. Those of `single` precision are replaced by double ones where they are
+    not accurate.
     """
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:

@@ -125,7 +125,7 @@ class Pattern:
     @cached_property
     def elimination_order(self) -> Ints:
         """The unknowns in an order of little fill, those of a node together, by nested dissection (compiled,
-        `dissection.h`); those of the last node, the bone, come last.
+        `factors/dissection.h`); those of the last node, the bone, come last.
         """
         from evfem.tissue.kernels.blocks import sparse_cholesky
 

@@ -10,8 +10,6 @@ import evfem as ev
 from evfem.tissue.kernels.blocks import sparse_cholesky
 from evfem.tissue.pattern import Pattern
 
-pytestmark = pytest.mark.skipif(sparse_cholesky() is None, reason="no compiler was there")
-
 
 def with_bone(cells, held):
     """The cells with the nodes `held` as one, the last."""

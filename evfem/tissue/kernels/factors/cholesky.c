@@ -15,7 +15,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include "arrays.h"
+#include "../arrays.h"
 #include "dissection.h"
 
 #define PLAN "evfem plan of a factorisation"
