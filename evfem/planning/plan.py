@@ -423,10 +423,13 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
 
 
 def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
+    own = find_spec("evfem.tissue.kernels.cholesky")
     backend = "SuperLU (no C compiler was there at the installation)"
-    if find_spec("pypardiso"):
+    if own and scene.solver.threads == 1 and mesh.dim == 3:
+        backend = "sparse Cholesky factors"
+    elif find_spec("pypardiso"):
         backend = "PARDISO (symmetric, Schur complement)"
-    elif find_spec("evfem.tissue.kernels.cholesky"):
+    elif own:
         backend = "sparse Cholesky factors (install evfem[fast] for PARDISO)"
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     yield f"symmetric stiffness matrix, factorised rarely and reused: {backend}; cell loops: {cells}"

@@ -18,7 +18,7 @@ SOLID, PLANE = "with a finger in three dimensions", "with a finger in the plane"
 #: with the power of a thousand nodes; in space of the dense matrices of contact, which grow with the square
 #: of the skin's nodes, of which a fifth may touch. Fitted to peaks of pads and benchmarks with 3,000 to
 #: 495,000 nodes (factors in double precision take more), and of fingers with 5,000 to 53,000 nodes.
-PACKAGES, BODY, CONTACT = {2: 0.095e9, 3: 0.13e9}, {2: (6.5e6, 1.0), 3: (0.0226e9, 1.1)}, {2: 0.0, 3: 27.0}
+PACKAGES, BODY, CONTACT = {2: 0.095e9, 3: 0.13e9}, {2: (6.5e6, 1.0), 3: (0.019e9, 1.1)}, {2: 0.0, 3: 10.0}
 
 
 def check_space(scene: Scene, mesh: Mesh) -> None:
@@ -54,11 +54,11 @@ def _beyond_space(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, str, str]]:
 
 def needed_memory(mesh: Mesh) -> float:
     """Memory (bytes) that a run takes at most, within 40 %; in space where its tissue is not nearly
-    incompressible and PARDISO is there.
+    incompressible.
 
     >>> from evfem.finger.fingertip import Fingertip
     >>> f"{needed_memory(Fingertip(resolution='coarse').mesh()) / 1e9:.1f} GB"
-    '1.1 GB'
+    '0.8 GB'
     """
     each, growth = BODY[mesh.dim]
     skin = float(len(mesh.node_sets["pad"]))

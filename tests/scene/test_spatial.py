@@ -90,12 +90,18 @@ def test_the_plan_says_what_a_whole_finger_needs():
     assert needed.unknowns == 3 * (5 * 81 - 81) + 3
     assert "three dimensions" in text
     assert "plane strain" not in text
-    assert "a run takes about 0.14 GB of memory and 0.3 to 2 s of CPU time with PARDISO" in text
+    assert "a run takes about 0.14 GB of memory and 0.3 to 2 s of CPU time" in text
+    assert "sparse Cholesky factors;" in text
 
 
 @pytest.mark.parametrize(
     ("resolution", "ridges", "peak"),
-    [("medium", "none", 0.465), ("fine", "none", 1.53), ("coarse", "along", 1.20), ("medium", "along", 1.80)],
+    [
+        ("medium", "none", 0.488),
+        ("fine", "none", 1.53),
+        ("coarse", "along", 0.765),
+        ("medium", "along", 1.24),
+    ],
 )
 def test_the_memory_said_is_that_of_runs(resolution, ridges, peak):
     """Peaks (GB) of presses to 1 N under 1000 V and 3 mm of slide, measured once (fine: 0.3 N)."""
