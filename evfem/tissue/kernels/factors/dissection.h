@@ -7,11 +7,13 @@
    the order needs no coordinates. */
 
 #define SMALL 10      /* nodes that are not parted further */
+#define MANY 10000    /* nodes of a large part */
 #define UNEVEN 2.0    /* weight of the parts' uneven sizes beside the separator's own */
 #define BETWEEN (-1)  /* a node that separates */
 
-/* Shares of the nodes at either end: with few the separator is small, with many the parts are even. */
-static const double ENDS[] = {0.1, 0.25, 0.4};
+/* Shares of the nodes at either end: with few the separator is small, with many the parts are even, and the paths of
+   large parts, which have one, short. */
+static const double ENDS[] = {0.1, 0.25, 0.4}, ENDS_OF_MANY[] = {0.33};
 
 /* Nodes and cells of a part. Its vertices are node v as v, where a path goes in, and as nodes + v, where it goes out,
    and cell c as 2 nodes + c. */
@@ -226,11 +228,12 @@ static double compare(part *p, int end, double cost) {
 
 /* Find the best separator with the nodes in their present order; its cost if it is less. */
 static double separate(part *p, double cost) {
-    int n = p->nodes;
+    int n = p->nodes, rounds = n > MANY ? 1 : sizeof ENDS / sizeof *ENDS;
+    const double *ends = n > MANY ? ENDS_OF_MANY : ENDS;
     memset(p->from, -1, n * sizeof(int));
     memset(p->into, -1, n * sizeof(int));
-    for (size_t t = 0; t < sizeof ENDS / sizeof *ENDS; t++) {
-        int many = ENDS[t] * n < 1.0 ? 1 : (int)(ENDS[t] * n), *swap = p->from;
+    for (int t = 0; t < rounds; t++) {
+        int many = ends[t] * n < 1.0 ? 1 : (int)(ends[t] * n), *swap = p->from;
         memset(p->side, 0, n * sizeof(int));
         for (int i = 0; i < many; i++) p->side[p->order[i]] = 1, p->side[p->order[n - 1 - i]] = 2;
         if (!separated(p, cost < 0.0 ? n : cost)) break;
