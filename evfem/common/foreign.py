@@ -29,11 +29,15 @@ MOST_DECLARED = 10**9
 PHOTOMETRIC = 262
 
 
+class TooLong(ValueError):
+    """Longer than is read."""
+
+
 def check_declared(sizes: Iterable[int]) -> None:
-    """Raise ValueError for parts of these sizes (bytes) that together are longer than is read."""
+    """Raise `TooLong` for parts of these sizes (bytes) that together are longer than is read."""
     declared = sum(sizes)
     if declared > MOST_DECLARED:
-        raise ValueError(f"it declares {declared / 1e9:.3g} GB of numbers or texts; 1 GB is read")
+        raise TooLong(f"it declares {declared / 1e9:.3g} GB of numbers or texts; 1 GB is read")
 
 
 def read_grey(
@@ -106,11 +110,13 @@ def cells_of(path: Path, key: str, allowed: str) -> list[list[str]]:
         raise
     except ModuleNotFoundError as error:
         raise InputError(key, path.name, f"pip install {error.name}, which reads it, or a csv file") from None
+    except TooLong as error:
+        raise InputError(key, f"{path.name} ({error})", allowed) from None
     except NotImplementedError:  # MATLAB's version 7.3
         problem, rule = f"{path.name}, of version 7.3", 'save("-v7", ...) in MATLAB, or a csv file'
         raise InputError(key, problem, rule) from None
     except Exception as error:  # whatever the decoders raise for a damaged file
-        reason = getattr(error, "strerror", None) or "damaged, too long or of another kind"
+        reason = getattr(error, "strerror", None) or "damaged or of another kind"
         raise InputError(key, f"{path.name} ({reason})", allowed) from None
 
 
