@@ -133,7 +133,6 @@ def questions(found: Found) -> str:
     """Growth, memory, and what a step costs in factorisations."""
     n = found["numbers"]
     growth = (n["growth.exponent.press_s"], n["growth.exponent.slide_s"])
-    plain = [value for key, value in n.items() if key.endswith("_plain.cpu_over_usual")]
     memory = n.get("growth.peak_MB_at_100k_nodes")
     share = 100.0 * n["shares.setup_share_of_a_20_step_press"]
     steps = {"press": "a press step on L2", "stick_slip": "a step of stick and slip on L2"}
@@ -145,8 +144,6 @@ def questions(found: Found) -> str:
     for phase, name in steps.items():
         count = n.get(f"shares.{phase}.factorisations")
         rows.append([name, "-" if count is None else f"{count:.2g} LDL^T factorisations of its matrix"])
-    if plain:
-        rows.append(["without `[fast]`", f"{min(plain):.1f} to {max(plain):.1f} times as long"])
     rows.append(["set-up", f"{share:.0f} % of a press of 20 steps"])
     return table(["question", "answer"], rows)
 
@@ -164,8 +161,7 @@ def readme(peers: Found, runs: Found) -> str:
         ["Hertz line contact, closed form", "peak pressure 0.05 %, half width 0.6 %"],
         [
             f"default run, {run['default.steps']:.0f} steps, one thread",
-            f"{short(run['default.fast.cpu_s'])} CPU s with `[fast]`, "
-            f"{short(run['default.plain.cpu_s'])} without",
+            f"{short(run['default.cpu_s'])} CPU s",
         ],
     ]
     return table(["question", "answer"], rows)
@@ -185,8 +181,8 @@ def default_run(runs: Found) -> str:
     n = runs["numbers"]
     return filled(
         f"`evfem run` ({n['default.nodes']:,.0f} nodes, {n['default.steps']:.0f} steps, "
-        f"{n['default.MB']:.0f} MB of files) takes {short(n['default.fast.cpu_s'])} CPU seconds with "
-        f"`[fast]` and {short(n['default.plain.cpu_s'])} without, imports included, on one thread."
+        f"{n['default.MB']:.0f} MB of files) takes {short(n['default.cpu_s'])} CPU seconds, "
+        "imports included, on one thread."
     )
 
 

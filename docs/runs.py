@@ -1,5 +1,5 @@
-"""Measures what no study does, in CPU seconds on one thread: the built-in scene by the command, with and
-without PARDISO, single steps of a loop, and ridged fingertips with their memory. `python docs/runs.py`
+"""Measures what no study does, in CPU seconds on one thread: the built-in scene by the command,
+single steps of a loop, and ridged fingertips with their memory. `python docs/runs.py`
 writes docs/results/runs.json and the pages; it takes about four minutes.
 """
 
@@ -23,9 +23,7 @@ from evfem.simulation.provenance import origin
 from evfem.studies.common import commit, processor
 
 RESULTS = Path(__file__).parent / "results"
-#: the command; without PARDISO as where it is not installed
-RUN = "import sys{}; from evfem.cli import main; sys.exit(main(['run', '--out', 'out']))"
-WITHOUT = "; sys.modules['pypardiso'] = None"
+RUN = "import sys; from evfem.cli import main; sys.exit(main(['run', '--out', 'out']))"
 LOOPS = {
     "coarse": (ev.FingerPad(resolution="coarse", ridges=False), 0.05, 100),
     "medium": (ev.FingerPad(resolution="medium", ridges=False), 0.05, 60),
@@ -38,11 +36,11 @@ TIPS: dict[str, tuple[float, list[ev.Motion]]] = {
 }
 
 
-def default_run(program: str) -> dict[str, float]:
+def default_run() -> dict[str, float]:
     """CPU seconds and files of the built-in scene."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with TemporaryDirectory() as folder:
-        subprocess.run([sys.executable, "-c", program], cwd=folder, check=True, capture_output=True)
+        subprocess.run([sys.executable, "-c", RUN], cwd=folder, check=True, capture_output=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         out = Path(folder) / "out"
         size = sum(path.stat().st_size for path in out.iterdir())
@@ -53,8 +51,7 @@ def default_run(program: str) -> dict[str, float]:
 
 
 def loop_times(finger: ev.FingerPad | ev.Fingertip, force: float, steps: int) -> dict[str, float]:
-    """Steps of 0.02 mm under a voltage that changes, without PARDISO."""
-    sys.modules["pypardiso"] = None  # type: ignore[assignment]
+    """Steps of 0.02 mm under a voltage that changes."""
     begin = time.process_time()
     scene = ev.Scene(finger, ev.Display(friction=0.3), ev.Kaczmarek(), 0.0, [])
     loop = ev.loop(scene, largest_voltage=1000.0)
@@ -90,9 +87,7 @@ def main() -> None:
     import measured
 
     begin = time.perf_counter()
-    fast, plain = default_run(RUN.format("")), default_run(RUN.format(WITHOUT))
-    numbers = {f"default.{key}": fast[key] for key in ("MB", "steps", "nodes")}
-    numbers |= {"default.fast.cpu_s": fast["cpu_s"], "default.plain.cpu_s": plain["cpu_s"]}
+    numbers = {f"default.{key}": value for key, value in default_run().items()}
     for name, (finger, force, steps) in LOOPS.items():
         numbers |= {f"loop.{name}.{k}": float(v) for k, v in loop_times(finger, force, steps).items()}
     for name in TIPS:

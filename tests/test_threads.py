@@ -87,6 +87,7 @@ def test_scipy_comes_under_the_limits_that_hold_when_it_is_loaded(tmp_path):
     assert fresh(code, tmp_path).splitlines() == ["[1, 1] [2, 2]", "True"]
 
 
+@pytest.mark.pardiso
 def test_a_limit_that_begins_within_a_run_leaves_the_threads_of_its_factorisations(tmp_path):
     """PARDISO ends the process where a phase has fewer threads than the analysis had."""
     code = (
@@ -103,6 +104,7 @@ def test_a_limit_that_begins_within_a_run_leaves_the_threads_of_its_factorisatio
     assert fresh(code, tmp_path) == "done"
 
 
+@pytest.mark.pardiso
 def test_the_threads_of_a_scene_are_those_of_its_factorisations_alone(tmp_path):
     """Threads of the BLAS that spin beside them took twice the CPU time, and longer."""
     code = (

@@ -343,12 +343,11 @@ def other_solver() -> Iterator[bool]:
 
 
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> Condensation:
-    """The first that is there: PARDISO, Cholesky factors, SuperLU. On one thread Cholesky factors come first
-    in space and where they may be `single`; else they are no slower, but load scipy. SuperLU alone takes
-    matrices all of whose unknowns are kept.
+    """The first that is there: Cholesky factors, PARDISO, SuperLU; on several threads, which Cholesky factors
+    have no use for, PARDISO first. SuperLU alone takes matrices all of whose unknowns are kept.
     """
-    kinds: list[type[Condensation]] = [Pardiso, Cholesky]
-    if threads == 1 and (single or pattern.dim == 3):
+    kinds: list[type[Condensation]] = [Cholesky, Pardiso]
+    if threads > 1:
         kinds.reverse()
     there = (kind for kind in kinds if kept.size < pattern.size and _is_there(kind))
     return next(islice(there, int(_OTHER.get()), None), SuperLU)(pattern, kept, threads, single)

@@ -36,7 +36,7 @@ CALM, ATTRACTED, SNAPPING = (0.4, 2.5), (0.3, 3.5), (0.3, 10.0)
 
 
 def needed_time(scene: Scene, mesh: Mesh) -> tuple[float, float]:
-    """CPU time (s), from and to, of a run with compiled loops, in the plane with PARDISO, on the processor of
+    """CPU time (s), from and to, of a run with compiled loops, on the processor of
     `docs/performance.md`; nine of ten drawn scenes lie within.
     """
     pressing = sum(motion.steps for motion in scene.motion if motion.course.presses)
@@ -66,5 +66,5 @@ def needs(scene: Scene, mesh: Mesh) -> str:
     """Memory and time of a run in a sentence."""
     least, most = (f"{float(f'{seconds:.1g}'):g}" for seconds in needed_time(scene, mesh))
     snaps = ", most where contact snaps" if _attraction(scene, mesh) >= STRONG else ""
-    memory, solver = needed_memory(mesh) / 1e9, " with PARDISO" if mesh.dim == 2 else ""
-    return f"a run takes about {memory:.2g} GB of memory and {least} to {most} s of CPU time{solver}{snaps}"
+    memory = needed_memory(mesh) / 1e9
+    return f"a run takes about {memory:.2g} GB of memory and {least} to {most} s of CPU time{snaps}"

@@ -423,14 +423,10 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
 
 
 def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
-    own = find_spec("evfem.tissue.kernels.cholesky")
-    backend = "SuperLU (no C compiler was there at the installation)"
-    if own and scene.solver.threads == 1 and mesh.dim == 3:
-        backend = "sparse Cholesky factors"
-    elif find_spec("pypardiso"):
-        backend = "PARDISO (symmetric, Schur complement)"
-    elif own:
-        backend = "sparse Cholesky factors (install evfem[fast] for PARDISO)"
+    direct = {"evfem.tissue.kernels.cholesky": "sparse Cholesky factors", "pypardiso": "PARDISO"}
+    there = [words for package, words in direct.items() if find_spec(package)]
+    there = there[:: -1 if scene.solver.threads > 1 else 1]  # as `newton.condensation.make_condensation`
+    backend = (*there, "SuperLU (no C compiler was there at the installation)")[0]
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     yield f"symmetric stiffness matrix, factorised rarely and reused: {backend}; cell loops: {cells}"
     yield f"contact: {scene.solver.contact}, active-set method on the nodes that may touch"

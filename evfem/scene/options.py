@@ -55,7 +55,7 @@ class Solver:
     tolerance: Annotated[
         float, _TOLERANCE, "largest free residual over the largest reaction, of every step"
     ] = 1e-8
-    threads: Annotated[int, whole(1024), "of PARDISO"] = 1
+    threads: Annotated[int, whole(1024), "of PARDISO, which is in evfem[fast]"] = 1
     strategy: Annotated[Strategy, {"allowed": "a table [solver.strategy]"}, "how hard steps are tried"] = (
         field(default_factory=Strategy)
     )

@@ -15,7 +15,6 @@ ELEMENTS = {
     "q1_fbar": ("F-bar", COLOURS["measured"], "^", "-"),
     "q2": ("Q2", COLOURS["fe"], "D", "-"),
     "q2p1": ("Q2-P1", COLOURS["kaczmarek"], "o", "-"),
-    "q2p1_plain": ("Q2-P1 without [fast]", COLOURS["kaczmarek"], "o", "--"),
 }
 #: what is not a curve over the meshes: label and marker
 POINTS = {

@@ -5,16 +5,14 @@ that has run everything once on the coarsest mesh; cheap runs are repeated and t
 """
 
 import gc
-import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from evfem.electrostatics.forces import EllipsoidalPad, pad_force_per_depth, plate_force
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.meshes.benchmark import OUTER
 
-from ..common import alone
 from ..peers.problem import LAYERS
 from .scenes import ELEMENTS, GAP, HOVER_VOLTAGE, PADS, Case, build, forces
 
@@ -65,18 +63,10 @@ def measure(case: Case, rounds: int = ROUNDS) -> Run:
     return Run(case, least, record["iterations"], record["factorisations"], nodes, forces(case, result))
 
 
-def measure_plain(cases: list[Case]) -> list[Run]:
-    """The same in a process that cannot import the package of evfem[fast] from now on."""
-    sys.modules["pypardiso"] = None  # type: ignore[assignment]
-    warm_up()
-    return [measure(case) for case in cases]
-
-
 def measured(cases: list[Case], rounds: int) -> list[Run]:
-    """The runs with evfem[fast], then those without."""
+    """The runs, in a process that has compiled what they need."""
     warm_up()
-    plain = [case for case in cases if not case.fast]
-    return [measure(case, rounds) for case in cases if case.fast] + alone(measure_plain, plain)
+    return [measure(case, rounds) for case in cases]
 
 
 def models() -> dict[str, tuple[float, float]]:
@@ -108,8 +98,7 @@ def full() -> list[Case]:
     cases += [Case(pad, "coarse", e) for pad in PADS for e in ELEMENTS]
     cases += [Case(pad, "medium", e) for pad in PADS for e in ("q1_fbar", "q2p1")]
     cases += [Case(pad, preset) for preset in ("paper", "fine") for pad in PADS]
-    plain = [*(Case(problem, 0) for problem in _FINGERS), Case("A", 1)]
-    return cases + [replace(one, fast=False) for one in cases if one in plain]
+    return cases
 
 
 def quick() -> list[Case]:
@@ -117,4 +106,4 @@ def quick() -> list[Case]:
     cases = [Case(problem, 0, element) for problem in ("A", "hover") for element in ("q1", "q2p1")]
     cases += [Case("A", 1), Case("hover", 1), Case("C", 0)]
     cases += [Case("A", 0, penalty=penalty) for penalty in PENALTIES]
-    return [*cases, Case("hover", 0, rigid=True), Case("hover", 0, fast=False)]
+    return [*cases, Case("hover", 0, rigid=True)]

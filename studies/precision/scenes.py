@@ -36,7 +36,7 @@ class Case:
 
     `level` of the benchmark's meshes, or the finger pad's preset; `penalty` (N/mm3) instead of
     exact contact; steps of A's to C's `press` and of the slide; `rigid`: the hovering outline does
-    not deform; `fast`: with evfem[fast].
+    not deform.
     """
 
     problem: str
@@ -45,7 +45,6 @@ class Case:
     penalty: float = 0.0
     steps: int = 30
     rigid: bool = False
-    fast: bool = True
     press: int = 15
     tolerance: float = problem.TOLERANCE
 
@@ -55,7 +54,6 @@ class Case:
         said = [f"penalty_{self.penalty:g}"] if self.penalty else []
         said += [f"{self.steps}_steps"] if self.steps != 30 else []
         said += ["rigid"] if self.rigid else []
-        said += ["plain"] if not self.fast else []
         return "_".join([self.element, *said])
 
     @property

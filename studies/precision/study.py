@@ -28,7 +28,6 @@ ASSUMPTIONS = {
     "in a process that has run before; least of three for runs below a second",
     "recommended": "exact contact; the cheapest measured run; a star where the reference is less "
     "certain than the goal",
-    "plain": "pypardiso cannot be imported: SuperLU",
     "growth": "scene B's finger, four press and four slide steps of 0.1 mm; the first press step counts as "
     "set-up; memory is the largest resident of a process, interpreter and imports included",
     "factorisations": "CPU of a step over CPU of one LDL^T factorisation of the same tangent without Schur "

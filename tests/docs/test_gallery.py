@@ -12,7 +12,7 @@ import pytest
 
 PAGE = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
 EXAMPLE = re.compile(
-    r'^<div class="example">\n\n(?:<!-- needs fast -->\n)?```python\n(.*?)^```\n\n'
+    r'^<div class="example">\n\n(?:<!-- takes long -->\n)?```python\n(.*?)^```\n\n'
     r"!\[(.+?)\]\(pictures/gallery-(\w+)\.(png|gif)\)"
     r"\n\n</div>$",
     re.M | re.S,

@@ -5,7 +5,7 @@ A page's Python blocks run in order, in one namespace and a folder of their own.
 what it prints, `...` standing for anything. TOML blocks are scenes, sweeps or
 sensitivities, `evfem` lines in `sh` blocks
 are understood by the command. `<!-- not run: reason -->` or `<!-- needs vtk -->` before a block says why it
-does not run here; `<!-- needs fast -->` that it takes minutes without PARDISO.
+does not run here; `<!-- takes long -->` that it runs with the slow tests.
 """
 
 import doctest
@@ -17,7 +17,6 @@ import sys
 import tomllib
 from contextlib import ExitStack
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from unittest.mock import patch
 
@@ -117,14 +116,13 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-def test_blocks_that_take_long_without_pardiso_run(tmp_path, monkeypatch, capsys):
+def test_blocks_that_take_long_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    slow = [page for page in PAGES if "<!-- needs fast -->" in (DOCS / page).read_text(encoding="utf-8")]
+    slow = [page for page in PAGES if "<!-- takes long -->" in (DOCS / page).read_text(encoding="utf-8")]
     assert slow
-    if find_spec("pypardiso") is not None:  # `.ci/run` runs the tests with this mark with it
-        for page in slow:
-            run(page, {"needs fast"}, capsys)
-        assert Path("footprint.png").exists()
+    for page in slow:
+        run(page, {"takes long"}, capsys)
+    assert Path("footprint.png").exists()
 
 
 def anchors(page):

@@ -1,6 +1,5 @@
 """Condensing factorisations against dense algebra; both back ends on the same problems."""
 
-import importlib.util
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -14,8 +13,8 @@ from evfem.newton.condensation import Cholesky, Pardiso, Singular, SuperLU
 from evfem.tissue.kernels.blocks import sparse_cholesky
 from evfem.tissue.pattern import Pattern
 
-#: PARDISO is part of evfem[fast], Cholesky is compiled
-WITH_PARDISO = [Pardiso] if importlib.util.find_spec("pypardiso") else []
+#: Cholesky is compiled
+WITH_PARDISO = [pytest.param(Pardiso, marks=pytest.mark.pardiso)]
 BACK_ENDS = [*WITH_PARDISO, *([Cholesky] if sparse_cholesky() else []), SuperLU]
 every_back_end = pytest.mark.parametrize("back_end", BACK_ENDS)
 KEPT = np.array([17, 3, 39, 0, 22, 8])  # in no order, first and last unknown among them
