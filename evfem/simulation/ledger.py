@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.signorini import FORWARD, OPEN
+from evfem.contact.signorini import FORWARD, OPEN, SLIP
 from evfem.errors import InputError
 from evfem.newton.control import VoltageControl
 from evfem.newton.interface import Interface
@@ -101,7 +101,7 @@ class EnergyAccount:
             **reduce(or_, (_components(f"{name}_force", pull) for name, (pull, _) in pulls.items())),
             **extent,
             "min_gap": float(surface_state(model.surface, places).gap.min()),
-            "peak_contact_pressure": float(tractions(interface, position, pressing, pressing).max()),
+            "peak_contact_pressure": float(tractions(interface, state, pressing, pressing).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
             **end.columns,
@@ -170,12 +170,13 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
     }
 
 
-def tractions(interface: Interface, position: Floats, pressing: Floats, force: Floats) -> Floats:
+def tractions(interface: Interface, state: State, pressing: Floats, force: Floats) -> Floats:
     """Tractions (P,) in MPa of contact forces (P,) of pad nodes under pressing ones (P,), in N/mm or N: over
     what nodes stand for, above an elastic surface even along the facets of an outline.
     """
-    length = _positive(interface.pad.tributary(position))
-    return np.asarray(interface.foundation.evened(pressing / length, force / length))
+    length = _positive(interface.pad.tributary(interface.positions(state.u)))
+    slips = state.status >= SLIP
+    return np.asarray(interface.foundation.evened(pressing / length, force / length, slips))
 
 
 def _positive(length: Floats) -> Floats:
@@ -206,7 +207,7 @@ def _fields(
     """The fields of `Frame` in a state, by name."""
     size, nodes = len(state.u), interface.pad.nodes
     surface, withheld = surface_state(interface.surface, interface.places(state)), interface.withheld(state)
-    position, pressing = interface.positions(state.u), state.contact_force[:, 0] + withheld
+    pressing = state.contact_force[:, 0] + withheld
     pulled = _positive(attraction.weights(interface.pad_state(state, state.touching)))
 
     def on_pad(values: Any, off: float) -> Any:
@@ -219,8 +220,8 @@ def _fields(
     return {
         "displacement": whole(state.u).copy(),
         "gap": on_pad(surface.gap, np.nan),
-        "contact_pressure": on_pad(tractions(interface, position, pressing, pressing), 0.0),
-        "shear_traction": on_pad(tractions(interface, position, pressing, _shear(state)), 0.0),
+        "contact_pressure": on_pad(tractions(interface, state, pressing, pressing), 0.0),
+        "shear_traction": on_pad(tractions(interface, state, pressing, _shear(state)), 0.0),
         "electrostatic_traction": on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
         "surface_sink": on_pad(interface.foundation.sink(state), 0.0),
         "contact_status": on_pad(status, 0).astype(np.int64),

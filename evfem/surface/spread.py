@@ -163,16 +163,21 @@ class Facets:
         facets = (bend > STRAIGHT) & (bend < SMOOTH) & (straight and corner.shape != sides.shape)
         self.sides, self.size = sides[facets], size[facets]
 
-    def evened(self, pressure: Floats, traction: Floats) -> Floats:
+    def evened(self, pressure: Floats, traction: Floats, slips: Any) -> Floats:
         """A traction (P,) of nodes under a pressure (P,): on sides that touch as a whole the linear one of
-        the same force and moment, at nodes the mean of their sides.
+        the same force and moment, at nodes the mean of their sides. Its ratio to the pressure is that of each
+        node where one of a side `slips` (P,), else no larger than at a node of the side.
         """
         even = pressure[self.sides] @ self.even.T
         whole = np.flatnonzero((np.minimum(pressure[self.sides], even) > 0.0).all(axis=1))
         if not whole.size:
             return traction
-        of, weight = self.sides[whole].ravel(), np.repeat(self.size[whole], self.sides.shape[1])
-        values = (traction[self.sides[whole]] @ self.even.T).ravel()
+        sides, even = self.sides[whole], even[whole]
+        of, weight = sides.ravel(), np.repeat(self.size[whole], sides.shape[1])
+        ratio = traction[sides] / pressure[sides]
+        largest = np.abs(ratio).max(axis=1, keepdims=True) * even
+        linear = np.clip(traction[sides] @ self.even.T, -largest, largest)
+        values = np.where(slips[sides].any(axis=1, keepdims=True), ratio * even, linear).ravel()
         total, weights = (np.bincount(of, each, traction.size) for each in (weight * values, weight))
         return np.where(weights > 0.0, total / np.where(weights > 0.0, weights, 1.0), traction)
 

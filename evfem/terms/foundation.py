@@ -165,8 +165,10 @@ class Rigid(Room):
         """The same attraction as above the undeformed surface, whose work is that of the field."""
         return force
 
-    def evened(self, pressure: Floats, traction: Floats) -> Floats:
-        """A traction (P,) of nodes under a pressure (P,), without what its facets make alternate."""
+    def evened(self, pressure: Floats, traction: Floats, slips: Any) -> Floats:
+        """A traction (P,) of nodes under a pressure (P,), whether each `slips` (P,): without what facets of
+        the outline make alternate.
+        """
         return traction
 
     def missed(self, position: Floats, state: Any, force: Floats) -> float:
@@ -302,9 +304,9 @@ class ElasticFoundation(Rigid):
     def _facets(self) -> Facets:
         return Facets(self.pad, self.rest)
 
-    def evened(self, pressure: Floats, traction: Floats) -> Floats:
+    def evened(self, pressure: Floats, traction: Floats, slips: Any) -> Floats:
         flat = not self.surface.relief(self.rest[:, ::2])[2].any()
-        return self._facets.evened(pressure, traction) if flat else traction
+        return self._facets.evened(pressure, traction, slips) if flat else traction
 
     def under(self, position: Floats, state: Any) -> Yielding:
         """The surface below nodes at `position` (P, dim) in a state."""

@@ -212,9 +212,10 @@ def _beyond_the_cone(scene: ev.Scene, result: ev.Result, frame: ev.result.Frame)
     """How far shear is outside the cone at any node's place; where it slips, how far from it.
 
     At a jump, and within a steep ramp, any coefficient within `NEAR` will do. Where coefficients are carried
-    along by an elastic surface a frame does not say which.
+    along by an elastic surface a frame does not say which, and evened pressures are not those of a law.
     """
-    if scene.ground.elastic is not None and not isinstance(scene.surface.friction, float):  # type: ignore[attr-defined]
+    coulomb = isinstance(scene.friction_law, ev.Coulomb)
+    if scene.ground.elastic is not None and not (coulomb and isinstance(scene.surface.friction, float)):  # type: ignore[attr-defined]
         return 0.0
     place = (result.mesh.points + frame.displacement)[:, ::2]
     shifts = [NEAR * np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=place.shape[1])]

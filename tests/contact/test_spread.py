@@ -11,6 +11,7 @@ from tools.meshes import arc, contact_block
 from tools.solids import bent, sheet
 
 import evfem as ev
+from evfem.contact.signorini import SLIP, STICK
 from evfem.mesh.mesh import raised
 from evfem.simulation.model import make_model
 from evfem.surface.elastic import transfer
@@ -158,10 +159,11 @@ def test_linear_tractions_along_facets_stay_and_what_alternates_goes():
     linear = 2.0 + points @ [0.3, 0.0, -0.4]
     middle = np.isin(np.arange(len(points)), skin.faces[:, 8])
     alternating = np.where(middle, 0.2, 0.0) - 0.2 * 4.0 / 9.0  # of no force on a face
-    assert_allclose(even.evened(linear, linear), linear)
-    assert_allclose(even.evened(linear, linear + alternating), linear, atol=1e-12)
+    none = np.zeros(linear.size, bool)
+    assert_allclose(even.evened(linear, linear, none), linear)
+    assert_allclose(even.evened(linear, linear + alternating, none), linear, atol=1e-12)
     drawn = linear + np.random.default_rng(2).uniform(-0.1, 0.1, linear.size)
-    assert_allclose(size @ even.evened(linear, drawn), size @ drawn)
+    assert_allclose(size @ even.evened(drawn, drawn, none), size @ drawn)
 
 
 def test_tractions_stay_where_a_side_touches_in_part():
@@ -169,7 +171,7 @@ def test_tractions_stay_where_a_side_touches_in_part():
     pressure = 1.0 + np.random.default_rng(3).uniform(0.0, 0.1, len(points))
     pressure[skin.faces[0, 8]] = 0.0
     lone = np.setdiff1d(skin.faces[0], skin.faces[1:])
-    changed = Facets(skin, points).evened(pressure, pressure) != pressure
+    changed = Facets(skin, points).evened(pressure, pressure, pressure < 0.0) != pressure
     assert not changed[lone].any()
     assert changed.sum() > 0.8 * len(points)
 
@@ -204,4 +206,22 @@ def test_tractions_are_even_above_flat_elastic_surfaces_alone(surface, evens):
     model = make_model(ev.Scene(finger, surface, motion=[ev.Press(indentation=0.01)]))
     drawn = np.random.default_rng(4).uniform(1.0, 1.1, len(model.pad.nodes))
     foundation = model.equilibrium.interface.foundation
-    assert (foundation.evened(drawn, drawn) != drawn).any() == evens
+    assert (foundation.evened(drawn, drawn, drawn < 0.0) != drawn).any() == evens
+
+
+def test_shear_on_facets_is_within_the_cone_and_on_it_where_nodes_slip():
+    """Evened along a side that sticks in part, it was twice the friction at the end that sticks."""
+    x = np.linspace(-2.0, 2.0, 9)
+    mesh = contact_block(x, np.array([0.0, 0.5, 1.0]), 2.0, lambda x: 0.03 * x**2, False)
+    surface = ev.Flat(friction=0.2, elastic=ev.ElasticLayer(2.5, 0.3, 4.0))
+    finger = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(0.04, 0.45)})
+    motion = [ev.Press(indentation=0.05, steps=3), ev.Slide(0.01, steps=3)]
+    result = ev.simulate(ev.Scene(finger, surface, motion=motion))
+    mixed = 0
+    for frame in result.frames:
+        shear, bound = np.abs(frame.shear_traction), 0.2 * frame.contact_pressure
+        mixed += {STICK, SLIP} <= {*frame.contact_status}
+        assert_allclose(np.maximum(shear, bound), bound, rtol=1e-9)
+        slips = frame.contact_status == SLIP
+        assert_allclose(shear[slips], bound[slips], rtol=1e-9)
+    assert mixed
