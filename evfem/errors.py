@@ -16,6 +16,30 @@ from typing import Any
 LONGEST_VALUE, LONGEST_TEXT = 200, 500
 #: letters after which no further mistake is told
 LONGEST_LIST = 800
+#: words that people try -> the keys and kinds that they may mean
+MEANT = {
+    "mu": "friction",
+    "friction_coefficient": "friction",
+    "tilt": "posture",
+    "pitch": "ridge_width",
+    "modulus": "E",
+    "youngs_modulus": "E",
+    "young": "E",
+    "poisson": "nu",
+    "load": "force",
+    "depth": "indentation",
+    "velocity": "speed",
+    "length": "distance",
+    "wavelength": "period terms",
+    "amplitude": "terms",
+    "thickness": "insulator_thickness",
+    "eps_r": "insulator_eps_r",
+    "permittivity": "insulator_eps_r eps_r",
+    "roughness": "roughness_gap",
+    "move": "slide",
+    "sine": "sinusoid",
+    **dict.fromkeys(("stratum_corneum", "epidermis", "dermis", "hypodermis", "skin"), "materials"),
+}
 
 
 class EvfemError(Exception):
@@ -32,10 +56,11 @@ ABSENT = Absent.ABSENT
 
 
 def readable(value: object) -> str:
-    """A value as it is shown to the user: on one line, a text in quotes, cut to a readable length.
+    """A value as it is shown to the user: on one line, a text in quotes, cut to a readable length, an object
+    without its address.
 
-    >>> print(readable("two\\nlines"), len(readable([1.0] * 1000)))
-    "two\\nlines" 200
+    >>> print(readable("two\\nlines"), len(readable([1.0] * 1000)), readable(object()))
+    "two\\nlines" 200 <object object>
     """
     if isinstance(value, str):
         start = value[: LONGEST_VALUE + 1]  # a file of 4 MB may be one text
@@ -43,7 +68,8 @@ def readable(value: object) -> str:
     if isinstance(value, type):
         return f"the class {value.__name__}"
     try:
-        return _cut(re.sub(r"\bnp\.\w+\((.*?)\)", r"\1", repr(value)), LONGEST_VALUE)  # np.float64(1.0): 1.0
+        said = re.sub(r" at 0x[0-9a-fA-F]+>", ">", repr(value))
+        return _cut(re.sub(r"\bnp\.\w+\((.*?)\)", r"\1", said), LONGEST_VALUE)  # np.float64(1.0): 1.0
     except (ValueError, RecursionError):  # an integer of too many digits, lists in lists
         return f"{type(value).__name__} too large to show"
 
@@ -140,10 +166,16 @@ def unknown(key: str, name: str, known: Sequence[str], what: str = "an unknown k
 
 
 def closest_name(name: str, known: Sequence[str]) -> list[str]:
-    """The name that may have been meant, if there is one."""
+    """The name that may have been meant, by its meaning or its letters, if there is one.
+
+    >>> closest_name("tilt", ["width", "posture"]), closest_name("widht", ["width", "posture"])
+    (['posture'], ['width'])
+    """
     from difflib import get_close_matches
 
     small = {one.lower(): one for one in known}
+    if meant := [one for one in MEANT.get(name.lower(), "").split() if one in known]:
+        return meant[:1]
     return [small[one] for one in get_close_matches(name[:40].lower(), small, n=1)]
 
 

@@ -36,8 +36,7 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     1.0
     """
     if isinstance(value, bool) or not isinstance(value, Real):
-        bare = isinstance(value, str) and allowed.lstrip("-")[:1].isdigit()  # a range that says not of what
-        raise InputError(key, describe_value(value), f"a number, {allowed}" if bare else allowed)
+        raise InputError(key, describe_value(value), _bare(value, allowed))
     try:
         number = float(value)
     except OverflowError:  # an integer beyond all floats
@@ -45,6 +44,19 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     if not (math.isfinite(number) and test(number)):
         raise InputError(key, describe_value(value), allowed)
     return number
+
+
+def _bare(value: object, allowed: str) -> str:
+    """What is allowed in place of a value that is no number; of a text that was to be one, how it is written.
+
+    >>> _bare("0.5 N", "a force in N/mm"), _bare("soft", "0 to 1 MPa")
+    ('a number without quotes and unit, a force in N/mm', 'a number, 0 to 1 MPa')
+    """
+    if not isinstance(value, str) or allowed.startswith("a number"):
+        return allowed
+    if value.strip()[:1] in tuple("+-.0123456789"):
+        return f"a number without quotes and unit, {allowed}"
+    return f"a number, {allowed}" if allowed.lstrip("-")[:1].isdigit() else allowed
 
 
 def count(key: str, value: object, most: int = MOST_STEPS, least: int = 1, allowed: str = "") -> int:
@@ -99,7 +111,7 @@ def finite(key: str, entered: Values, allowed: str) -> Values:
     except ValueError as error:  # rows of different length
         raise InputError(key, describe_value(entered), allowed) from error
     if value.dtype.kind not in "iufc" or np.ma.is_masked(entered) or not np.all(np.isfinite(value)):
-        raise InputError(key, describe_value(entered), allowed)
+        raise InputError(key, describe_value(entered), _bare(entered, allowed))
     return to_python(value * 1.0)
 
 

@@ -23,6 +23,7 @@ from evfem.errors import ABSENT, InputError, describe_value, unknown
 from evfem.mesh.mesh import Mesh, raised
 from evfem.planning.plan import scene_mesh
 from evfem.scene import file as scenefile
+from evfem.scene.format import dotted
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 
@@ -132,9 +133,9 @@ class Keyed:
         """Attributes, names and numbers from the scene to it."""
         table, *rest = self.name.split(".")
         if table not in TABLES or not rest:
-            raise InputError(
-                "parameters", describe_value(self.name), f"TABLE.KEY, TABLE one of {', '.join(TABLES)}"
-            )
+            meant = f"{dotted(self.name)}? " if dotted(self.name) else ""
+            allowed = f"{meant}TABLE.KEY, TABLE one of {', '.join(TABLES)}"
+            raise InputError("parameters", describe_value(self.name), allowed)
         if table == "electrostatics":
             return self._electric(*rest)
         if (table, rest[0]) == ("surface", "friction_law"):

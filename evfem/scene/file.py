@@ -77,8 +77,9 @@ def tables_of(key: str, text: str) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        several = "; each motion is a table [[motion]]" if "'motion'" in str(error) else ""
-        raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML{several}") from error
+        more = "; each motion is a table [[motion]]" if "'motion'" in str(error) else ""
+        more = "; each key once" if "Cannot overwrite a value" in str(error) else more
+        raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML{more}") from error
     if type(version := tables.get("version", ABSENT)) is not int or version != VERSION:
         given = ABSENT if version is ABSENT else shown(version)
         raise InputError("version", given, f"version = {VERSION}")
@@ -216,8 +217,12 @@ def _parametric(table: Mapping[str, Any], folder: Path) -> Any:
     with mistakes.of_a_part():
         if isinstance(laws := table.get("materials"), Mapping):
             table = {**table, "materials": {name: _completed(name, law) for name, law in laws.items()}}
-        beside = [*names(Measured, BesideFinger), "mesh"]
-        found = read(cls, {**sizes, **table}, "finger", folder, tag="kind", beside=beside, homes=HOMES)
+        more: dict[str, Any] = {
+            "beside": [*names(Measured, BesideFinger), "mesh"],
+            "homes": HOMES,
+            "kinds": FINGERS,
+        }
+        found = read(cls, {**sizes, **table}, "finger", folder, tag="kind", **more)
     mistakes.report()
     return found
 

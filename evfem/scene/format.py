@@ -21,9 +21,9 @@ from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, SOLID, STRENGTH, STRONG, Layer
 from evfem.electrostatics.timesignals import RATE, START, Sampled
-from evfem.errors import ABSENT, InputError, Mistakes
+from evfem.errors import ABSENT, MEANT, InputError, Mistakes
 from evfem.finger.fingerpad import Electrical, FingerPad
-from evfem.scene.keys import VERSION, at, columns, shown
+from evfem.scene.keys import VERSION, at, columns, names, shown
 from evfem.scene.motion import MOTIONS, VOLTAGE
 from evfem.scene.scene import (
     DEPTH,
@@ -47,7 +47,9 @@ Pairs = list[list[float]]
 _HEIGHTS = "the path of a csv file with the header x,height"
 _RELIEF = "the path of a csv file with the header x,z,height"
 _CSV = {"file": lambda name: name.lower().endswith(TABLES)}
-_SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
+_SIGNAL = instance(
+    f"a table [electrostatics.signal] with kind = {' | '.join(timesignals.SIGNALS)}", timesignals.TimeSignal
+)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
 _VOLTAGE = number(f"{VOLTAGE['allowed']}, or a table with a kind: {' | '.join(FOUND)}", VOLTAGE["test"], "V")
 _VOLTAGE |= {"type": float | dict, "kinds": lambda: FOUND}
@@ -386,3 +388,16 @@ HOMES: Mapping[str, tuple[Any, ...]] = {
     "[output]": (Output,),
     "[[motion]]": tuple(MOTIONS.values()),
 }
+
+
+def dotted(name: str) -> str:
+    """The dotted key that a bare one may mean, nothing for none.
+
+    >>> dotted("friction"), dotted("tilt"), dotted("speed"), dotted("colour")
+    ('surface.friction', '', 'motion.0.speed', '')
+    """
+    for meant in (name, *MEANT.get(name.lower(), "").split()):
+        for table, classes in HOMES.items():
+            if meant in names(*classes):
+                return f"{table.strip('[]')}.{meant}".replace("motion.", "motion.0.")
+    return ""

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import Any, get_origin
 
 from evfem.common.checks import RENAMED_KEYS, Key, keys_of
-from evfem.errors import ABSENT, InputError, Mistakes, closest_name, combine, readable, unknown
+from evfem.errors import ABSENT, MEANT, InputError, Mistakes, closest_name, combine, readable, unknown
 
 #: of the format
 VERSION = 1
@@ -37,11 +37,13 @@ def read(
     tag: str = "",
     beside: Sequence[str] = (),
     homes: Mapping[str, Collection[Any]] | None = None,
+    kinds: Mapping[str, Any] = MappingProxyType({}),
     **extra: Any,
 ) -> Any:
     """What a table describes, or all mistakes in it: first unknown keys, then others but the lack of what an
     unknown one may stand for. Paths start at `folder`; the key `tag` and those of somebody else's may stand
-    `beside`; `homes` are other tables, whose keys may have been meant; `extra` are fields that no file has.
+    `beside`; `homes` are other tables and `kinds` all of this one by their `tag`, whose keys may have been
+    meant; `extra` are fields that no file has.
     """
     if not isinstance(table, Mapping):
         raise InputError(prefix, shown(table), f"a table [{prefix}]")
@@ -55,7 +57,7 @@ def read(
         if path in RENAMED_KEYS:
             mistakes.found.append(InputError(path, shown(value), RENAMED_KEYS[path]))
         else:
-            mistakes.found.append(_unknown_key(path, name, known, homes or {}))
+            mistakes.found.append(_unknown_key(path, name, known, homes or {}, kinds, tag))
             meant |= {*closest_name(name, known)}
     for key in keys:
         with mistakes.of_a_part(), at(prefix):
@@ -73,7 +75,8 @@ def read_kind(
     table: Any, prefix: str, kinds: Mapping[str, Any], folder: Path = Path(), tag: str = "kind", **more: Any
 ) -> Any:
     """What a table describes that says by its key `tag` which of `kinds` it is."""
-    return read(kinds[kind_of(table, prefix, kinds, tag)], table, prefix, folder, tag=tag, **more)
+    cls = kinds[kind_of(table, prefix, kinds, tag)]
+    return read(cls, table, prefix, folder, tag=tag, kinds=kinds, **more)
 
 
 def _value(key: Key, entry: Any, prefix: str, folder: Path) -> Any:
@@ -102,13 +105,22 @@ def _value(key: Key, entry: Any, prefix: str, folder: Path) -> Any:
 
 
 def _unknown_key(
-    key: str, name: str, known: Sequence[str], homes: Mapping[str, Collection[Any]]
+    key: str,
+    name: str,
+    known: Sequence[str],
+    homes: Mapping[str, Collection[Any]],
+    kinds: Mapping[str, Any],
+    tag: str,
 ) -> InputError:
-    """The error for a key that its table does not have, and which table has it."""
-    mistake = unknown(key, name, known)
+    """The error for a key that its table does not have, and which kind of it or other table has it."""
+    mistake, close = unknown(key, name, known), closest_name(name, known)
+    for meant in (name, *([] if close else MEANT.get(name.lower(), "").split())):
+        if having := [kind for kind, cls in kinds.items() if meant in names(cls)]:
+            told = f"{meant} is a key of {tag} = {' | '.join(having)}"
+            return InputError(key, mistake.given, f"{mistake.allowed}; {told}")
     home = next((table for table, classes in homes.items() if name in names(*classes)), "")
-    here = re.sub(r"\[\d+\]", "", key.rpartition(".")[0])  # whose other kinds may have it
-    if home.strip("[]") in ("", here) or closest_name(name, known):
+    here = re.sub(r"\[\d+\]", "", key.rpartition(".")[0])
+    if home.strip("[]") in ("", here) or close:
         return mistake
     return InputError(key, mistake.given, f"{mistake.allowed}; {name} stands in {home}")
 
@@ -148,7 +160,7 @@ def columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]
 def kind_of(table: Any, prefix: str, kinds: Mapping[str, Any], key: str = "kind") -> str:
     """The kind that a table says it is by its `key`, one of `kinds`."""
     if not isinstance(table, Mapping):
-        raise InputError(prefix, shown(table), f"a table with a {key} and its keys")
+        raise InputError(prefix, shown(table), f"a table with {key} = {' | '.join(kinds)} and its keys")
     kind = table.get(key, ABSENT)
     if not isinstance(kind, str) or kind not in kinds:
         problem = ABSENT if kind is ABSENT else shown(kind)

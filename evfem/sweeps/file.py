@@ -25,7 +25,7 @@ from evfem.common.checks import instance, real, set_frozen
 from evfem.errors import InputError, describe_value
 from evfem.scene import schema as scenes
 from evfem.scene.file import read_text, scene_at, tables_of
-from evfem.scene.format import SceneTable
+from evfem.scene.format import SceneTable, dotted
 from evfem.scene.keys import VERSION, names, read, shown
 from evfem.scene.scene import Scene
 from evfem.scene.schema import DRAFT, Schema, Section, section
@@ -212,7 +212,9 @@ def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
 def check_key(where: str, key: str) -> None:
     """InputError unless `key` may be a dotted key of a scene file."""
     if key.split(".")[0] not in TABLES or "." not in key:
-        raise InputError(where, shown(key), f"TABLE.KEY of a scene file, TABLE one of {', '.join(TABLES)}")
+        meant = f"{dotted(key)}? " if dotted(key) else ""
+        allowed = f"{meant}TABLE.KEY of a scene file, TABLE one of {', '.join(TABLES)}"
+        raise InputError(where, shown(key), allowed)
 
 
 def plain_value(where: str, value: Any) -> Any:

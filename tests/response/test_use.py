@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tools.builders import finger
 from tools.meshes import block
+from tools.refusals import refuses
 
 import evfem as ev
 from evfem.cli import main
@@ -34,6 +35,12 @@ def path(tmp_path):
     """A finger pressed, and slid to full slip."""
     (tmp_path / "scene.toml").write_text(SCENE)
     return tmp_path / "scene.toml"
+
+
+def test_a_bare_name_is_told_its_table(path):
+    for name in ("friction", "mu"):
+        refuses(f'parameters: given "{name}"; allowed: surface.friction[?]', ev.sensitivities, path, name)
+    refuses("allowed: materials[?]", ev.sensitivities, path, "finger.dermis.E")
 
 
 def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):

@@ -117,7 +117,10 @@ def test_a_stream_belongs_to_its_parameter_and_seed():
 SAMPLED = "[samples]\ncount = 3\nseed = 1\n[samples.parameters]\n"
 MISTAKES = [
     ("", "sweep: given nothing that varies; allowed: a grid or samples"),
-    ("[grid]\nfriction = [0.1]", 'grid.friction: given "friction"; allowed: TABLE.KEY of a scene file'),
+    (
+        "[grid]\nfriction = [0.1]",
+        'grid.friction: given "friction"; allowed: surface.friction? TABLE.KEY of a scene file',
+    ),
     ("[grid]\nsurface.friction = []", "grid.surface.friction: given no values; allowed: a list of values"),
     ("[grid]\nsurface.friction = 0.3", "grid.surface.friction: given 0.3; allowed: a list of values"),
     ("[grid]\nsurface.friction = [1979-05-27]", "allowed: numbers, text, true or false, and lists of them"),
