@@ -37,7 +37,18 @@ class Known(tuple[str, ...]):
 class _Parser(argparse.ArgumentParser):
     """A parser that reports a mistake in one sentence."""
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """So that the command that does not know an argument says so, not `evfem`."""
+        found, left = super().parse_known_args(args, namespace)
+        if left:
+            close = [one for word in left for one in get_close_matches(word, self._option_string_actions, 1)]
+            meant = f"; did you mean {close[0]}?" if close else ""
+            self.error(f"unrecognized arguments: {' '.join(left)}{meant}")
+        return found, left
+
     def error(self, message: str) -> NoReturn:
+        for kind, allowed in (("float", "a number"), ("int", "a whole number")):
+            message = re.sub(f"invalid {kind} value: '(.*)'", rf"given '\1'; allowed: {allowed}", message)
         text = f"{self.prog}: {message}{_meant(message)} (see {self.prog} --help)"
         self.exit(BAD_INPUT, notices.wrapped(text, sys.stderr) + "\n")
 

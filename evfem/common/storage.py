@@ -29,7 +29,10 @@ from evfem.errors import InputError, StorageError
 #: largest archive that is read, in bytes, and the most arrays in it
 LARGEST_ARCHIVE, MOST_ARRAYS = 4 * 2**30, 10_000
 #: endings that say what is in a file
-FORMATS = (".csv", ".json", ".mat", ".msh", ".npy", ".npz", ".pdf", ".png", ".pvd", ".toml", ".txt", ".vtu")
+FORMATS = (
+    *(".csv", ".h5", ".hdf5", ".json", ".mat", ".msh", ".npy", ".npz", ".parquet", ".pdf", ".pkl", ".png"),
+    *(".pvd", ".svg", ".toml", ".tsv", ".txt", ".vtk", ".vtu", ".xls", ".xlsx"),
+)
 
 
 @contextmanager
@@ -130,7 +133,8 @@ def disk(doing: str) -> Iterator[None]:
     except StorageError:
         raise
     except OSError as error:
-        raise StorageError(f"cannot {doing}: {error.strerror or error}") from error
+        reason = "it is a file, not a folder" if error.errno == errno.EEXIST else error.strerror
+        raise StorageError(f"cannot {doing}: {reason or error}") from error
 
 
 @contextmanager

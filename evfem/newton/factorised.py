@@ -33,10 +33,10 @@ from evfem.newton.pressure import Unbalanced, make_pressure
 from evfem.newton.search import VoltageProblem
 from evfem.newton.state import (
     Balance,
+    Collapsed,
     Limits,
     Reusable,
     State,
-    StepFailed,
     findings,
 )
 from evfem.newton.travel import Travel
@@ -293,7 +293,7 @@ class FactorisedBody:
         while not self.body.tissue.smallest_J(u + fraction * delta) > constants.SMALLEST_J:
             fraction *= 0.5
             if fraction < constants.SHORTEST_FRACTION:
-                raise StepFailed("cells would collapse", self.record.residuals)
+                raise Collapsed("cells would collapse", self.record.residuals)
         return fraction
 
     def stability_ratio(self, state: State, target: Target) -> StabilityRatio | None:

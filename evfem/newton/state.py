@@ -40,6 +40,10 @@ class Folded(StepFailed):
     """
 
 
+class Collapsed(StepFailed):
+    """Every update, however short, would turn a cell inside out."""
+
+
 class OutOfReach(StepFailed):
     """No voltage makes what is wished of it, and none at all is the nearest."""
 

@@ -201,13 +201,14 @@ def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
     bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))
     sides, unit = (mesh.points[:, ::2], "N") if mesh.dim == 3 else (mesh.points[:, :1], "N/mm")
     size = float(np.prod(np.ptp(sides, axis=0)))
+    units = "forces are in N" if mesh.dim == 3 else "forces are in N/mm, a load in N over the depth in mm"
     for i, course in enumerate(scene.courses):
         depth, force = course.indentation or 0.0, course.force or 0.0
         if depth >= bone - pad > 0.0:
             yield f"motion {i} presses {depth:g} mm deep, but the bone is {bone - pad:.2g} mm above the skin"
         if force > HEAVIEST * modulus * size:
             much = f"{force / size:.3g} MPa over the whole finger"
-            yield f"motion {i} presses with {force:g} {unit}, {much}: forces are in {unit}"
+            yield f"motion {i} presses with {force:g} {unit}, {much}: {units}"
 
 
 def _breakdown(scene: Scene) -> Iterator[str]:

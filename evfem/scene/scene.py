@@ -63,7 +63,10 @@ Grounded = Annotated[bool, yes_or_no(), "false: the finger has no charge; with f
 Breakdown = Annotated[
     str, one_of(*MODES), "of air: warn of it; limit: the field of such gaps is held at it; off: do not look"
 ]
-Adhesion = Annotated[AdhesionLaw | None, {"allowed": ADHESION, "check": adhesion_of}]
+#: a table of its own in a file, not a key of [electrostatics]
+Adhesion = Annotated[
+    AdhesionLaw | None, {"allowed": ADHESION, "check": lambda key, law: adhesion_of("adhesion", law)}
+]
 
 
 def monolithic(key: str, value: object) -> str:
@@ -327,7 +330,7 @@ def _check_electrostatics(scene: Scene) -> None:
         allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
         raise InputError("electrostatics.direction", "normal with a law without a potential", allowed)
     elif scene.ground.insulator is None:
-        allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
+        allowed = f"{type(scene.surface).__name__} with insulator=Layer(thickness in mm, eps_r), or no law"
         raise InputError("surface.insulator", "a law and no insulator", allowed)
 
 
@@ -357,7 +360,7 @@ def _check_field(scene: Scene) -> None:
     ended = getattr(scene.surface, "electrodes", None) is not None
     if scene.field != "full" and (ended or not scene.grounded):
         given = f"{scene.field} with {'electrodes that end' if ended else 'a finger that is not grounded'}"
-        allowed = f"full, with a finger in the plane: the column law knows neither; {IN_SPACE}"
+        allowed = f"full, which exists for fingers in the plane only: {IN_SPACE}"
         raise InputError("electrostatics.field", given, allowed)
     against = without_field(scene)
     if against is not None and scene.field == "full":

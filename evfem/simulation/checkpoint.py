@@ -207,7 +207,9 @@ class Checkpoint:
             found = f"{self.path}, written by evfem {version[:40]!r}, not by {evfem.__version__!r}"
             raise InputError("checkpoint", found, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
-            raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")
+            raise InputError(
+                "checkpoint", f"{self.path}, {ANOTHER}", "the scene of that run, or another folder"
+            )
         if odd:
             found = f"{self.path}, of another version: without the columns {', '.join(odd)}"
             raise InputError("checkpoint", found, allowed)

@@ -13,7 +13,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CRITICAL, SMALLEST_FORCE, SOFTENED
 from evfem.errors import InputError
 from evfem.newton.control import Target
-from evfem.newton.state import FORCES, Folded, LiftedOff, State, StepFailed
+from evfem.newton.state import FORCES, Collapsed, Folded, LiftedOff, State, StepFailed
 from evfem.planning.parts import COMPLEX_SAFE, lost_derivatives
 from evfem.planning.plausibility import weakens
 from evfem.planning.rooms import rooms_of
@@ -203,9 +203,9 @@ def _energy_created(rows: Sequence[Row]) -> Iterator[str]:
     if created.max() > GAINED * _energy(rows) + OPEN_WORK * works:
         worst = int(created.argmax())
         yield (
-            f"step {rows[worst]['step']} ends with {created[worst]:.2g} {WORKS[_dim(rows)]} of energy from "
-            "nowhere (integrator_dissipation): where it went over a barrier, its forces are those of another "
-            "state; where more steps give the same forces, its works alone are wrong"
+            f"energy error of {created[worst]:.2g} {WORKS[_dim(rows)]} in step {rows[worst]['step']} "
+            "(integrator_dissipation): compare with more steps; where the forces stay the same, the works of "
+            "this step alone are wrong, otherwise it went over an energy barrier to another state"
         )
 
 
@@ -236,7 +236,7 @@ def _snapped(rows: Sequence[Row]) -> Iterator[str]:
         worst = int(freed.argmax())
         yield (
             f"in step {rows[worst]['step']} the finger snaps and loses {freed[worst]:.0%} of the energy of "
-            "the run: other states are stable too, and the way decides which; `evfem check` compares"
+            "the run: other states are stable too, and the path decides which; `evfem check` compares"
         )
 
 
@@ -246,13 +246,13 @@ def _climbed(rows: Sequence[Row]) -> Iterator[str]:
     if climbed.any():
         first, count = rows[int(climbed.argmax())]["step"], int(climbed.sum())
         yield (
-            f"{count} steps in time, the first of them step {first}, pass a barrier of the energy that their "
-            "speed does not carry them over: shorter steps may end elsewhere"
+            f"{count} steps in time, the first of them step {first}, pass an energy barrier that the inertia "
+            "cannot carry the finger over: shorter steps may end elsewhere"
         )
 
 
 def _missed(rows: Sequence[Row]) -> Iterator[str]:
-    """Rows whose friction force or gap is not the wished one: each, or all at once if they are many."""
+    """Rows whose friction force or gap misses its target: each, or all at once if they are many."""
     for name, reached, unit in (
         ("missed_force", "applied_tangential_force", FORCES[_dim(rows)]),
         ("missed_gap", "min_gap", "mm"),
@@ -261,7 +261,7 @@ def _missed(rows: Sequence[Row]) -> Iterator[str]:
         for group in [missed] if len(missed) > MANY else [[row] for row in missed]:
             found, volts = _column(group, reached), _column(group, "voltage")
             yield (
-                f"{_steps([row['step'] for row in group])}: wished {_span(found + _column(group, name), 3)}, "
+                f"{_steps([row['step'] for row in group])}: target {_span(found + _column(group, name), 3)}, "
                 f"reached {_span(found, 3)} {unit} at {_span(volts, 4)} V"
             )
 
@@ -371,6 +371,9 @@ def _suggestions(scene: Scene, failed: StepFailed, lost: bool) -> str:
         return f"try {'more voltage, or ' if pulled else ''}hold = indentation"
     if isinstance(failed, Folded):
         return f"try {'less voltage, a thicker insulator, ' if pulled else ''}smaller steps, {finer}"
+    if isinstance(failed, Collapsed) and not lost:
+        less = "a smaller load, less voltage" if pulled else "a smaller load"
+        return f"the load is too large for the mesh, or the step too long: try {less}, smaller steps, {finer}"
     if not scene.solver.inertial and weakens(scene):
         return "try dynamics = inertial: friction that falls with the speed lets go at once what has no mass"
     if scene.solver.timed:

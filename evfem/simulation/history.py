@@ -63,11 +63,11 @@ def no_column(key: str, name: Any, columns: Sequence[str]) -> InputError:
 
     >>> raise no_column("column", "friction", ["position", "tangential_force"])
     Traceback (most recent call last):
-    evfem.errors.InputError: column: given "friction", no column; allowed: tangential_force? (docs, Notation)
+    evfem.errors.InputError: column: given "friction", no column; allowed: tangential_force? (docs/notation)
     """
     meant = MEANT.get(str(name).lower(), "").split()
     close = [one for one in meant if one in columns] or closest_name(str(name), columns)
-    known = f"{close[0]}? (docs, Notation)" if close else f"{', '.join(columns)}"
+    known = f"{close[0]}? (docs/notation)" if close else f"{', '.join(columns)}"
     return InputError(key, f"{readable(name)}, no column", known)
 
 

@@ -129,9 +129,10 @@ class _Run:
             self.keys = [self._key(point.text) for point in self.points]
         refused = dict(self.answers)
         if len(refused) == len(set(self.keys)):
+            first = self.refusals[0]
             if len({str(error) for error in self.refusals}) == 1:
-                raise self.refusals[0]
-            raise InputError("sweep", f"no valid point: {self.refusals[0]}", "at least one valid scene")
+                raise first
+            raise InputError(first.key, first.given, f"{first.allowed} (no point of the sweep is valid)")
         self.units = table_units(plan.outputs, plan.parameters, self.found)
         self.digest = digest(sorted(set(self.keys)))
         if folder is not None:

@@ -181,7 +181,7 @@ class OpenSource(SignalSource):
 class ForceSource(Source):
     """Whatever voltage makes the friction force follow a target in slides; elsewhere it stays."""
 
-    columns = (Column("missed_force", "N/mm", "wished less reached friction force on the bone"),)
+    columns = (Column("missed_force", "N/mm", "target less reached friction force on the bone"),)
 
     @property
     def start(self) -> float:
@@ -209,7 +209,7 @@ class ForceSource(Source):
 
 
 #: columns of scenes in which a voltage makes gaps
-GAP_COLUMNS = (Column("missed_gap", "mm", "wished less reached smallest gap"),)
+GAP_COLUMNS = (Column("missed_gap", "mm", "target less reached smallest gap"),)
 #: kinds of a scene's voltage, the particular ones first
 KINDS = (
     (FollowForce, ForceSource),

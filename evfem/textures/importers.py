@@ -258,7 +258,7 @@ class Recording(Importer, kind="recording"):
     mostly the drift of the hand.
     """
 
-    speed: Annotated[float, number("a speed above zero", POSITIVE, "mm/s"), "of the recorded slide"]
+    speed: Annotated[float, number("a speed in mm/s above zero", POSITIVE, "mm/s"), "of the recorded slide"]
     quantity: Quantity = None
     longest: Longest = 10.0
     channel: Channel = None

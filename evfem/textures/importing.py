@@ -44,7 +44,7 @@ POSITIVE = Within(0.0, above=True)
 class Importer(Checked):
     """What a file cannot say of itself, whatever its kind; called with a path it makes the texture."""
 
-    licence: Annotated[str, Text, "what others may do with it"]
+    licence: Annotated[str, instance('a text, such as "CC0-1.0"', str), "what others may do with it"]
     name: Annotated[str | None, Text, "what it is called; default: as its file"] = None
     note: Annotated[str | None, Text, "where it is from, a sentence"] = None
 

@@ -5,8 +5,9 @@ import logging
 import sys
 
 import pytest
+from tools.refusals import refuses
 
-from evfem.common.storage import alone_in
+from evfem.common.storage import alone_in, check_ending
 from evfem.errors import StorageError
 
 
@@ -34,6 +35,19 @@ def test_a_folder_made_for_nothing_goes_away_with_those_above_it(tmp_path):
     with alone_in(tmp_path / "a" / "b"):
         (tmp_path / "a" / "notes").write_text("mine")
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["notes"]
+
+
+def test_a_file_where_a_folder_was_to_be_is_told_to_be_one(tmp_path):
+    (tmp_path / "notes").write_text("mine")
+    told = "cannot use .*notes: it is a file, not a folder"
+    with pytest.raises(StorageError, match=told), alone_in(tmp_path / "notes"):
+        pass
+
+
+def test_an_archive_is_not_written_under_a_name_that_promises_a_table():
+    for name in ("a.xlsx", "a.parquet", "a.CSV"):
+        refuses("allowed: a name that ends in .npz", check_ending, name, ".npz")
+    check_ending("a.kept", ".npz")
 
 
 @pytest.mark.parametrize("where", ["system", "disk"])

@@ -97,6 +97,9 @@ def test_what_does_not_go_together_in_python():
     refuses("a drive without a law", replace, scene, law=None, voltage=0.0)
     for drive in (ev.Drive(50.0), ev.Drive(50.0, resolved=True)):
         refuses("a law and no insulator", replace, scene, surface=ev.Flat(), drive=drive)
+    wave = ev.Sinusoid(terms=[[0.02, 1.0, 0.0]])
+    refuses(r"surface\.insulator.*: Sinusoid with insulator=Layer", replace, scene, surface=wave)
+    refuses("^adhesion: given 0.3; allowed: Dugdale", replace, scene, adhesion=0.3)
     with pytest.raises(InputError, match="normal in a resolved drive"):
         replace(scene, direction="normal", drive=ev.Drive(50.0, resolved=True))
 

@@ -133,6 +133,9 @@ def test_a_field_that_breaks_solids_down_is_doubted():
     assert "a field of 300 V/um in the insulator" in plan(replace(charged, voltage=1.001 * edge)).warnings[0]
 
 
+PER_MM = "forces are in N/mm, a load in N over the depth in mm"
+
+
 @pytest.mark.parametrize(
     ("press", "said"),
     [
@@ -140,11 +143,11 @@ def test_a_field_that_breaks_solids_down_is_doubted():
         (ev.Press(indentation=4.8), None),
         (
             ev.Press(force=50.0),
-            "motion 0 presses with 50 N/mm, 3 MPa over the whole finger: forces are in N/mm",
+            f"motion 0 presses with 50 N/mm, 3 MPa over the whole finger: {PER_MM}",
         ),
         (
             ev.Press(force=5.0),
-            "motion 0 presses with 5 N/mm, 0.3 MPa over the whole finger: forces are in N/mm",
+            f"motion 0 presses with 5 N/mm, 0.3 MPa over the whole finger: {PER_MM}",
         ),
         (ev.Press(force=3.0), None),
     ],

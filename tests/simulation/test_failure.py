@@ -10,7 +10,7 @@ from tools.meshes import block
 import evfem as ev
 from evfem.contact.stability import SLOPES, StabilityRatio
 from evfem.newton.control import Target
-from evfem.newton.state import Folded, LiftedOff, StepFailed
+from evfem.newton.state import Collapsed, Folded, LiftedOff, StepFailed
 from evfem.simulation.doubtful import advice
 from evfem.simulation.run import Run
 
@@ -96,6 +96,18 @@ def test_a_fold_is_told_as_it_is():
     assert found[1] == "try smaller steps, less friction or a finer mesh"
     electric = {"law": ev.Kaczmarek(), "voltage": 100.0}
     assert "less voltage, a thicker insulator" in said(failure=Folded, electric=electric)[1]
+
+
+def test_a_load_that_cells_do_not_bear_is_told_to_be_smaller():
+    """Not to be given an energy, or time, even where a release was tried."""
+    failed = Collapsed("cells would collapse", [1.0])
+    failed.released = True
+    surface = ev.Flat(insulator=ev.Layer(0.05, 3.0))
+    scene = ev.Scene(coarse_pad(), surface, ev.Kaczmarek(), 100.0, ev.Press(force=50.0, steps=1))
+    _, why = advice(scene, None, failed).split("; ")
+    assert why.startswith(
+        "the load is too large for the mesh, or the step too long: try a smaller load, less"
+    )
 
 
 def test_where_friction_falls_with_the_speed_only_mass_helps():

@@ -56,17 +56,17 @@ def test_a_friction_force_out_of_reach_is_said_to_be_missed(wish, steps, largest
     missed = wish - result.applied_tangential_force
     np.testing.assert_allclose(result.missed_force[2:], missed[2:], rtol=1e-12)
     assert (result.missed_force[:2] == 0.0).all()
-    said = [one for one in result.warnings if "wished" in one]
+    said = [one for one in result.warnings if "target" in one]
     assert len(said) == steps
     reached = f"{result.applied_tangential_force[-1]:.3g}"
-    assert said[-1] == f"step {2 + steps}: wished {wish}, reached {reached} N/mm at {voltage:.4g} V"
+    assert said[-1] == f"step {2 + steps}: target {wish}, reached {reached} N/mm at {voltage:.4g} V"
 
 
 def test_while_the_pad_sticks_it_is_said_too_and_the_wish_comes_later():
     result = slid(0.035, 6)
     missed = np.flatnonzero(result.missed_force)
     assert missed.tolist() == [2, 3]
-    assert [one.split(":")[0] for one in result.warnings if "wished" in one] == ["step 3", "step 4"]
+    assert [one.split(":")[0] for one in result.warnings if "target" in one] == ["step 3", "step 4"]
     assert result.voltage[2] == 0.0
     assert result.voltage[3] > result.voltage[4]
     assert result.applied_tangential_force[3] < 0.035
@@ -99,7 +99,7 @@ def test_a_run_that_is_resumed_misses_the_same():
     text = FILE.replace("[0.03, 0.035]", "[0.035, 0.035]").replace("steps = 2", "steps = 4")
     whole, again = resumed(ev.scenefile.loads(text), 4)
     np.testing.assert_array_equal(again.missed_force, whole.missed_force)
-    told = [[one for one in run.warnings if "wished" in one] for run in (whole, again)]
+    told = [[one for one in run.warnings if "target" in one] for run in (whole, again)]
     assert told[0] == told[1]
     assert np.flatnonzero(whole.missed_force).tolist() == [4]
 

@@ -115,7 +115,7 @@ def test_a_plate_under_a_charge_passes_no_barrier(farthest, steps):
     np.testing.assert_allclose(GAP - found.min_gap, travel[:: 8 // steps], rtol=2e-3, atol=1e-9)
     assert found.jumps.sum() == 0
     assert found.snap_dissipation[-1] == 0.0
-    assert not [one for one in found.warnings if "snaps" in one or "pass a barrier" in one]
+    assert not [one for one in found.warnings if "snaps" in one or "pass an energy barrier" in one]
 
 
 def test_the_barrier_under_a_charge_is_that_of_its_potential():
@@ -281,17 +281,17 @@ def test_of_a_wider_gap_than_without_a_voltage_the_nearest_is_taken_and_told(dim
     np.testing.assert_allclose(found.missed_gap, [0.0, 0.0, 0.0, 0.1, 0.0], rtol=1e-8)
     assert (found.voltage == 0.0).tolist() == [True, False, False, True, False]
     assert found.voltage[4] == pytest.approx(found.voltage[1], rel=1e-6)
-    assert [one for one in found.warnings if "wished" in one] == ["step 4: wished 0.2, reached 0.1 mm at 0 V"]
+    assert [one for one in found.warnings if "target" in one] == ["step 4: target 0.2, reached 0.1 mm at 0 V"]
 
 
 def test_many_rows_that_miss_their_gap_are_told_in_one_sentence():
     found = ev.simulate(scene(2, 0.0, [ev.VoltageRamp(gap=0.2, steps=5), ev.VoltageRamp(gap=0.09, steps=1)]))
-    (said,) = (one for one in found.warnings if "wished" in one)
-    assert said == "steps 2 to 6: wished 0.12 to 0.2, reached 0.1 mm at 0 V"
+    (said,) = (one for one in found.warnings if "target" in one)
+    assert said == "steps 2 to 6: target 0.12 to 0.2, reached 0.1 mm at 0 V"
 
 
 def test_a_gap_that_is_missed_has_the_derivative_of_none():
-    """Its voltage stays 0, and wished less reached falls as the finger hovers higher."""
+    """Its voltage stays 0, and target less reached falls as the finger hovers higher."""
     hover = scene(2, 0.0, [ev.VoltageRamp(gap=0.2, steps=1)])
     found = ev.sensitivities(hover, ["motion.0.gap"], ["voltage", "min_gap"])
     assert found["voltage", "motion.0.gap"][-1] == 0.0
