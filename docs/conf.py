@@ -4,6 +4,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+from sphinx.domains.python import PythonDomain
 from sphinx.ext.napoleon import Config, NumpyDocstring
 
 import evfem
@@ -61,6 +62,16 @@ def notebook(app, name, source):
         source[0] = page(NOTEBOOKS / f"{file}.py")
 
 
+class Searched(PythonDomain):
+    """The search finds no names of a page that it leaves out; links to them stay."""
+
+    def get_objects(self):
+        for *found, priority in super().get_objects():
+            hidden = "no-search" in self.env.metadata.get(found[3], {})
+            yield *found, -1 if hidden else priority
+
+
 def setup(app):
+    app.add_domain(Searched, override=True)
     app.connect("autodoc-process-docstring", sections)
     app.connect("source-read", notebook)

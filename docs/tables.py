@@ -18,7 +18,6 @@ from evfem.textures.importers import IMPORTERS
 
 DOCS = Path(__file__).parent
 WIDTH = 99
-ROOM = 66  # columns of a row for what a name is
 HEAD = """\
 # Keys of scenes, sweeps and sensitivities
 
@@ -98,18 +97,12 @@ def importers(text: str) -> str:
 
 
 def public_names(text: str) -> str:
-    """The first page of the reference with a table of the public names for each page that has some."""
+    """The first page of the reference with a list of the public names for each page that has some."""
     parts, places = [], _places()
     for page, own in places.items():
         heading = (DOCS / "reference" / f"{page}.md").read_text(encoding="utf-8").splitlines()[0]
-        rows = [f"| `ev.{name}` | {_summary(getattr(evfem, name))} |" for name in sorted(own)]
-        lines = [
-            f"### [{heading.removeprefix('# ')}]({page}.md)",
-            "",
-            "| name | what it is |",
-            "|---|---|",
-            *rows,
-        ]
+        rows = [filled(f"- `ev.{name}`: {_summary(getattr(evfem, name))}.") for name in sorted(own)]
+        lines = [f"### [{heading.removeprefix('# ')}]({page}.md)", "", *rows]
         parts.append("\n".join(lines))
     return PUBLIC.sub(lambda found: f"{found[1]}\n\n" + "\n\n".join(parts) + f"\n\n{found[2]}", text)
 
@@ -126,14 +119,12 @@ def _places() -> dict[str, list[str]]:
 
 
 def _summary(thing: object) -> str:
-    """The beginning of a docstring, or the value of what has none of its own, as far as a row has room."""
+    """The first sentence of a docstring, or the value of what has none of its own."""
     if isinstance(thing, float) or type(thing).__module__.startswith("evfem."):
         return f"`{thing!r}`"
-    first = re.split(r"(?<=\w|\))[.:;] ", " ".join((thing.__doc__ or "").split()))[0].rstrip(".")
-    first = first.replace("|", "or")
-    while len(first) > ROOM or first.count("(") > first.count(")"):
-        first = first.rpartition(", " if ", " in first else " ")[0]
-    return first
+    paragraph = " ".join((thing.__doc__ or "").split("\n\n")[0].split())
+    first = re.split(r"(?<=[\w)`*])[.;] ", paragraph)[0].rstrip(".")
+    return first.replace(" + ", "\xa0+ ")  # no line begins with what makes an item of a list
 
 
 def _told(key: Key) -> str:

@@ -9,6 +9,7 @@ does not run here; `<!-- takes long -->` that it runs with the slow tests.
 """
 
 import doctest
+import json
 import re
 import runpy
 import shlex
@@ -353,6 +354,32 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert (tmp_path / "site" / "index.html").is_file()
 
 
+@pytest.mark.site
+def test_the_search_finds_no_internals(tmp_path):
+    """Neither the words nor the names of a page that says so; its links stay."""
+    module = "```{eval-rst}\n.. automodule:: evfem.%s\n```\n"
+    pages = {
+        "index": "# Start\n\n```{toctree}\nerrors\ninside\n```\n",
+        "errors": "# Errors\n\n" + module % "errors",
+        "inside": "---\nno-search: true\n---\n\n# Inside\n\n" + module % "simulation.ledger",
+    }
+    for name, text in pages.items():
+        (tmp_path / f"{name}.md").write_text(text)
+    out = tmp_path / "site"
+    words = [sys.executable, "-m", "sphinx", "-Q", "-c", str(DOCS), str(tmp_path), str(out)]
+    assert subprocess.run(words).returncode == 0
+    index = (out / "searchindex.js").read_text(encoding="utf-8")
+    found = {
+        name: json.loads(index[index.index("{") : index.rindex("}") + 1])[name]
+        for name in ("objects", "terms")
+    }
+    assert "evfem.errors" in found["objects"]
+    assert "evfem.simulation.ledger" not in found["objects"]
+    assert "admiss" in found["terms"]
+    assert "ledger" not in found["terms"]
+    assert 'id="evfem.simulation.ledger.EnergyAccount"' in (out / "inside.html").read_text(encoding="utf-8")
+
+
 MAKER = runpy.run_path(str(DOCS / "notebooks.py"))
 
 
@@ -425,4 +452,13 @@ def test_an_entry_says_type_unit_default_range_and_meaning():
 def test_the_reference_has_every_public_name_on_the_page_of_its_module():
     text = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
     assert TABLES["public_names"](text) == text
-    assert [name for name in evfem.__all__ if text.count(f"| `ev.{name}` |") != 1] == []
+    assert [name for name in evfem.__all__ if text.count(f"\n- `ev.{name}`: ") != 1] == []
+
+
+def test_pages_of_the_reference_begin_with_what_a_user_makes():
+    """Or leave the search: a page that it finds begins with a module of public names."""
+    public = {*evfem._HOME.values(), *evfem._MODULES.values(), "field.rigid"}
+    for page in (DOCS / "reference").glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        shown = re.findall(r"automodule:: evfem\.([\w.]+)", text)
+        assert not shown or shown[0] in public or text.startswith("---\nno-search: true\n"), page.stem
