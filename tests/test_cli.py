@@ -84,7 +84,7 @@ def test_a_run_leaves_all_its_files_and_a_table(finished):
     assert indexed_files(results) == series
     rows = history(results)
     assert [row["step"] for row in rows] == ["1", "2", "3", "4", "5"]
-    assert tuple(rows[0]) == COLUMNS
+    assert tuple(rows[0]) == (*COLUMNS, "friction", "stick_share", "slip_share")
     assert [row["motion"] for row in rows] == ["press"] * 2 + ["slide"] * 3
     assert float(rows[1]["indentation"]) == 0.2
     assert float(rows[4]["position"]) == 0.5

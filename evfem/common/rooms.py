@@ -9,7 +9,8 @@ rooms of a scene in the order of a step and knows none by name (docs, Inside)::
     accept(old, new)        a substep is accepted    the room's memory at its end
     stored, kinetic         of an accepted state     energies
     work, dissipation       of an accepted substep   the balance of energy closes with them
-    values, works           of a state, a substep    the room's `columns` in the history
+    values, works, of_row   of a state, a substep,   the room's `columns` in the history
+                            the rest of the row
 
 Units: mm, N, MPa, s, V; in the plane per mm of depth. N nodes, P nodes of the pad, dim = 2 or 3.
 A room without memory, energies and columns inherits all of this.
@@ -93,6 +94,10 @@ class Room:
 
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
         """Values in an accepted state of the `columns` that are no sums."""
+        return {}
+
+    def of_row(self, row: Mapping[str, Any]) -> Mapping[str, float]:
+        """Values of the `columns` that follow from a row of `History` alone, without other rooms' columns."""
         return {}
 
     def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from evfem.circuit.load import Air, Load, Supply
 from evfem.common.rooms import Room
 from evfem.scene.scene import Scene
+from evfem.terms.friction import Felt, Rubbing
 from evfem.tissue.dynamics import DYNAMICS
 
 
@@ -30,7 +31,7 @@ class Kind:
 
 
 KINDS = (
-    Kind("surface.friction_law", "friction", "terms.friction", lambda scene: scene.has_friction),
+    Kind("surface.friction_law", "friction", "terms.friction", lambda scene: scene.has_friction, Rubbing()),
     Kind("surface.elastic", "elastic surface", "terms.foundation", lambda scene: bool(scene.ground.elastic)),
     Kind("solver.contact", "penalties", "terms.foundation", lambda scene: scene.solver.contact != "exact"),
     Kind("electrostatics", "electricity", "terms.attraction", lambda scene: scene.electrics.acts),
@@ -43,6 +44,13 @@ KINDS = (
     ),
     Kind("electrostatics.breakdown", "breakdown", "circuit.load", lambda scene: scene.may_spark, Air()),
     Kind("adhesion", "adhesion", "terms.attraction", lambda scene: scene.adhesion is not None),
+    Kind(
+        "surface.friction",
+        "felt friction",
+        "terms.friction",
+        lambda scene: scene.has_friction and scene.is_pulled,
+        Felt(),
+    ),
     Kind("solver.dynamics", "time", "tissue.dynamics", lambda scene: bool(DYNAMICS[scene.solver.dynamics])),
     Kind("hand", "hand", "terms.hand", lambda scene: scene.hand is not None),
 )
@@ -54,6 +62,6 @@ def rooms_of(scene: Scene) -> tuple[Kind, ...]:
     >>> from evfem import Display, FingerPad, Kaczmarek, Press
     >>> scene = Scene(FingerPad(), Display(friction=0.3), Kaczmarek(), 100.0, Press(force=0.1))
     >>> [one.name for one in rooms_of(scene)]
-    ['friction', 'electricity', 'breakdown']
+    ['friction', 'electricity', 'breakdown', 'felt friction']
     """
     return tuple(kind for kind in KINDS if kind.there(scene))

@@ -28,6 +28,7 @@ from evfem.simulation.model import Model
 from evfem.simulation.run import Request, Run
 from evfem.simulation.works import EnergyState
 from evfem.surface.ways import Steps
+from evfem.terms.friction import COEFFICIENTS
 
 #: relative change of a parameter between samples
 STEP = 1e-3
@@ -60,6 +61,8 @@ TIED = "several nodes touch the surface first, and which one is next depends on 
 LOST = "the linear equations of step {} were not solved"
 #: endings of columns with units that are counts all the same: not differentiable
 DISCRETE = ("contact_width", "contact_area", "mean_contact_pressure")
+#: columns without a unit that are smooth
+SMOOTH_RATIOS = (*COEFFICIENTS,)
 Jumps = Sequence[Steps]
 Lengths = Callable[[State], Floats]
 Solve = Callable[[Floats], Floats]
@@ -71,7 +74,8 @@ def differentiable(column: str) -> bool:
     >>> differentiable("normal_force"), differentiable("substeps"), differentiable("contact_width")
     (True, False, False)
     """
-    return UNITS.get(column, "N") not in ("", "s") and not column.endswith(DISCRETE)
+    unit = UNITS.get(column, "N")
+    return column in SMOOTH_RATIOS or (unit not in ("", "s") and not column.endswith(DISCRETE))
 
 
 def is_work(column: str) -> bool:

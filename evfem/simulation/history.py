@@ -21,7 +21,7 @@ from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.errors import InputError, closest_name, readable
 from evfem.terms.columns import COLUMNS as OF_PACKAGE
-from evfem.terms.columns import OfRooms
+from evfem.terms.columns import OfRooms, without
 
 Row = Mapping[str, Any]
 #: a drift of the load that is worth a word
@@ -42,7 +42,12 @@ def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> d
 
 #: words that people try -> the column that they mean, the first that is there
 MEANT = {
+    **dict.fromkeys(("mu", "cof", "coefficient", "friction_coefficient"), "friction"),
     "friction": "tangential_force",
+    "felt_friction": "apparent_friction",
+    **dict.fromkeys(("stick", "sticking", "stuck"), "stick_share"),
+    **dict.fromkeys(("slip", "slipping", "sliding"), "slip_share"),
+    "gap": "min_gap",
     "friction_force": "tangential_force",
     "shear_force": "tangential_force",
     "force": "applied_force",
@@ -65,18 +70,19 @@ def no_column(key: str, name: Any, columns: Sequence[str]) -> InputError:
     Traceback (most recent call last):
     evfem.errors.InputError: column: given "friction", no column; allowed: tangential_force? (docs/notation)
     """
-    meant = MEANT.get(str(name).lower(), "").split()
+    word, *statistic = str(name).lower().split(".")
+    meant = (".".join((one, *statistic)) for one in MEANT.get(word, "").split())
     close = [one for one in meant if one in columns] or closest_name(str(name), columns)
     known = f"{close[0]}? (docs/notation)" if close else f"{', '.join(columns)}"
     return InputError(key, f"{readable(name)}, no column", known)
 
 
 class Values(dict[str, Any]):
-    """One row by its columns; a column of a room of the package that the scene has not reads 0."""
+    """One row by its columns; one of a room of the package that the scene has not is as `without` says."""
 
     def __missing__(self, name: str) -> float:
         if name in ROOM_COLUMNS:
-            return 0.0
+            return float(without(name, self))
         raise KeyError(name)
 
 
@@ -309,7 +315,8 @@ def _value_of(name: str, text: str) -> str | int | float:
 
 
 def _plain_value(name: str, value: Any) -> str | int | float:
-    return "" if name in WIDTHS and np.isnan(value) else KINDS.get(name, float)(value)
+    kind = KINDS.get(name, float)
+    return "" if kind is float and np.isnan(value) else kind(value)
 
 
 def column_of(name: str, values: list[Any]) -> Any:

@@ -85,7 +85,7 @@ class EnergyAccount:
         pulls = self._pulls(state, withheld)
         real, extent = _extent(model, state, position, contact)
         pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
-        return {
+        row = {
             "step": step,
             "motion_index": motion_index,
             "motion": motion,
@@ -105,8 +105,8 @@ class EnergyAccount:
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
             **end.columns,
-            **reduce(or_, (_values(room, model, state) for room in model.shown), {}),
         }
+        return reduce(or_, (_values(room, model, state, row) for room in model.shown), row)
 
     def _pulls(self, state: State, withheld: Floats) -> dict[str, tuple[Floats, float]]:
         """Of every attraction by name: its force on the pad (dim,), and the force that its regularised law
@@ -130,15 +130,13 @@ class EnergyAccount:
         return [0, 2][:axes], np.array((slides[-1] if slides else (1.0, 0.0))[:axes])
 
 
-def _values(room: Any, model: Model, state: State) -> dict[str, float]:
-    """What a room says of a state: all of its columns that are no sums."""
-    told, wanted = (
-        dict(room.values(model, state)),
-        {one.name for one in room.columns if not one.name.endswith(ADDED)},
-    )
-    if set(told) != wanted:
+def _values(room: Any, model: Model, state: State, row: Row) -> dict[str, float]:
+    """What a room says of a state and its row: all of its columns that are no sums."""
+    told = {**room.values(model, state), **room.of_row(row)}
+    wanted = [one.name for one in room.columns if not one.name.endswith(ADDED)]
+    if set(told) != set(wanted):
         raise InputError(f"{type(room).__name__}.values", f"{sorted(told)}", f"its columns {sorted(wanted)}")
-    return {name: float(value) for name, value in told.items()}
+    return {name: float(told[name]) for name in wanted}
 
 
 def _components(name: str, force: Floats) -> dict[str, float]:

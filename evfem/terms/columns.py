@@ -10,6 +10,7 @@ from evfem.circuit.load import Air, Load
 from evfem.common.arrays import Floats
 from evfem.terms.charging import ChargeBooks
 from evfem.terms.foundation import ElasticFoundation
+from evfem.terms.friction import COEFFICIENTS, Felt, Rubbing, of_forces
 from evfem.terms.sources import GAP_COLUMNS, ForceSource
 from evfem.terms.traction import force_columns
 
@@ -17,6 +18,8 @@ from evfem.terms.traction import force_columns
 COLUMNS = {
     one.name: one
     for one in (
+        *Rubbing.columns,
+        *Felt.columns,
         *force_columns("adhesive", "adhesion"),
         *ElasticFoundation.columns,
         *ChargeBooks.columns,
@@ -28,18 +31,37 @@ COLUMNS = {
 }
 
 
+#: columns of which 0 would be a statement
+UNKNOWN = ("stick_share", "slip_share")
+
+
+def without(name: str, row: Any) -> Any:
+    """A column of a room in a row, or a whole history, that has not the room: 0, or nan where that would be
+    a statement; a coefficient of friction is that of the forces.
+    """
+    if name in COEFFICIENTS:
+        return of_forces(name, row)
+    return np.full_like(row["position"], np.nan if name in UNKNOWN else 0.0)[()]
+
+
 def _of_room(name: str) -> Any:
-    """A column as an attribute: 0 in a run whose scene has no such room."""
+    """A column as an attribute."""
 
     def found(result: Any) -> Floats:
-        return result.in_rooms.get(name, np.zeros_like(result.position))
+        there = result.in_rooms
+        return there[name] if name in there else without(name, result)
 
-    return property(found, doc=f"{COLUMNS[name].meaning}; 0 without")
+    unlike = (*COEFFICIENTS, *UNKNOWN)
+    return property(found, doc=f"{COLUMNS[name].meaning}{'' if name in unlike else '; 0 without'}")
 
 
 class OfRooms:
     """These columns as attributes of a result."""
 
+    friction = _of_room("friction")
+    stick_share = _of_room("stick_share")
+    slip_share = _of_room("slip_share")
+    apparent_friction = _of_room("apparent_friction")
     adhesive_force = _of_room("adhesive_force")
     adhesive_force_x = _of_room("adhesive_force_x")
     adhesive_force_z = _of_room("adhesive_force_z")

@@ -11,15 +11,16 @@ without time too.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.rooms import Room
+from evfem.common.rooms import Column, Room
 from evfem.contact.condensed import Candidates
-from evfem.contact.signorini import FORWARD, OPEN, sizes
+from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.protocols import FrictionLaw
 from evfem.surface.friction import Renewing, SlipMemory, Slipping
 from evfem.tensor import derivative
@@ -30,6 +31,64 @@ State = Any
 
 #: steps of differences of a bound by contact forces (N/mm) and tributary lengths (mm)
 FORCE_STEP, LENGTH_STEP = 1e-7, 1e-6
+#: normal force (N/mm, N) below which there is no coefficient of friction: solved forces are known to it
+LEAST = 1e-9
+
+
+def coefficient(tangential: Any, normal: Any) -> Any:
+    """Tangential over normal force, each a number or an array; NaN where nothing presses.
+
+    >>> coefficient(np.array([0.5, 0.0, -1.0]), np.array([2.0, 0.0, -1.0])).tolist()
+    [0.25, nan, nan]
+    """
+    presses = np.asarray(normal) > LEAST
+    return np.where(presses, tangential / np.where(presses, normal, 1.0), np.nan)[()]
+
+
+#: column -> the columns of which it is the quotient
+COEFFICIENTS = {
+    "friction": ("tangential_force", "normal_force"),
+    "apparent_friction": ("applied_tangential_force", "applied_force"),
+}
+
+
+class Rubbing(Room):
+    """What friction is over all of the contact, and how much of it sticks and slips, as columns: shares of
+    the lengths or areas for which the touching nodes stand, NaN where nothing touches.
+    """
+
+    columns = (
+        Column("friction", "", "tangential_force over normal_force; nan where nothing presses"),
+        Column("stick_share", "", "of what touches, by the nodes' lengths or areas, the part that sticks"),
+        Column("slip_share", "", "of what touches the part that slips"),
+    )
+
+    def values(self, model: Any, state: Any) -> Mapping[str, float]:
+        length = model.pad.tributary(model.equilibrium.interface.positions(state.u))
+        touches = float(length[state.status != OPEN].sum())
+        parts = (state.status == STICK, state.status >= FORWARD)
+        sticks, slips = (float(length[part].sum()) / touches if touches else np.nan for part in parts)
+        return {"stick_share": sticks, "slip_share": slips}
+
+    def of_row(self, row: Mapping[str, Any]) -> Mapping[str, float]:
+        return {"friction": of_forces("friction", row)}
+
+
+class Felt(Room):
+    """Friction as a load of so much feels it, where something beside the load presses."""
+
+    columns = (
+        Column("apparent_friction", "", "applied_tangential_force over applied_force; nan without a load"),
+    )
+
+    def of_row(self, row: Mapping[str, Any]) -> Mapping[str, float]:
+        return {"apparent_friction": of_forces("apparent_friction", row)}
+
+
+def of_forces(name: str, row: Any) -> Any:
+    """One of `COEFFICIENTS`, of a row or of a whole history."""
+    tangential, normal = COEFFICIENTS[name]
+    return coefficient(row[tangential], row[normal])
 
 
 @dataclass(frozen=True)

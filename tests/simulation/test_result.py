@@ -27,8 +27,9 @@ CONTRACT = (
     "kinetic_energy, integrator_dissipation, snap_dissipation, "
     "substeps, newton_iterations, relaxations, jumps, seconds"
 )
-#: those that follow where the scene has adhesion, an elastic surface, a drive, a voltage, one that is found
+#: those that follow where the scene has friction, adhesion, an elastic surface, a drive, a voltage, one found
 OF_ROOMS = (
+    "friction, stick_share, slip_share, apparent_friction, "
     "adhesive_force, adhesive_force_x, adhesive_force_z, adhesive_work, surface_sink, source_work, "
     "leakage_dissipation, stretch_work, field_energy, charge, current_rms, power, breakdown, breakdown_x, "
     "missed_force, missed_gap"
@@ -45,7 +46,9 @@ MOIST = ev.Dugdale(stress=0.002, reach=0.02)
 SOLVED = ev.Drive(resolved=True)
 LOAD = ("charge", "current_rms", "power")
 AIR = ("breakdown", "breakdown_x")
-SOFT = ev.Display(elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
+RUBBING = ("friction", "stick_share", "slip_share")
+SMOOTH, ROUGH = ev.Display(friction=0.0), ev.Display(friction=0.3)
+SOFT = ev.Display(friction=0.0, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
 
 
 @pytest.mark.parametrize(
@@ -54,6 +57,8 @@ SOFT = ev.Display(elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
         ({}, ()),
         ({"adhesion": MOIST}, ("adhesive_force", "adhesive_force_x", "adhesive_work")),
         ({"surface": SOFT}, ("surface_sink",)),
+        ({"surface": ROUGH}, RUBBING),
+        ({"surface": ROUGH, "law": ev.StrongTroxel(), "voltage": 9.0}, (*RUBBING, *AIR, "apparent_friction")),
         (
             {"law": ev.StrongTroxel(), "voltage": ev.Sine(50.0, 9.0), "drive": SOLVED},
             ("source_work", "leakage_dissipation", "stretch_work", "field_energy", *LOAD, *AIR),
@@ -61,11 +66,11 @@ SOFT = ev.Display(elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
         ({"law": ev.StrongTroxel(), "voltage": 9.0}, AIR),
         ({"law": ev.StrongTroxel(), "voltage": 9.0, "drive": ev.Drive(50.0)}, (*LOAD, *AIR)),
     ],
-    ids=["base", "adhesion", "elastic surface", "charges", "voltage", "drive"],
+    ids=["base", "adhesion", "elastic surface", "friction", "friction felt", "charges", "voltage", "drive"],
 )
 def test_a_run_has_the_columns_of_the_rooms_of_its_scene(given, further):
-    """The others are 0 where they are asked for, but are no columns."""
-    finger, surface = ev.FingerPad(ridges=False, resolution="coarse"), given.pop("surface", ev.Display())
+    """The others are 0 where they are asked for, or unknown, but are no columns."""
+    finger, surface = ev.FingerPad(ridges=False, resolution="coarse"), given.pop("surface", SMOOTH)
     motion = [ev.Press(indentation=0.1, steps=1), ev.Wait(1e-3, steps=1)]
     result = ev.simulate(ev.Scene(finger, surface, motion=motion, **given))
     assert result.columns == (*COLUMNS, *further)
@@ -73,7 +78,9 @@ def test_a_run_has_the_columns_of_the_rooms_of_its_scene(given, further):
         if name in further:
             assert result[name] is result.in_rooms[name] is getattr(result, name)
         else:
-            assert result[name].tolist() == getattr(result, name).tolist() == [0.0, 0.0]
+            nought = float("nan") if name in RUBBING[1:] else 0.0  # shares of what was not looked at
+            np.testing.assert_allclose(result[name], [nought, nought], atol=1e-12)
+            np.testing.assert_array_equal(getattr(result, name), result[name])
     named = tuple(name for name in further if name.endswith(("_force", "_sink", "_energy")))
     assert all(result[name].any() for name in named)
 
@@ -184,7 +191,7 @@ def test_a_column_is_found_by_its_name_and_a_misspelt_one_is_guessed():
     result = fake_result()
     for name in COLUMNS:
         assert result[name] is getattr(result, name)
-    for given, meant in {"normal_forse": "normal_force", "friction": "tangential_force"}.items():
+    for given, meant in {"normal_forse": "normal_force", "shear_force": "tangential_force"}.items():
         with pytest.raises(InputError, match=f'column: given "{given}", no column; allowed: {meant}\\?'):
             result[given]
     # a fingertip has areas, and widths that stay empty

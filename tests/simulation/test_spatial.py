@@ -37,7 +37,10 @@ def test_forces_and_energies_balance_and_friction_is_against_the_slide(slid):
 
 
 def test_columns_of_the_plane_stay_and_widths_are_empty(slid):
-    assert slid.columns[-len(SPATIAL) - 2 :] == (*SPATIAL, "breakdown", "breakdown_x")
+    rooms = ("friction", "stick_share", "slip_share", "breakdown", "breakdown_x", "apparent_friction")
+    assert slid.columns[-len(SPATIAL) - 6 :] == (*SPATIAL, *rooms)
+    assert_allclose(slid.friction[-1], 0.3, rtol=2e-3)
+    assert slid.slip_share[-1] == 1.0
     assert all(np.isnan(slid[name]).all() for name in WIDTHS)
     assert (slid.contact_area >= slid.real_contact_area).all()
     assert slid.real_contact_area[-1] > 1.0
