@@ -56,6 +56,7 @@ _NAMES = {
     "response.impedance": ("impedance",),
     "response.electrical": ("electrical_impedance",),
     "mesh.mesh": ("Mesh",),
+    "reporting.page": ("report",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),
     "scene.probes": ("Probe",),

@@ -82,6 +82,7 @@ def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
         ("init", "write a commented scene to begin with", _init_options),
         ("plan", "check a scene; list its physics, unknowns and solver; solve nothing", _scene_argument),
         ("check", "compare final forces by other steps and solvers, and state errors", _check_options),
+        ("report", "write one page about a run: scene, forces, pictures, accuracy", _report_options),
         ("sensitivities", "derivatives of forces, works and energies by keys of a scene", _response_options),
         ("impedance", "dynamic stiffness of the finger versus frequency", _impedance_options),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
@@ -116,6 +117,13 @@ def _check_options(check: argparse.ArgumentParser) -> None:
     check.add_argument("--outputs", nargs="+", metavar="NAME", help=said)
     said = "leave out the runs on a finer and a coarser mesh, which take longest"
     check.add_argument("--no-mesh", action="store_true", help=said)
+
+
+def _report_options(report: argparse.ArgumentParser) -> None:
+    _path(report, "path", "FOLDER", FOLDERS, help="the folder of a run, or a saved result (.npz)")
+    _path(report, "--out", "FILE.html", help="default: report.html in the folder, or beside the result")
+    said = "run evfem check of the scene too, and tell its errors in the page"
+    report.add_argument("--check", action="store_true", help=said)
 
 
 def _response_options(command: argparse.ArgumentParser) -> None:

@@ -155,6 +155,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int | None]:
         "init": _init,
         "plan": _plan,
         "check": _check,
+        "report": _page,
         "sensitivities": _sensitivities,
         "impedance": _impedance,
         "study": _study,
@@ -303,6 +304,15 @@ def _check(options: argparse.Namespace) -> int:
     return DONE if found.agrees else DIFFERENT
 
 
+def _page(options: argparse.Namespace) -> None:
+    from evfem.loading import load
+    from evfem.reporting.page import told
+    from evfem.runfolder import write_report
+
+    text = told(load(options.path), options.check)
+    print(write_report(text, options.path, options.out), flush=True)
+
+
 def _sensitivities(options: argparse.Namespace) -> None:
     from evfem.common.storage import alone_in
     from evfem.response.file import load
@@ -413,16 +423,8 @@ def _signal(options: argparse.Namespace) -> None:
 
     playback = None
     if options.full_scale is not None:
-        playback = Playback(
-            options.full_scale,
-            options.speed,
-            options.friction,
-            options.rate,
-            options.carrier,
-            options.pixel,
-            options.bits,
-            options.second,
-        )
+        names = ("full_scale", "speed", "friction", "rate", "carrier", "pixel", "bits", "second")
+        playback = Playback(*(getattr(options, name) for name in names))
     profile = read_signal(options.file)
     write_signal(options.out, profile, playback)
     start, stop = profile.position[0], profile.position[-1]

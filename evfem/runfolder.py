@@ -23,7 +23,15 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.notices import LOG
-from evfem.common.storage import GrowingText, disk, refuse_others, replacing, write_text
+from evfem.common.storage import (
+    GrowingText,
+    alone_in,
+    check_ending,
+    disk,
+    refuse_others,
+    replacing,
+    write_text,
+)
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
@@ -44,13 +52,13 @@ FORCES = ("tangential_force", "normal_force", "electrostatic_force")
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000
 MANIFEST = ".evfem-files"
-HISTORY, PROBES, SUMMARY = "history.csv", "probes.csv", "summary.json"
+HISTORY, PROBES, SUMMARY, REPORT = "history.csv", "probes.csv", "summary.json", "report.html"
 FIELDS, PICTURE, STATE = "fields.pvd", "forces.png", "checkpoint.npz"
 #: of a finger in three dimensions: its skin alone, beside the fields of the solid
 SKIN = "skin.pvd"
 OURS = re.compile(
-    r"history\.csv|probes\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png"
-    r"|checkpoint\.npz|\.checkpoint\.rows"
+    r"history\.csv|probes\.csv|summary\.json|report\.html|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu"
+    r"|forces\.png|checkpoint\.npz|\.checkpoint\.rows"
 )
 #: what a killed run was writing
 LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
@@ -386,6 +394,18 @@ def _refuse_others(path: Path) -> None:
 def _remove_left(path: Path) -> None:
     for left in [p for p in path.iterdir() if LEFT.fullmatch(p.name)]:
         left.unlink()
+
+
+def write_report(text: str, path: Path, out: Path | None) -> Path:
+    """Write the page about a run, the folder or saved result `path`: to `out`, or there; returns its path."""
+    if out is None and path.is_dir():
+        with alone_in(path), Manifest(path / MANIFEST, OURS).writing(path / REPORT):
+            write_text(path / REPORT, text)
+        return path / REPORT
+    out = out or path.with_suffix(".html")
+    check_ending(out, ".html")
+    write_text(out, text)
+    return out
 
 
 def write_sensitivities(found: Sensitivities, folder: Path) -> Path:

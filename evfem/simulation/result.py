@@ -311,7 +311,8 @@ class Result(History, FurtherColumns, Told):
         return found
 
     @property
-    def _meanings(self) -> dict[str, str]:
+    def meanings(self) -> dict[str, str]:
+        """What each column is."""
         own = {name: meaning for name, _, meaning in self._room_columns}
         return {name: own[name] if name in own else str(ABOUT[name]["meaning"]) for name in self.columns}
 
@@ -323,7 +324,7 @@ class Result(History, FurtherColumns, Told):
         Raises InputError where xarray is not installed (the extra `xarray`).
         """
         variables: dict[str, Any] = {
-            name: ("step", self[name], {"units": self.units[name], "long_name": self._meanings[name]})
+            name: ("step", self[name], {"units": self.units[name], "long_name": self.meanings[name]})
             for name in self.columns[1:]
         }
         for name, shape in _SHAPES.items() if self.frames else ():
@@ -342,6 +343,10 @@ class Result(History, FurtherColumns, Told):
             **{axis: ("node", place, {"units": "mm"}) for axis, place in places},
         }
         return dataset(variables, coordinates, {"provenance": json.dumps(self.provenance)})
+
+    def report(self, path: str | Path, checked: Any = None) -> None:
+        """Write one page about the run, which needs no other file: see `evfem.report`."""
+        evfem.report(self, path, checked)
 
     def save(self, path: str | Path) -> None:
         """Write one .npz file, in one step. Raises StorageError, and InputError for another ending."""

@@ -1,0 +1,1 @@
+"""A page about a run, for whoever has to judge it."""
