@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from evfem.calibration.parameters import Parameter
+from evfem.calibration.parameters import Parameter, number_at
 from evfem.common.arrays import Floats
 from evfem.common.checks import real
 from evfem.common.storage import check_ending, write_text
@@ -62,6 +62,21 @@ class FitResult:
     def residuals(self) -> Floats:
         """(predicted - measured) / scale, (N,)."""
         return (self.predicted - self.measured) / self.scale
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """Standard deviation of the number that the fitted scene has under each key, to first order; inf of
+        what the data do not determine. `ev.uncertainty(fit.scene, fit.sd, correlation=fit.correlation)` is
+        then that of a run.
+        """
+        rows = zip(self.parameters.items(), self.unknowns.tolist(), self.errors.tolist(), strict=True)
+        return {key: abs(one.slope(z, number_at(self.tables, key))) * error for (key, one), z, error in rows}
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance (P, P) of these numbers; inf and nan of what the data do not determine."""
+        sd = np.array([*self.sd.values()])
+        return np.asarray(self.correlation * np.outer(sd, sd))
 
     @property
     def rms(self) -> float:

@@ -1,12 +1,13 @@
 r"""First-order uncertainty of a run from that of its parameters.
 
-Independent parameters with standard deviations :math:`\sigma_k` give a column F the standard deviation
+Parameters with standard deviations :math:`\sigma_k` and correlation :math:`\rho_{kl}`, which is 0 between
+independent ones, give a column F the standard deviation
 
-.. math:: \sigma_F^2 = \sum_k c_k^2, \qquad c_k = \frac{dF}{dp_k}\,\sigma_k .
+.. math:: \sigma_F^2 = \sum_{k, l} c_k\,\rho_{kl}\,c_l, \qquad c_k = \frac{dF}{dp_k}\,\sigma_k
 
-That is the first term of a series. One run with the most important parameter changed by its standard
-deviation says how much of it is true there (`Check`). Samples (`evfem.sweeps.samples`) know no such limit,
-and need hundreds of runs.
+(JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation 13). That is the first term of
+a series. One run with the most important parameter changed by its standard deviation says how much of it is
+true there (`Check`). Samples (`evfem.sweeps.samples`) know no such limit, and need hundreds of runs.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ from evfem.simulation.history import no_column
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 
+#: by how much the entries of a correlation may be rounded
+ROUNDED = 1e-6
+
 
 class Check(NamedTuple):
     """Change of a column's last value with one parameter larger by its standard deviation: by its derivative
@@ -44,7 +48,8 @@ class Check(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Standard deviations `sd[column]` (steps,) of a run, `contribution[column, key]` (steps,) of each
-    parameter with its sign, whose squares add up to those of `sd`, and the `checked` contribution.
+    parameter with its sign, and the `checked` contribution. Squares of contributions add up to those of `sd`
+    where the parameters are independent.
     """
 
     result: Result
@@ -81,8 +86,9 @@ def uncertainty(
     sd: Mapping[str, float],
     columns: Sequence[str] | None = None,
     progress: bool = False,
+    correlation: Floats | Sequence[Sequence[float]] | None = None,
 ) -> Uncertainty:
-    """Standard deviations of the history of a scene from those of independent parameters, to first order.
+    """Standard deviations of the history of a scene from those of its parameters, to first order.
 
     Parameters
     ----------
@@ -94,6 +100,9 @@ def uncertainty(
         Columns of the history; None: all that have derivatives.
     progress
         Show a progress bar.
+    correlation
+        (P, P) of the parameters in the order of `sd`, as a fit has it: `uncertainty(fit.scene, fit.sd,
+        correlation=fit.correlation)`. None: they are independent.
 
     Returns
     -------
@@ -104,7 +113,8 @@ def uncertainty(
     Raises
     ------
     InputError
-        A parameter that has no derivative, or a standard deviation that is not above 0.
+        A parameter that has no derivative, a standard deviation that is not above 0, or a matrix that is no
+        correlation.
 
     Examples
     --------
@@ -120,13 +130,36 @@ def uncertainty(
         raise InputError("sd", describe_value(sd), "{key of the scene: standard deviation}")
     for key, value in sd.items():
         real(f"sd.{key}", value, "a standard deviation larger than 0", Within(0.0, 1e12, above=True))
+    together = _correlation(correlation, len(sd))
     found = sensitivities(scene, list(sd), columns, progress)
     names = [name for name in found.columns if differentiable(name)]
     if not names:
         raise InputError("columns", describe_value(columns), "at least one column that has derivatives")
     parts = {(name, key): found[name, key] * float(sd[key]) for name in names for key in sd}
-    total = {name: np.sqrt(sum(parts[name, key] ** 2 for key in sd)) for name in names}
+    total = {name: _total(np.array([parts[name, key] for key in sd]), together) for name in names}
     return Uncertainty(found.result, total, parts, _checked(scene, sd, parts, found, names), found)
+
+
+def _total(parts: Floats, correlation: Floats) -> Floats:
+    """The standard deviation (steps,) that contributions (P, steps) make together.
+
+    >>> _total(np.array([[3.0, 3.0], [4.0, -3.0]]), np.array([[1.0, 1.0], [1.0, 1.0]])).tolist()
+    [7.0, 0.0]
+    """
+    return np.sqrt(np.maximum(np.einsum("ks,kl,ls->s", parts, correlation, parts), 0.0))
+
+
+def _correlation(given: Any, size: int) -> Floats:
+    """A matrix of correlation (size, size); InputError for any other."""
+    found = np.eye(size) if given is None else np.asarray(given, dtype=float)
+    allowed = f"a symmetric matrix ({size}, {size}) of numbers from -1 to 1, with 1 on its diagonal"
+    if found.shape != (size, size) or not np.isfinite(found).all():
+        problem = f"one of shape {found.shape}" if found.shape != (size, size) else "nan"
+        raise InputError("correlation", problem, allowed)
+    symmetric = np.allclose(found, found.T, rtol=0.0, atol=ROUNDED) and np.allclose(np.diag(found), 1.0)
+    if not symmetric or np.linalg.eigvalsh(found).min() < -ROUNDED * size:
+        raise InputError("correlation", found.tolist(), f"{allowed}, that some parameters can have")
+    return found
 
 
 def _checked(

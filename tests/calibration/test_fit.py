@@ -338,3 +338,52 @@ def test_data_that_do_not_fit_the_scene_are_refused(path):
         InputError, match=r"scene: given one that cannot be run at the start: data\.at: .*0\.3"
     ):
         ev.fit(path, beyond, {E: (0.1, 0.2)}, workers=1)
+
+
+def test_the_uncertainty_of_a_run_from_a_fit_is_that_of_the_fitted_curves(noisy):
+    """The covariance of fitted values is s^2 times a projection of rank P: the sum of their variances, in
+    those of the data, is P s^2, with s^2 = r.r / (N - P) (Seber and Wild, section 2.1).
+    """
+    sure = ev.uncertainty(noisy.scene, noisy.sd, correlation=noisy.correlation)
+    sd = np.concatenate([sure.sd["normal_force"][:3], sure.sd["tangential_force"][3:]])
+    variance = noisy.residuals @ noisy.residuals / (6 - 2)
+    assert np.sum((sd / noisy.scale) ** 2) == pytest.approx(2.0 * variance, rel=1e-4)
+    # the parameters are correlated, and independent ones would err otherwise
+    alone = ev.uncertainty(noisy.scene, noisy.sd, ["normal_force", "tangential_force"])
+    apart = np.concatenate([alone.sd["normal_force"][:3], alone.sd["tangential_force"][3:]])
+    assert abs(noisy.correlation[0, 1]) > 0.1
+    assert np.sum((apart / noisy.scale) ** 2) != pytest.approx(2.0 * variance, rel=0.02)
+
+
+def test_standard_deviations_are_of_the_numbers_of_the_scene(noisy, hover):
+    """Half an interval over Student's quantile, for small ones; of a factor those of what it multiplies."""
+    from scipy.stats import t
+
+    for key, (low, high) in noisy.intervals(0.5).items():
+        assert noisy.sd[key] == pytest.approx(0.5 * (high - low) / t.ppf(0.75, 4), rel=1e-3)
+    sd = np.array([*noisy.sd.values()])
+    np.testing.assert_allclose(np.diag(noisy.covariance), sd**2)
+    gap, case = "motion.0.gap", {"electrostatics.voltage": [90.0, 100.0, 120.0]}
+    run = [
+        ev.simulate(ev.load(hover)).electrostatic_force[-1] * (v / 100.0) ** 2 for v in (90.0, 100.0, 120.0)
+    ]
+    data = ev.MeasuredValues("electrostatic_force.last", np.array(run) * [1.01, 0.98, 1.0], case)
+    ways = {
+        "value": ev.Parameter(0.1, 0.4),
+        "factor": ev.Parameter(0.5, 2.0, apply="factor"),
+        "offset": ev.Parameter(-0.1, 0.1, apply="offset"),
+    }
+    found = {way: ev.fit(hover, data, {gap: one}, workers=1) for way, one in ways.items()}
+    assert found["factor"][gap] == pytest.approx(found["value"][gap] / 0.2, rel=1e-5)
+    for way in ("factor", "offset"):
+        assert found[way].sd[gap] == pytest.approx(found["value"].sd[gap], rel=1e-4)
+
+
+def test_what_is_not_determined_has_no_standard_deviation(path):
+    """Without a voltage the horny layer changes nothing that was measured."""
+    layer = "finger.electrical.stratum_corneum_thickness"
+    found = ev.fit(path, measured(path)[0], {E: BOUNDS[E], layer: (0.2, 0.5)}, workers=1)
+    assert found.sd[layer] == np.inf
+    assert np.isfinite(found.sd[E])
+    with pytest.raises(InputError, match=rf"sd\.{layer}: given inf"):
+        ev.uncertainty(found.scene, found.sd, correlation=found.correlation)

@@ -201,3 +201,42 @@ def test_a_folder_that_cannot_be_is_told_before_anything_is_computed(path, capsy
     for asked in (["impedance", "--frequencies", "1"], ["sensitivities", "--by", "surface.friction"]):
         assert main([asked[0], str(path), "--out", str(path / "out"), *asked[1:]]) == 4
         assert "cannot use" in capsys.readouterr().err
+
+
+INSULATOR = ("electrostatics.insulator_thickness", "electrostatics.insulator_eps_r")
+
+
+def hovering():
+    pad = ev.FingerPad(ridges=False, resolution="coarse")
+    return ev.Scene(pad, ev.Display(), ev.StrongTroxel(), 100.0, ev.Hover(gap=0.3, steps=1))
+
+
+def test_parameters_that_err_together_cancel_or_add():
+    """The law knows the insulator by d / eps_r alone: two relative errors of 5 % that are the same cancel,
+    opposite ones add, and independent ones are their root.
+    """
+    scene, column = hovering(), "electrostatic_force"
+    layer = scene.surface.insulator
+    sd = {INSULATOR[0]: 0.05 * layer.thickness, INSULATOR[1]: 0.05 * layer.eps_r}
+    found = {
+        rho: ev.uncertainty(scene, sd, [column], correlation=[[1.0, rho], [rho, 1.0]]).sd[column][0]
+        for rho in (-1.0, 0.0, 1.0)
+    }
+    assert found[0.0] == ev.uncertainty(scene, sd, [column]).sd[column][0] > 0.0
+    assert found[1.0] < 1e-6 * found[0.0]
+    assert found[-1.0] == pytest.approx(2.0**0.5 * found[0.0], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ([[1.0]], r"shape \(1, 1\).*symmetric matrix \(2, 2\)"),
+        ([[1.0, np.nan], [np.nan, 1.0]], "given nan"),
+        ([[1.0, 0.3], [0.2, 1.0]], "symmetric"),
+        ([[2.0, 0.0], [0.0, 2.0]], "1 on its diagonal"),
+        ([[1.0, 1.5], [1.5, 1.0]], "that some parameters can have"),
+    ],
+)
+def test_a_matrix_that_is_no_correlation_is_refused(given, said):
+    with pytest.raises(ev.InputError, match=f"correlation: .*{said}"):
+        ev.uncertainty(hovering(), dict.fromkeys(INSULATOR, 0.01), ["electrostatic_force"], correlation=given)
