@@ -26,6 +26,15 @@ from evfem.simulation.result import Result
 if TYPE_CHECKING:
     from evfem.sweeps.check import Checked
 
+#: where works go
+SPENT = (
+    "stored_energy",
+    "kinetic_energy",
+    "friction_dissipation",
+    "viscous_dissipation",
+    "integrator_dissipation",
+    "snap_dissipation",
+)
 #: columns that say nothing of the finger
 COUNTS = ("step", "motion_index", "motion", "substeps", "newton_iterations", "seconds")
 #: further columns of the table of forces, and their heads there
@@ -230,9 +239,7 @@ def _largest(result: Result) -> float:
 
 def _left_over(result: Result) -> float:
     """Works less energies and dissipations, at most, relative to the largest work."""
-    spent = ("stored_energy", "kinetic_energy", "friction_dissipation", "viscous_dissipation")
-    spent += ("integrator_dissipation", "snap_dissipation")
-    left = sum(_works(result).values()) - sum(np.asarray(result[name]) for name in spent)
+    left = sum(_works(result).values()) - sum(np.asarray(result[name]) for name in SPENT)
     return float(np.abs(left).max()) / _largest(result)
 
 
