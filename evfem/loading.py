@@ -17,6 +17,8 @@ ALLOWED = (
 )
 #: format of the fast models that 0.2 saved
 FAST_MODEL = "evfem-reduced-1"
+#: how the formats of checkpoints of all versions begin
+CHECKPOINT = "evfem-checkpoint-"
 
 
 def load(path: str | Path) -> Found:
@@ -63,8 +65,18 @@ def load(path: str | Path) -> Found:
         return _run(path)
     if not path.is_file():
         raise InputError("path", f"{path}, which does not exist", ALLOWED)
-    reader = READERS.get(path.suffix.lower())
-    return _archive(path) if reader is None else reader(path)
+    reader = READERS.get(path.suffix.lower(), _archive)
+    if reader is not _archive and _is_of_a_run(path):
+        raise InputError("path", f"{path}, one file of a run", f"the run's folder, {path.parent}")
+    return reader(path)
+
+
+def _is_of_a_run(path: Path) -> bool:
+    """Whether the folder of a run lists the file among its own."""
+    from evfem.runfolder import MANIFEST
+
+    manifest = path.parent / MANIFEST
+    return manifest.is_file() and path.name in manifest.read_text("utf-8", "replace").splitlines()
 
 
 def _run(path: Path) -> Found:
@@ -82,7 +94,6 @@ def _run(path: Path) -> Found:
 
 
 def _archive(path: Path) -> Found:
-    from evfem.simulation.checkpoint import CHECKPOINT_FORMAT
     from evfem.simulation.result import RESULT_FORMAT
     from evfem.simulation.result import load as load_result
 
@@ -90,7 +101,7 @@ def _archive(path: Path) -> Found:
     if form == FAST_MODEL:
         allowed = "other files: the fast model is gone since 0.3, `ev.simulate` runs the scene itself"
         raise InputError("path", f"{path}, a fast model", allowed)
-    if form == CHECKPOINT_FORMAT:
+    if (form or "").startswith(CHECKPOINT):
         raise InputError(
             "path", f"{path}, the checkpoint of a run", "`evfem run --resume`, which goes on there"
         )

@@ -299,7 +299,8 @@ def saved(path: Path, scene: Scene) -> Saved | None:
         try:
             return Checkpoint(path / STATE).read(scene.digest())
         except InputError as error:
-            raise InputError("--resume", _told(path, error), error.allowed) from error
+            allowed = f"{error.allowed}; --overwrite begins the run anew"
+            raise InputError("--resume", _told(path, error), allowed) from error
     if (path / MANIFEST).is_file() and _without_a_row(path / HISTORY):
         return None
     raise InputError("--resume", f"{path} without {STATE}", "a folder with a run that was interrupted")
