@@ -55,7 +55,8 @@ FENCED = re.compile(r"^```\w+\n(.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FORMS, WORDS = "docs/howto/form.md", "docs/words.md"
 #: pages with so much to compute that `.ci/run` alone runs them
-LONG = {"gallery.md", *(f"howto/{p}.md" for p in ("element", "field", "fit", "pictures", "rough", "texture"))}
+HEAVY = ("element", "field", "fit", "friction", "pictures", "rough", "texture")
+LONG = {"gallery.md", *(f"howto/{p}.md" for p in HEAVY)}
 #: pages that are still to be filled to the width of the others
 UNFILLED = {"docs/theory.md"}
 #: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.surface.pad`
