@@ -43,7 +43,7 @@ from evfem.tissue.kernels.blocks import contact_loop
 #: y, x and z of a vector (x, y, z), and conversely
 COMPONENTS = np.array([1, 0, 2])
 #: why there is no solution where the compliance is not positive
-LOST_STABILITY = "the body gives way the more, the more it is loaded"
+LOST_STABILITY = "the body softens under its load"
 
 
 #: displacements, forces on the body (dim c,), contact forces (c, dim), statuses (c,), extra unknowns (p,),

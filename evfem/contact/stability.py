@@ -28,7 +28,7 @@ from evfem.contact.signorini import FORWARD, OPEN, STICK, ExtraUnknowns
 
 #: the forces, by what they do
 SLOPES = "on the slopes of the profile the contact forces push the finger aside"
-FALLING = "friction falls along the way"
+FALLING = "friction falls along the path"
 FASTER = "friction falls with the speed"
 ATTRACTION = "the attraction grows as the gap closes"
 

@@ -71,14 +71,14 @@ class Core:
         steep = f"at closing {self.ratio:.3g} times as steep as this mesh resolves"
         if not self.fits:
             return (
-                f"{steep}, and a line of the same work would reach {self.length:.2g} mm, beyond half of the "
-                "hovering gap: the law itself, whose contact depends on mesh and way after landing"
+                f"{steep}, and a linear law of the same work would reach {self.length:.2g} mm, beyond half "
+                "of the hovering gap: the law is kept, and after first touch results depend on mesh and steps"
             )
         return (
-            f"{steep}: below {1e3 * self.length:.2g} um a line of the same work takes the law's place (work "
+            f"{steep}: below {1e3 * self.length:.2g} um a linear law of the same work replaces it (work "
             f"of adhesion {self.work:.2g} N/mm, exact beyond); an edge of contact is right to "
             f"{EDGE * self.distance:.2g} mm, a load to 1 %, a pull-off to 3 %; a finer mesh or a wider "
-            'roughness_gap needs less; core = "off" gives the law itself and answers that depend on the way'
+            'roughness_gap needs less; core = "off" keeps the law, and results depend on the steps'
         )
 
 
@@ -176,7 +176,7 @@ class Closing:
         line = ""
         if end > begin:
             line = (
-                f"; from {begin:.2g} to {end:.2g} um a line of the same work takes its place, the steepest "
+                f"; from {begin:.2g} to {end:.2g} um a linear law of the same work replaces it, the steepest "
                 "that this mesh resolves"
             )
         return f"{type(law).__name__}, work of adhesion {work:.2g} N/mm, always on{line}"

@@ -32,7 +32,7 @@ def time_scales(scene: Scene) -> str:
     if isinstance(scene.voltage, OpenCircuit):
         what = f"open circuit: {scene.voltage.voltage:g} V, disconnected after {scene.voltage.after:g} s"
     elif isinstance(scene.voltage, ChargeControl):
-        what = "given charge of the electrode, whatever voltage that takes"
+        what = "prescribed charge of the electrode, whatever voltage that takes"
     elif isinstance(scene.voltage, TimeSignal):
         what = f"{type(scene.voltage).__name__} signal"
     how = "resolved in time with its charges" if drive.resolved else "by its mean over the cycle"

@@ -155,8 +155,8 @@ def _check(scene: Scene) -> None:
         raise InputError("scene", "a scene with an elastic surface", "a rigid surface")
     resolved = scene.drive is not None and scene.drive.resolved
     if resolved or isinstance(scene.electrics.voltage, (ChargeControl, OpenCircuit)):
-        given = "a drive that is resolved in time" if resolved else "a given charge"
-        allowed = 'a scene with a given voltage, and drive = "mean" where it alternates'
+        given = "a drive that is resolved in time" if resolved else "a prescribed charge"
+        allowed = 'a scene with a prescribed voltage, and drive = "mean" where it alternates'
         raise InputError("scene", given, allowed)
 
 

@@ -204,7 +204,7 @@ def parameter_of(scene: Scene, wanted: Any) -> Parameter:
         )
     found = Keyed(scene, wanted)
     if found.value == 0.0:
-        raise InputError(f"parameters.{wanted}", 0.0, "a number other than 0: steps are shares of it")
+        raise InputError(f"parameters.{wanted}", 0.0, "a number other than 0: steps are fractions of it")
     return found
 
 

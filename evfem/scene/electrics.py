@@ -264,7 +264,7 @@ def _check_limited(scene: Any) -> None:
         raise InputError(
             "electrostatics.breakdown",
             given,
-            "warn | off; or a given voltage, direct or a sine, the field local, and even gaps",
+            "warn | off; or a prescribed voltage, direct or a sine, the field local, and even gaps",
         )
 
 
@@ -296,7 +296,7 @@ def _check_resolved(scene: Any, drive: Drive) -> None:
         given = f"{drive.frequency:g} beside a signal over time, which is resolved itself"
         raise InputError("electrostatics.frequency", given, "nothing here")
     if isinstance(voltage, CHARGED) and np.any(seen_at(scene.ground.insulator, scene.electrics.frequency)[1]):
-        allowed = "an insulator that does not conduct, with an open circuit or a given charge"
+        allowed = "an insulator that does not conduct, with an open circuit or a prescribed charge"
         raise InputError("surface.insulator", "a conductor", allowed)
     if isinstance(voltage, Carrier) and not voltage.resolved:
         allowed = "a carrier with resolved=True in a resolved drive"
@@ -335,5 +335,5 @@ def without_field(scene: Any) -> tuple[str, str] | None:
     if scene.drive.resolved:
         return "a resolved drive", 'drive = "mean": charges are resolved column by column'
     if spectrum(scene.drive, scene.voltage)[0][0] == 0.0:
-        return "a voltage with a direct part", "a voltage whose mean over the cycle is 0"
+        return "a voltage with a direct component", "a voltage whose mean over the cycle is 0"
     return None

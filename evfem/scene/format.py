@@ -250,7 +250,7 @@ class Electrostatics:
 
     law: Annotated[str, among(FORCE_LAWS), "force law of the paper, eqs (2) to (5)"]
     voltage: Annotated[
-        float | FollowForce | None, _VOLTAGE, "effective, across skin and insulator, given or found"
+        float | FollowForce | None, _VOLTAGE, "effective, across skin and insulator, prescribed or found"
     ] = None
     amplitude: Annotated[
         float | None,
@@ -298,8 +298,8 @@ class Electrostatics:
     field: FieldChoice = "local"
     electrodes: Annotated[
         Pairs | None,
-        _rows("rows [[from, to, share], ...] in mm, with gaps between", "mm, 1"),
-        "where electrodes end, and their share of the voltage; with field full",
+        _rows("rows [[from, to, fraction], ...] in mm, with gaps between", "mm, 1"),
+        "where electrodes end, and their fraction of the voltage; with field full",
     ] = None
     grounded: Grounded = True
     coupling: Coupling = "monolithic"

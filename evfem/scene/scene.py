@@ -383,7 +383,7 @@ def _check_elastic(scene: Scene) -> None:
         raise InputError("surface.elastic", f"{type(elastic).__name__}, a frozen dataclass", allowed)
     found = isinstance(scene.voltage, (FollowForce, OpenCircuit, ChargeControl))
     if found or any(course.gap is not None for course in scene.courses):
-        allowed = "a rigid surface, or a voltage that is given: it is not sought above an elastic surface"
+        allowed = "a rigid surface, or a prescribed voltage: it is not sought above an elastic surface"
         raise InputError("surface.elastic", "an elastic surface under a voltage that is sought", allowed)
 
 

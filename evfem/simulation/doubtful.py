@@ -342,8 +342,8 @@ def unstable_alone(model: Model, state: State, rows: Sequence[Mapping[str, float
     if not lost:
         return ""
     return (
-        f"the gap of {rows[-1]['min_gap']:.4g} mm was given, and {state.voltage:.4g} V alone do not hold it: "
-        "the equilibrium is not stable, and where the finger goes from there is by chance"
+        f"the gap of {rows[-1]['min_gap']:.4g} mm is prescribed, and {state.voltage:.4g} V alone do not hold "
+        "it: the equilibrium is not stable, and where the finger goes from there is by chance"
     )
 
 

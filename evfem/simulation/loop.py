@@ -35,7 +35,7 @@ from evfem.solver.path import Path
 #: forces that have an error; those below `FAINT` of the largest have none of their own
 FORCES, FAINT = ("normal_force", "tangential_force", "electrostatic_force"), 1e-3
 
-_PLACE = number("a place in mm between -1000 and 1000", Within(-1000.0, 1000.0), "mm")
+_PLACE = number("a position in mm between -1000 and 1000", Within(-1000.0, 1000.0), "mm")
 _SECONDS = number("a time in s, not negative, up to 1e6", Within(0.0, 1e6), "s")
 
 
@@ -260,7 +260,7 @@ class Loop:
         if not course.angle:
             return
         if self._run.model.mesh.dim == 2:
-            raise InputError("position_z", "a way across x", "0 with a finger in the plane")
+            raise InputError("position_z", "a displacement across x", "0 with a finger in the plane")
 
     def _start(self, wanted: StepRequest) -> Start:
         run = self._run

@@ -60,7 +60,7 @@ STEEPEST = 20.0
 PRESSURE_STEP, COEFFICIENT_STEP, SPEED_STEP = 1e-7, 1e-6, 1e-5
 _PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "MPa")
 _SPEED = number("a speed in mm/s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "mm/s")
-_SHARE = number("a share from 0 to 1", Within(0.0, 1.0))
+_SHARE = number("a fraction from 0 to 1", Within(0.0, 1.0))
 _INDEX = number("an exponent from 0.1 to 3", Within(0.1, 3.0))
 _RATIO = number("a ratio from 0 to 100", Within(0.0, 100.0))
 _EXPONENT = number("an exponent from -2 to 2", Within(-2.0, 2.0))
@@ -121,9 +121,7 @@ class AdhesiveFriction(NamedFriction, kind="adhesive"):
     [0.0026, 0.007]
     """
 
-    strength: Annotated[
-        float, _PRESSURE, "shear traction that every place in real contact carries beside mu p"
-    ]
+    strength: Annotated[float, _PRESSURE, "shear strength of the real contact, added to mu p"]
     full: Annotated[
         float | None, _PRESSURE, "contact pressure at which real contact is complete; without it the strength"
     ] = None
@@ -173,7 +171,7 @@ class AgeingFriction(NamedFriction, kind="ageing"):
     [0.001, 0.0048]
     """
 
-    fresh: Annotated[float, _SHARE, "share of the friction that a place has when it touches"]
+    fresh: Annotated[float, _SHARE, "fraction of its friction that a node has when it touches"]
     time: Annotated[float, _TIME, "time constant of the rest"] = 6.7
     timed = True
 
@@ -211,7 +209,7 @@ class SlipMemory(NamedFriction, kind="slip_memory"):
     friction: Annotated[
         Any,
         _INNER_LAW,
-        "what it follows: a law, or a coefficient in the place of the surface's",
+        "what it follows: a law, or a coefficient instead of the surface's",
     ]
     length: Annotated[float, _SLIP, "of slip over which friction follows"] = 0.0115
     time: Annotated[

@@ -147,7 +147,7 @@ def accurate(
     >>> found.scene.finger.resolution, found.error["normal_force"] < 0.1
     ('coarse', True)
     """
-    error = real("error", error, "a share from 1e-5 to 0.5", Within(1e-5, 0.5))
+    error = real("error", error, "a relative error from 1e-5 to 0.5", Within(1e-5, 0.5))
     run, scene = _remembering(), scene_at(scene)
     scene = _coarsest(scene) if other_levels(scene.finger) else scene
     tolerance = max(RESIDUAL * error, SMALLEST)

@@ -45,7 +45,7 @@ IMAGES = ("PNG", "JPEG", "TIFF", "BMP")
 MOST_PIXELS, MOST_BYTES, MOST_POINTS = 40_000_000, 512_000_000, 50_000_000
 
 Unit = Annotated[str | None, one_of(*LENGTHS), "of lengths for which the file names none; default: mm"]
-_ROW = number("a place from 0 to 1", Within(0.0, 1.0))
+_ROW = number("a fraction from 0 to 1", Within(0.0, 1.0))
 Row = Annotated[float, _ROW, "which line, from the first to the last"]
 Quantity = Annotated[str | None, one_of(*RECORDED), "what a recording holds"]
 Longest = Annotated[float, number("a wavelength above zero", POSITIVE, "mm"), "longest wave of a recording"]

@@ -158,17 +158,17 @@ def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():
 @pytest.mark.parametrize(
     ("signal", "voltage", "said"),
     [
-        ('kind = "charge", charge = 0.02', ev.ChargeControl(0.02), "given charge"),
+        ('kind = "charge", charge = 0.02', ev.ChargeControl(0.02), "prescribed charge"),
         (
             'kind = "charge", charge = 0.02, parallel_capacitance = 0.01',
             ev.ChargeControl(0.02, parallel_capacitance=0.01),
-            "given charge",
+            "prescribed charge",
         ),
         ('kind = "open_circuit", voltage = 80.0, after = 0.05', ev.OpenCircuit(80.0, 0.05), "disconnected"),
         (
             'kind = "charge", charge = {kind = "sine", frequency = 0.5, amplitude = 0.02}',
             ev.ChargeControl(ev.Sine(0.5, 0.02)),
-            "given charge",
+            "prescribed charge",
         ),
     ],
 )

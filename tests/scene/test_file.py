@@ -266,7 +266,7 @@ WRONG = [
     (SHORT, FLAT, "\nfriction_law = 0.3", "surface.friction_law", "given 0.3; allowed: a table"),
     (SHORT, FLAT, "\nfriction_law = {kind = 'glue'}", "surface.friction_law.kind", "coulomb | load_index | "),
     (SHORT, FLAT, "\nfriction_law = {kind = 'adhesive'}", "surface.friction_law.strength", "missing"),
-    (SHORT, FLAT, "\nfriction_law = {kind = 'ageing', fresh = 2.0}", "surface.friction_law.fresh", "a share"),
+    (SHORT, FLAT, "\nfriction_law = {kind = 'ageing', fresh = 2.0}", "surface.friction_law.fresh", "0 to 1"),
     (SHORT, FLAT, "kind = 'sinusoid'\nterms = [[1, 2]]", "surface.terms", "wavenumber"),
     (SHORT, FLAT, "kind = 'profile'", "surface.file", "missing; allowed:"),
     (SHORT, FLAT, "kind = 'profile'\nfile = 'none.csv'", "surface.file", "No such file"),

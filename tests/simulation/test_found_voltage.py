@@ -264,7 +264,7 @@ def test_a_gap_that_its_voltage_does_not_hold_is_told_when_it_is_let_go(dim):
     """Beyond a third the equilibrium under the same voltage is not stable; before it is."""
     ramp = ev.VoltageRamp(gap=0.08, steps=2)
     ev.simulate(scene(dim, 0.0, [ramp, ev.Slide(0.01, steps=1)]))
-    with pytest.warns(UserWarning, match="motion 2: the gap of 0.05 mm was given, and .* do not hold it"):
+    with pytest.warns(UserWarning, match="motion 2: the gap of 0.05 mm is prescribed, and .* do not hold it"):
         ev.simulate(scene(dim, 0.0, [replace(ramp, gap=0.05, steps=5), ev.Slide(0.01, steps=1)]))
 
 

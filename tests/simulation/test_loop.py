@@ -161,7 +161,7 @@ MISTAKES = [
     (plane(), {"indentation": 0.1, "force": 0.1}, "force: given indentation and force; allowed: one of"),
     (plane(), {"force": -1.0}, "force: given -1"),
     (plane(), {"position": "far"}, 'position: given "far"'),
-    (plane(), {"position_z": 1.0}, "position_z: given a way across x; allowed: 0 with a finger in the plane"),
+    (plane(), {"position_z": 1.0}, "position_z: given a displacement across x; allowed: 0 with a finger in"),
     (plane(), {"duration": -1.0}, "duration: given -1.0; allowed: a time in s, not negative"),
     (ev.Scene(PAD, ev.Flat()), {"voltage": 1.0}, "voltage: given a voltage without a law"),
     (ev.Scene(PAD, ev.Flat()), {"force": 0.0}, "force: given 0.0; allowed: larger than 0 when nothing else"),

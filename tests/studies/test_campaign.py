@@ -88,7 +88,7 @@ NEVER = {
     "electrostatics.coupling": "without effect",
     "electrostatics.insulator_strength": "no number of a run depends on it",
     "electrostatics.grounded": "false has no balance of the source to be checked by",
-    "solver.core": "off gives answers that depend on the way, a length changes what is asked for",
+    "solver.core": "off gives results that depend on the steps, a length changes what is asked for",
     "solver.strategy.hold": "another first rate leads to the same end, or `evfem check` says so",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 } | dict.fromkeys(("finger.ridge_pixel", "finger.ridge_dark", "finger.ridge_scan"), "of a print alone")
