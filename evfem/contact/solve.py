@@ -191,7 +191,7 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
 
 def _damped_status_change(before: Projected, after: Projected) -> Projected:
     """`after` with damped changes of status: in the plane closing nodes slip first, and slips change their
-    side by way of stick. That is faster, but under a steep bound of friction a node may stick that can
+    side through stick. That is faster, but under a steep bound of friction a node may stick that can
     neither slip nor open.
     """
     if after.z.shape[1] == 2:

@@ -49,41 +49,42 @@ class FrictionJumps:
         self.steps = steps
         self.begin(begin)
 
-    def begin(self, place: Floats) -> None:
+    def begin(self, position: Floats) -> None:
         """Starts a step with the nodes at these positions (P, d) in mm, none pinned."""
-        self.place, self.lower, self._begin = np.full(place.shape, np.nan), np.zeros(len(place)), place
-        self._side = [self._sides(steps, place) for steps in self.steps]
-        self._changes = np.zeros((len(self.steps), len(place)), dtype=np.int64)
-        self._released = np.zeros(len(place), dtype=bool)
+        self.place, self.lower = np.full(position.shape, np.nan), np.zeros(len(position))
+        self._begin = position
+        self._side = [self._sides(steps, position) for steps in self.steps]
+        self._changes = np.zeros((len(self.steps), len(position)), dtype=np.int64)
+        self._released = np.zeros(len(position), dtype=bool)
 
     @staticmethod
-    def _sides(steps: Steps, place: Floats) -> Ints:
+    def _sides(steps: Steps, position: Floats) -> Ints:
         """Number of discontinuities (P,) at smaller coordinates than a node, along the axis of `steps`."""
-        return np.asarray(np.searchsorted(steps.place, place[:, steps.axis], side="right"))
+        return np.asarray(np.searchsorted(steps.place, position[:, steps.axis], side="right"))
 
     @property
     def held(self) -> Any:
         """Nodes pinned to a discontinuity, (P,) bool."""
         return np.isfinite(self.place[:, 0])
 
-    def at(self, place: Floats) -> Floats:
-        """Positions for friction (P, d): pinned nodes at their pin, others at `place`."""
-        return np.where(np.isfinite(self.place), self.place, place)
+    def at(self, position: Floats) -> Floats:
+        """Positions for friction (P, d): pinned nodes at their pin, others at `position`."""
+        return np.where(np.isfinite(self.place), self.place, position)
 
-    def watch(self, place: Floats, touching: Any) -> None:
+    def watch(self, position: Floats, touching: Any) -> None:
         """Counts changes of side at the next iterate; pins a node after `CHANGES` of them."""
         for number, steps in enumerate(self.steps):
-            side = self._sides(steps, place)
+            side = self._sides(steps, position)
             moved = touching & (side != self._side[number]) & ~self._released
             self._changes[number] += moved
             new = np.flatnonzero(moved & (self._changes[number] >= constants.CHANGES) & ~self.held)
-            self._hold(steps, new, np.maximum(side, self._side[number])[new] - 1, place)
+            self._hold(steps, new, np.maximum(side, self._side[number])[new] - 1, position)
             self._side[number] = side
 
-    def _hold(self, steps: Steps, new: Ints, which: Ints, place: Floats) -> None:
+    def _hold(self, steps: Steps, new: Ints, which: Ints, position: Floats) -> None:
         """Pins nodes `new` (k,) that reach the discontinuities `which` (k,) from their smoother side."""
         begin, axis = self._begin[new], steps.axis
-        moved = place[new] - begin
+        moved = position[new] - begin
         whole = np.where(moved[:, axis] == 0.0, 1.0, moved[:, axis])
         crossed = begin + moved * ((steps.place[which] - begin[:, axis]) / whole)[:, None]
         across = crossed[:, 1 - axis] if crossed.shape[1] > 1 else np.zeros(new.size)
@@ -159,12 +160,12 @@ class Interface:
 
     def surface_at(self, state: State) -> SurfaceState:
         """The surface below the pad nodes, cached for the last two states."""
-        sunk = self.foundation.displacement(state)
+        displacement = self.foundation.displacement(state)
         for u, before, found in self._surfaces:
-            if u is state.u and before is sunk:
+            if u is state.u and before is displacement:
                 return found
         found = self.foundation.sloped(surface_state(self.surface, self.places(state)), state)
-        self._surfaces = ((state.u, sunk, found), *self._surfaces[:1])
+        self._surfaces = ((state.u, displacement, found), *self._surfaces[:1])
         return found
 
     def resting(self, state: State) -> Floats:
@@ -183,9 +184,9 @@ class Interface:
         same = all(one is other for one, other in zip(made_of, last, strict=True))
         if same and found.voltage == state.voltage and np.array_equal(found.touching, touching):
             return found
-        place, pressing = self.resting(state), state.contact_force[:, 0]
+        position, pressing = self.resting(state), state.contact_force[:, 0]
         memory, below = state.memory, self.surface_at(state)
-        found = PadState(self.pad, self.surface, place, state.voltage, pressing, touching, memory, below)
+        found = PadState(self.pad, self.surface, position, state.voltage, pressing, touching, memory, below)
         self._pad_state = made_of, found
         return found
 
@@ -260,8 +261,8 @@ class Interface:
 
     def unused_friction(self, old: State, state: State, direction: Floats) -> float:
         """Friction force (N/mm) along a unit vector (d,) by which sticking nodes are below their bounds."""
-        place, sticks = self.jumps.at(self.on_display(state)), state.status == STICK
-        bound = self.limit(old, state, place, np.zeros(len(place)))
+        position, sticks = self.jumps.at(self.on_display(state)), state.status == STICK
+        bound = self.limit(old, state, position, np.zeros(len(position)))
         return float((bound + state.contact_force[:, 1:] @ direction)[sticks].sum())
 
     def compliance(self, old: State) -> Floats:

@@ -81,7 +81,7 @@ FIRST_PART = 0.125
 @dataclass(frozen=True)
 class Request:
     """One requested step: its number in the run, its motion, and the path to its exact target; fractions (k,)
-    of it at which parts with an admissible error end, for what is prescribed turns there.
+    of it at which substeps with an admissible error end, for what is prescribed turns there.
     """
 
     step: int
@@ -171,7 +171,7 @@ def climb(model: Model, old: State, new: State, target: Target) -> float:
 
 
 def _towards(begin: float, end: float | None, fraction: float) -> float:
-    """The value at a fraction (0 to 1) of the way to the end, if there is one; exactly the end at 1."""
+    """The value at a fraction (0 to 1) of a motion, if there is one; exactly the end at 1."""
     return begin if end is None else end if fraction == 1.0 else begin + fraction * (end - begin)
 
 
@@ -283,9 +283,9 @@ class Run:
             self._moment(course, start, part, self.time + spent)
             for part, spent in zip(fractions, (0.0, seconds), strict=True)
         ]
-        way = abs(course.distance) * (fractions[1] - fractions[0])
-        parts = int(np.ceil(way / self.slip_scale)) if way else 1
-        return np.union1d(self.source.turns(*ends), np.arange(1, parts) / parts)
+        length = abs(course.distance) * (fractions[1] - fractions[0])
+        count = int(np.ceil(length / self.slip_scale)) if length else 1
+        return np.union1d(self.source.turns(*ends), np.arange(1, count) / count)
 
     def start_of(self, rows_before: int) -> Start:
         """Initial state of a motion: bone, indentation, force, voltage, and whether it is unloaded."""
@@ -311,10 +311,10 @@ class Run:
         return x, z
 
     def _moment(self, course: Course, start: Start, fraction: float, time: float) -> Moment:
-        """What a source is asked at `fraction` (0 to 1) of a motion, at `time` (s)."""
+        """What a source is evaluated at: `fraction` (0 to 1) of a motion, at `time` (s)."""
         x, z = (
-            _towards(start[name], start[name] + way, fraction)
-            for name, way in zip(("position", "position_z"), course.travel, strict=True)
+            _towards(start[name], start[name] + distance, fraction)
+            for name, distance in zip(("position", "position_z"), course.travel, strict=True)
         )
         heading = course.direction[: self.model.mesh.dim - 1]
         along = float(np.dot((x, z)[: len(heading)], heading))

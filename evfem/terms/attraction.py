@@ -134,15 +134,15 @@ class Attraction(PadTraction):
         )
 
     def work_apart(self, path: PadPath) -> float:
-        """Charges follow at the end, where they follow a prescribed charge they do so on the way."""
+        """Charges follow at the end, where they follow a prescribed charge they do so along the path."""
         return self.work_along(path) - path.trapezoidal if self.flows else 0.0
 
-    def of_one_charge(self, way: list[PadState]) -> Floats:
+    def of_one_charge(self, path: list[PadState]) -> Floats:
         """In which that charge is linear."""
-        volts = super().of_one_charge(way)
+        volts = super().of_one_charge(path)
         if not self.flows:
             return volts
-        readings = [self.electrode_charge(pad) for pad in way]
+        readings = [self.electrode_charge(pad) for pad in path]
         return volts + KILOVOLT * np.array(
             [(readings[-1].value - one.value) / one.by_voltage for one in readings]
         )
@@ -303,7 +303,7 @@ class Attraction(PadTraction):
             return self._work_of_charged(path)
         if not (self.load(path.old) or self.load(path.new)):
             return path.trapezoidal
-        # on the way with the bone the mean force does the work, and along a vertical pull's level nothing
+        # along the path of the bone the mean force does the work, and along a vertical pull's level nothing
         if self.direction == "vertical" and not path.turned[:, 1].any():
             return path.trapezoidal
         return super().work_along(path)

@@ -191,8 +191,8 @@ class Rigid(Room):
         """Displacements relative to the surface of nodes that `moved` (P, dim)."""
         return moved
 
-    def stretched(self, ends: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
-        """Slips (P,) along the stretched surface, for displacements `way` (P, d) along it."""
+    def stretched(self, ends: tuple[Any, Any], displacement: Floats, length: Floats) -> Floats:
+        """Slips (P,) along the stretched surface, for displacements (P, d) along it."""
         return length
 
 
@@ -236,8 +236,8 @@ class ElasticFoundation(Rigid):
 
     def pushing(self, state: Any) -> Floats:
         """Forces of contact and attraction on the pad's nodes (P, dim)."""
-        place = self.places(self.rest + state.u[self.pad.nodes], state)
-        found = self.sloped(surface_state(self.surface, place), state)
+        position = self.places(self.rest + state.u[self.pad.nodes], state)
+        found = self.sloped(surface_state(self.surface, position), state)
         return in_laboratory(state.contact_force, found) + np.asarray(state.attraction)
 
     def stored(self, state: Any) -> float:
@@ -325,16 +325,16 @@ class ElasticFoundation(Rigid):
     def sunk(
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
     ) -> dict[str, Floats]:
-        below, (c, gives, fraction), push = self.under(position, state), update, force()
-        displacement_below = below.given(push)
+        below, (c, gives, fraction), pushing = self.under(position, state), update, force()
+        displacement_below = below.given(pushing)
         displacement_below[c] = self.displacement(state)[c] + fraction * np.asarray(gives).reshape(c.size, -1)
-        return {DISPLACEMENT: displacement_below, GRADIENT: below.change(push)}
+        return {DISPLACEMENT: displacement_below, GRADIENT: below.change(pushing)}
 
     def relative_displacement(self, ends: tuple[Any, Any], moved: Floats) -> Floats:
         return np.asarray(moved + self.displacement(ends[1]) - self.displacement(ends[0]))
 
-    def stretched(self, ends: tuple[Any, Any], way: Floats, length: Floats) -> Floats:
-        along = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+    def stretched(self, ends: tuple[Any, Any], displacement: Floats, length: Floats) -> Floats:
+        along = displacement / np.maximum(np.linalg.norm(displacement, axis=1, keepdims=True), 1e-300)
         stretch = 0.5 * (ends[0].memory[GRADIENT] + ends[1].memory[GRADIENT])[:, :, ::2]
         return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
@@ -367,8 +367,8 @@ def foundation_of(interface: Any) -> Rigid:
     """The foundation of the pad of an `evfem.newton.interface.Interface`: elastic, or rigid."""
     if getattr(interface.surface, "elastic", None) is None:
         return Rigid()
-    place = interface.points, interface.length, interface.least
-    return ElasticFoundation(interface.surface, interface.pad, *place)
+    sampled = interface.points, interface.length, interface.least
+    return ElasticFoundation(interface.surface, interface.pad, *sampled)
 
 
 def _kept(state: Any) -> Floats:
@@ -383,8 +383,8 @@ def slopes(elastic: Any, x: Floats, length: Floats) -> Floats:
         return np.asarray(own(x, length))
     n, flat, found = len(x), x.reshape(len(x), -1), []
     dim = flat.shape[1] + 1
-    for way in STEP * np.eye(dim - 1):
-        positions = np.concatenate([flat + way, flat - way, flat]).reshape(-1, *x.shape[1:])
+    for step in STEP * np.eye(dim - 1):
+        positions = np.concatenate([flat + step, flat - step, flat]).reshape(-1, *x.shape[1:])
         compliances = np.asarray(elastic.compliance(positions, np.tile(length, 3))).reshape(
             dim, 3, n, dim, 3, n
         )

@@ -237,13 +237,13 @@ class RenewedFriction(LawFriction):
     def slipping(
         self, interface: Any, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats
     ) -> Renewing:
-        given = super().slipping(interface, old, state, nodes, mu, slip)
+        plain = super().slipping(interface, old, state, nodes, mu, slip)
         before = old.memory["friction_bound"][nodes]
-        return Renewing(**vars(given), before=before, seconds=self._seconds)
+        return Renewing(**vars(plain), before=before, seconds=self._seconds)
 
     def accept(self, old: Any, new: Any) -> dict[str, Floats]:
-        nodes, place = np.arange(self.nodes), self.interface.jumps.at(self.interface.on_display(new))
-        mu = self.interface.friction(old, nodes, place)
+        nodes, position = np.arange(self.nodes), self.interface.jumps.at(self.interface.on_display(new))
+        mu = self.interface.friction(old, nodes, position)
         nodal = self.slipping(self.interface, old, new, nodes, mu, self._slipped(old, new))
         bound = np.where(new.touching, nodal.renewed(self.law), 0.0)
         return super().accept(old, new) | {"friction_bound": bound}

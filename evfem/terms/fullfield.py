@@ -287,15 +287,15 @@ class FieldAttraction(Attraction):
         blocks = []
         for axis, first in product(range(2), range(min(APART, nodes.size))):
             moved = nodes[first::APART]
-            place = position.copy()
-            place[moved] += MOVED * directions[axis, moved]
-            rate = voltage**2 / MOVED * (self._above(replace(pad, position=place), lines)[1] - start)[nodes]
+            shifted = position.copy()
+            shifted[moved] += MOVED * directions[axis, moved]
+            rate = voltage**2 / MOVED * (self._above(replace(pad, position=shifted), lines)[1] - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
             blocks += [(2 * nodes + k, column, rate[:, k]) for k in range(2)]
         outer = self.flanks.stiffness(replace(pad, touching=np.ones(self._size, dtype=bool)))
-        share = self.voltage_fraction(position[:, 0])[outer.row // 2] ** 2
-        return Entries.of(outer.size, [*blocks, (outer.row, outer.column, share * outer.value)])
+        fraction = self.voltage_fraction(position[:, 0])[outer.row // 2] ** 2
+        return Entries.of(outer.size, [*blocks, (outer.row, outer.column, fraction * outer.value)])
 
     def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
         """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""
@@ -338,17 +338,17 @@ class FieldAttraction(Attraction):
 
     def outline(self, pad: PadState, lines: Any) -> tuple[Floats, Floats]:
         """x (L,) of columns at `lines` (L, P), heights (n + 1, L) of electrode, insulator, skin, tissue."""
-        place = lines @ pad.position
-        frame = surface_state(self.surface, place)
+        position = lines @ pad.position
+        frame = surface_state(self.surface, position)
         insulator = self.surface.insulator
         rough = self._separation(pad) * np.ones(self._size)
         lowest = SERIES_GAP * insulator.thickness / self.insulator_eps_r
         gap = np.maximum(np.maximum(frame.gap, 0.0) + np.maximum(lines @ rough, 0.0), lowest)
-        ground = place[:, 1] - frame.gap
+        ground = position[:, 1] - frame.gap
         levels = [ground - insulator.thickness, ground, ground + gap]
         if len(self._columns.eps_r) == 3:
             levels.append(ground + gap + lines @ self.skin.thickness)
-        return place[:, 0], np.stack(levels)
+        return position[:, 0], np.stack(levels)
 
     def bounds(self, x: Floats, levels: Floats) -> Bounds:
         """The bounds of C between these curves."""

@@ -283,9 +283,9 @@ class HandControl(Drive):
         """The bone's travels along x[, z] from its translation (dim,), in mm."""
         found = []
         for axis, force in zip((0, 2), self.force(bone[::2]).tolist(), strict=False):
-            push = -tangent.schur[:, axis - bone.size]
-            push[axis - bone.size] -= self.stiffness
-            found.append(ExtraUnknown(push, axis, force))
+            rate = -tangent.schur[:, axis - bone.size]
+            rate[axis - bone.size] -= self.stiffness
+            found.append(ExtraUnknown(rate, axis, force))
         return tuple(found)
 
     def accept(self, old: State, new: State) -> dict[str, Floats]:

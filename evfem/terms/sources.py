@@ -29,7 +29,7 @@ from evfem.protocols import TimeSignal
 
 #: fraction of its range by which what is prescribed may leave the straight line in a substep
 TURNED = 0.02
-#: parts of the way between two rows of a table, samples of a signal in a period and their largest number
+#: intervals between two rows of a table, samples of a signal in a period and their largest number
 PARTS, SAMPLES, MOST = 4, 32, 100_000
 
 
@@ -48,28 +48,28 @@ class Moment:
     slides: bool = False
 
 
-def chords(place: Floats, value: Floats, whole: float) -> Floats:
-    """Fractions (k,) of the way over the places (n,) at which to stop for the values (n,) to differ by no
-    more than `TURNED` of `whole` from the straight line between two stops: those of Ramer, Douglas and
-    Peucker (doi:10.1016/S0146-664X(72)80017-0).
+def chords(x: Floats, value: Floats, whole: float) -> Floats:
+    """Fractions (k,) of the path over positions or times x (n,) at which to stop for the values (n,) to
+    differ by no more than `TURNED` of `whole` from the straight line between two stops: those of Ramer,
+    Douglas and Peucker (doi:10.1016/S0146-664X(72)80017-0).
 
     >>> chords(np.linspace(0.0, 2.0, 5), np.array([0.0, 1.0, 2.0, 1.0, 0.0]), 2.0).tolist()
     [0.5]
     """
-    kept, open_ = [], [(0, len(place) - 1)]
+    kept, open_ = [], [(0, len(x) - 1)]
     while open_:
         first, last = open_.pop()
         ends = [first, last]
-        off = np.abs(value[first : last + 1] - np.interp(place[first : last + 1], place[ends], value[ends]))
+        off = np.abs(value[first : last + 1] - np.interp(x[first : last + 1], x[ends], value[ends]))
         worst = first + int(off.argmax())
         if last - first > 1 and off.max() > TURNED * whole:
             kept.append(worst)
             open_ += [(first, worst), (worst, last)]
-    return np.sort((place[kept] - place[0]) / (place[-1] - place[0]))
+    return np.sort((x[kept] - x[0]) / (x[-1] - x[0]))
 
 
 def over_places(signal: Any, begin: float, end: float, power: int) -> Floats:
-    """Stops on the way from `begin` to `end` along a table over the position; of a power of its values, that
+    """Stops on the path from `begin` to `end` along a table over the position; of a power of its values, that
     which acts.
     """
     low, high = min(begin, end), max(begin, end)
@@ -77,9 +77,9 @@ def over_places(signal: Any, begin: float, end: float, power: int) -> Floats:
         return np.zeros(0)
     knots = signal.position[(signal.position > low) & (signal.position < high)]
     edges = np.unique(np.concatenate([[low], knots, [high]]))
-    place = np.interp(np.arange(PARTS * (len(edges) - 1) + 1) / PARTS, np.arange(len(edges)), edges)
-    value = np.asarray(signal(place)) ** power
-    found = chords(place, value, float(np.ptp(np.asarray(signal(signal.position)) ** power)))
+    position = np.interp(np.arange(PARTS * (len(edges) - 1) + 1) / PARTS, np.arange(len(edges)), edges)
+    value = np.asarray(signal(position)) ** power
+    found = chords(position, value, float(np.ptp(np.asarray(signal(signal.position)) ** power)))
     return found if end > begin else np.sort(1.0 - found)
 
 
@@ -105,7 +105,7 @@ class Source:
         return controls.GivenVoltage(self.at(moment))
 
     def prescribed(self, seconds: float) -> bool:
-        """Whether the voltage has a course of its own in a step of so many seconds."""
+        """Whether the voltage changes by itself in a step of so many seconds."""
         return False
 
     def turns(self, begin: Moment, end: Moment) -> Floats:

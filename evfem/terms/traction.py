@@ -82,8 +82,8 @@ class PadState:
         each = zip(self.position, self.voltage.tolist(), pressing, self.load.tolist(), strict=True)
         on, kept, below = self.touching, self.memory, self.below
         return [
-            PadState(self.pad, self.surface, place, volts, force, on, kept, below, load)
-            for place, volts, force, load in each
+            PadState(self.pad, self.surface, position, volts, force, on, kept, below, load)
+            for position, volts, force, load in each
         ]
 
 
@@ -104,10 +104,10 @@ class PadPath:
         """The states at fractions (w,) of the straight path, from `begin` (P, dim) or the old position."""
         start, end = self.old.position if begin is None else begin, self.new.position
         pressed = self.old.pressed, self.new.pressed
-        place = start + fractions[:, None, None] * (end - start)
+        position = start + fractions[:, None, None] * (end - start)
         pressing = pressed[0] + fractions[:, None] * (pressed[1] - pressed[0])
         load = evenly(self.old.load, self.new.load, fractions)
-        return replace(self.old, position=place, voltage=voltage, load=load, pressing=pressing)
+        return replace(self.old, position=position, voltage=voltage, load=load, pressing=pressing)
 
     @property
     def trapezoidal(self) -> float:
@@ -266,7 +266,7 @@ class PadTraction(Room):
 
     def varies_over(self, pad: PadState) -> Floats:
         """Lengths (P,) in mm over which the pull changes, force over slope: derivatives of a run by
-        its parameters are differences over a small share of them.
+        its parameters are differences over a small fraction of them.
         """
         pull, rate = np.abs(self.forces(pad)[:, 1]), np.abs(self.by_gap(pad))
         return np.where(pull > 0.0, pull / np.maximum(rate, 1e-300), np.inf)
@@ -329,9 +329,9 @@ class PadTraction(Room):
         """Work (N mm) that the order in which charge and pad move adds to that of the end forces."""
         return 0.0
 
-    def of_one_charge(self, way: list[PadState]) -> Floats:
-        """Voltages (W,) in the states of a way at which the electrode has the charge of the last one."""
-        return np.array([pad.voltage for pad in way])
+    def of_one_charge(self, path: list[PadState]) -> Floats:
+        """Voltages (W,) in the states of a path at which the electrode has the charge of the last one."""
+        return np.array([pad.voltage for pad in path])
 
     def power_of_ends(self, path: PadPath, along: Floats) -> float:
         """Work along `along` (P, dim) by the mean of the end forces (N mm)."""
@@ -360,8 +360,8 @@ class PadTraction(Room):
         (P, dim), along `along` (P, dim), with the voltages that a `control` has there.
         """
         held = replace(path, old=replace(path.old, load=path.new.load))
-        way = held.at(fractions, np.full(fractions.shape, path.new.voltage), begin)
-        forces = self.column_law.forces_along(replace(way, voltage=control.along(self, way.states())))
+        pads = held.at(fractions, np.full(fractions.shape, path.new.voltage), begin)
+        forces = self.column_law.forces_along(replace(pads, voltage=control.along(self, pads.states())))
         power = np.sum(forces * along, axis=(1, 2))
         return np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(fractions)))
 

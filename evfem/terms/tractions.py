@@ -56,7 +56,7 @@ class NoPullOff(PullOff):
 
 def pull_off_of(attraction: Any) -> PullOff:
     """What watches a finger under a sum of tractions."""
-    return PullOff() if any(part.always for part in attraction.parts) else NoPullOff()
+    return PullOff() if any(traction.always for traction in attraction.parts) else NoPullOff()
 
 
 def sum_of(parts: Sequence[Any]) -> Any:
@@ -71,8 +71,8 @@ class Tractions(PadTraction):
 
     def __init__(self, parts: Sequence[Any]) -> None:
         self._parts = tuple(parts)
-        self.always = any(part.always for part in parts)
-        self.flows = any(part.flows for part in parts)
+        self.always = any(traction.always for traction in parts)
+        self.flows = any(traction.flows for traction in parts)
         self.direction = parts[0].direction
 
     @property
@@ -85,29 +85,29 @@ class Tractions(PadTraction):
         return self.parts[0].charging
 
     def acts(self, voltage: float) -> bool:
-        return any(part.acts(voltage) for part in self.parts)
+        return any(traction.acts(voltage) for traction in self.parts)
 
     def _sum(self, pad: PadState, of: Callable[[Any], Any]) -> Any:
         """The sum over the tractions that act on the pad."""
-        return np.asarray(sum(of(part) for part in self.parts if part.acts(pad.voltage)))
+        return np.asarray(sum(of(traction) for traction in self.parts if traction.acts(pad.voltage)))
 
     def memory(self, state: Any) -> dict[str, Floats]:
-        found = {f"forces.{part.name}": np.zeros_like(state.attraction) for part in self.parts[1:]}
-        for part in self.parts:
-            found |= begun(part, found, part.memory(state))
+        found = {f"forces.{traction.name}": np.zeros_like(state.attraction) for traction in self.parts[1:]}
+        for traction in self.parts:
+            found |= begun(traction, found, traction.memory(state))
         return found
 
     def restart(self, old: Any, target: Any) -> dict[str, Floats]:
-        return {name: kept for part in self.parts for name, kept in part.restart(old, target).items()}
+        return {name: kept for traction in self.parts for name, kept in traction.restart(old, target).items()}
 
     def begin(self, old: PadState, seconds: float) -> None:
-        for part in self.parts:
-            part.begin(old, seconds)
+        for traction in self.parts:
+            traction.begin(old, seconds)
 
     def accept(self, old: PadState, new: PadState) -> dict[str, Floats]:
-        found = {f"forces.{part.name}": part.forces(new) for part in self.parts[1:]}
-        for part in self.parts:
-            found |= ended(part, old.memory, part.accept(old, new))
+        found = {f"forces.{traction.name}": traction.forces(new) for traction in self.parts[1:]}
+        for traction in self.parts:
+            found |= ended(traction, old.memory, traction.accept(old, new))
         return found
 
     def forces(self, pad: PadState) -> Floats:
@@ -121,15 +121,15 @@ class Tractions(PadTraction):
         return self.parts[0].weights(pad)
 
     def restored(self, voltage: float) -> tuple[Any, Any]:
-        withheld, left = zip(*(part.restored(voltage) for part in self.parts), strict=True)
+        withheld, left = zip(*(traction.restored(voltage) for traction in self.parts), strict=True)
         return sum(withheld), sum(left)
 
     def gain_on_pressing(self, pad: PadState) -> Floats:
-        return self._sum(pad, lambda part: part.gain_on_pressing(pad))
+        return self._sum(pad, lambda traction: traction.gain_on_pressing(pad))
 
     def weakening(self, pad: PadState) -> Floats:
-        return self._sum(pad, lambda part: part.weakening(pad))
+        return self._sum(pad, lambda traction: traction.weakening(pad))
 
     def stiffness(self, pad: PadState) -> Entries:
-        found = [part.stiffness(pad) for part in self.parts if part.acts(pad.voltage)]
+        found = [traction.stiffness(pad) for traction in self.parts if traction.acts(pad.voltage)]
         return Entries.of(pad.position.size, [one[1:] for one in found])
