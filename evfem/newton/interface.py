@@ -78,10 +78,10 @@ class FrictionJumps:
             moved = touching & (side != self._side[number]) & ~self._released
             self._changes[number] += moved
             new = np.flatnonzero(moved & (self._changes[number] >= constants.CHANGES) & ~self.held)
-            self._hold(steps, new, np.maximum(side, self._side[number])[new] - 1, position)
+            self._pin(steps, new, np.maximum(side, self._side[number])[new] - 1, position)
             self._side[number] = side
 
-    def _hold(self, steps: Steps, new: Ints, which: Ints, position: Floats) -> None:
+    def _pin(self, steps: Steps, new: Ints, which: Ints, position: Floats) -> None:
         """Pins nodes `new` (k,) that reach the discontinuities `which` (k,) from their smoother side."""
         begin, axis = self._begin[new], steps.axis
         moved = position[new] - begin
@@ -96,9 +96,9 @@ class FrictionJumps:
         self.place[new] = crossed[from_smoother]
         self.lower[new] = np.minimum(before, behind)[from_smoother]
 
-    def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
+    def release(self, limit: Floats, shear: Floats, tolerance: float) -> bool:
         """Unpins nodes whose shear force is below the lower `limit` (P,); returns whether there were any."""
-        return self.unpin(self.held & (np.abs(shear) < limit - weak))
+        return self.unpin(self.held & (np.abs(shear) < limit - tolerance))
 
     def unpin(self, loose: Any) -> bool:
         """Unpins these nodes (P,) bool for the rest of the step; returns whether there were any."""
@@ -285,7 +285,7 @@ class Interface:
         penetrating = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
         return float(gap[penetrating].max()) if penetrating.any() else None
 
-    def _strayed(self, old: State, state: State, position: Floats) -> Any:
+    def _left_discontinuity(self, old: State, state: State, position: Floats) -> Any:
         """Pinned nodes (P,) that left their discontinuity: they slip where the coefficient is another one, or
         yield in the interface under more than its bound.
         """
@@ -306,12 +306,13 @@ class Interface:
         and friction cones. Unpins nodes that left their discontinuity of friction.
         """
         position, surface = self.on_display(state), self.surface_at(state)
-        short, weak, active = self.tolerance * self.length, self._force_tolerance(state), state.status != OPEN
+        short, tolerance = self.tolerance * self.length, self._force_tolerance(state)
+        active = state.status != OPEN
         every, resting = np.arange(len(position)), np.zeros(len(position))
         lower = self._bound(old, state, every, self.jumps.lower, resting)
-        if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), weak):
+        if self.jumps.release(lower, sizes(state.contact_force[:, 1:]), tolerance):
             return False
-        if self.jumps.unpin(self._strayed(old, state, position)):
+        if self.jumps.unpin(self._left_discontinuity(old, state, position)):
             return False
         normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         compliance = self.compliance(old)[active]
@@ -320,13 +321,13 @@ class Interface:
         slid, size = sizes(slip), sizes(shear)
         mu = self.friction(old, nodes, self.jumps.at(position)[active])
         limit = self._bound(old, state, nodes, mu, np.where(status == STICK, 0.0, slid))
-        sticks = (slid <= short) & (size <= limit + weak)
+        sticks = (slid <= short) & (size <= limit + tolerance)
         # a slip is known to `short`, and its direction accordingly
         against = sizes(shear + (limit / np.maximum(slid, 1e-300))[:, None] * slip)
         astray = np.where(slid > short, against - limit * short / np.maximum(slid, short), 0.0)
-        slips = (limit == 0.0) | ((np.abs(size - limit) <= weak) & (astray <= weak))
+        slips = (limit == 0.0) | ((np.abs(size - limit) <= tolerance) & (astray <= tolerance))
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
-        closed = (np.abs(gap) <= short) & (normal >= -weak)
+        closed = (np.abs(gap) <= short) & (normal >= -tolerance)
         return bool((closed & np.where(status == STICK, sticks, slips)).all())
 
 

@@ -106,7 +106,7 @@ CAPABILITIES = (
         |VoltageProblem|VoltageStep|electrode_charge|smallest_gap|\bdriven\b|_kept\b|course\.gap
         |last\.gap""",
     ),
-    capability("jumps of friction", r"\bjumps\b|FrictionJumps|\bSteps\b|friction_steps|pinned|_strayed"),
+    capability("jumps of friction", r"\bjumps\b|FrictionJumps|\bSteps\b|friction_steps|pinned|left_discont"),
     capability(
         "voltage ramp, path error",
         r"""\braised\b|FIRST_PART|VoltageProfile|TimeSignal|allowed\b|path_error|relative_difference""",
