@@ -99,7 +99,7 @@ class Playback:
 
 
 def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback | None = None) -> None:
-    """Write `profile` to `path` in one step; its ending says as what.
+    """Write `profile` to `path` in one step; the suffix sets the format.
 
     - `.csv`: position,voltage, to the last bit; needs no `playback`.
     - `.wav`: PCM; sample k is the voltage at the first position + k speed / rate, rounded to full_scale /

@@ -1,4 +1,4 @@
-"""What an amplifier sees of a finger about a loaded state: the electrical impedance over the frequency.
+"""What an amplifier sees of a finger about a loaded state: the electrical impedance versus frequency.
 
 The state is the last one of a scene. The nodes of the pad are in parallel, each a stack of skin, gap and
 insulator over its own gap and tributary area (`evfem.electrostatics.alternating`), with the separation of
@@ -31,7 +31,7 @@ from evfem.simulation.run import Run
 
 @dataclass(frozen=True, eq=False)
 class ElectricalImpedance:
-    """Impedance of a finger over the frequency, arrays (n,).
+    """Impedance of a finger versus frequency, arrays (n,).
 
     `frequency` in Hz; `impedance`, complex, in `unit`: ohm, of a plane finger without a depth ohm mm.
     """

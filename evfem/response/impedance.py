@@ -55,7 +55,7 @@ FORCE_STEP, LENGTH_STEP = 1e-7, 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Impedance:
-    """Stiffness of a finger over the frequency, arrays (n,).
+    """Stiffness of a finger versus frequency, arrays (n,).
 
     `frequency` in Hz; `stiffness`, complex, amplitude of the applied force over that of the bone's
     displacement, in `unit`: N/mm, in the plane per mm of depth. Its imaginary part is positive where the

@@ -68,11 +68,10 @@ class Uncertainty:
     def __repr__(self) -> str:
         """The check, and the standard deviations of the forces at the end."""
         one = self.checked
-        derived = f"{one.by_derivative:.4g} by its derivative"
+        derived = "no derivative" if np.isnan(one.by_derivative) else f"{one.by_derivative:.4g} by derivative"
         lines = [
             f"Uncertainty of {len(self.result.step)} steps to first order; check of linearity: "
-            f"{one.key} larger by its sd changes {one.column} at the end by {one.by_run:.4g} in a run, "
-            f"{'no derivative is there' if np.isnan(one.by_derivative) else derived}"
+            f"+1 sd of {one.key} changes {one.column} at the end by {one.by_run:.4g} in a run ({derived})"
         ]
         lines += [f"  {key}: {self.found.reasons[key]}" for key in self.found.missing]
         for name in ("normal_force", "tangential_force", "electrostatic_force"):

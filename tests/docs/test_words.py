@@ -59,3 +59,26 @@ def test_every_public_class_that_is_a_term_is_in_the_table():
     told = {name.split(".")[1] for name in NAMES if name.startswith("ev.")}
     assert classes - told == EXCEPTIONS - told
     assert classes >= EXCEPTIONS
+
+
+#: what newcomers search for -> the how-to page that answers
+SEARCHED = {
+    "posture": ("tilt", "pitch", "roll", "posture"),
+    "moist": ("moist", "humidity", "sweat", "water"),
+    "coat": ("silicone", "rubber", "glove", "screen protector"),
+    "electrodes": ("two electrodes", "ground"),
+    "rough": ("roughness",),
+    "friction": ("friction laws",),
+    "hand": ("grip", "robot", "hand"),
+    "accuracy": ("accurate", "noise of the", "digits"),
+}
+
+
+@pytest.mark.parametrize(("page", "words"), SEARCHED.items())
+def test_a_newcomers_words_lead_to_a_page_from_the_index_and_from_its_begin(page, words):
+    """They are in the line of the index, or in the page's first paragraph."""
+    index = (DOCS / "howto" / "index.md").read_text(encoding="utf-8")
+    line = re.search(rf"^- \[[^]]+\]\({page}\.md\).*?(?=^- |^$)", index, re.M | re.S)[0].lower()
+    begin = (DOCS / "howto" / f"{page}.md").read_text(encoding="utf-8").split("\n\n```")[0].lower()
+    assert [word for word in words if word not in line + begin] == []
+    assert any(word in line for word in words)

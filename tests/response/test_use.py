@@ -53,7 +53,7 @@ def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
     key, column, by_derivative, by_run = found.checked
     assert (key, column) == ("finger.materials.hypodermis.E", "tangential_force") or key == "surface.friction"
     assert by_run == pytest.approx(by_derivative, rel=0.05)
-    assert f"{key} larger by its sd" in repr(found)
+    assert f"+1 sd of {key} changes" in repr(found)
     drawn = ev.plotting.tornado(found, "tangential_force")
     assert [label.get_text() for label in drawn.get_yticklabels()][-1] == key
     band = ev.plotting.forces(found.result, sd=found.sd).collections[0].get_paths()[0].vertices
