@@ -170,13 +170,22 @@ def closest_name(name: str, known: Sequence[str]) -> list[str]:
 
     >>> closest_name("tilt", ["width", "posture"]), closest_name("widht", ["width", "posture"])
     (['posture'], ['width'])
+    >>> closest_name("fig3", ["fig13", "fig03"])
+    ['fig03']
     """
     from difflib import get_close_matches
 
+    if same := [one for one in known if _without_zeros(one) == _without_zeros(name)]:
+        return same[:1]
     small = {one.lower(): one for one in known}
     if meant := [one for one in MEANT.get(name.lower(), "").split() if one in known]:
         return meant[:1]
     return [small[one] for one in get_close_matches(name[:40].lower(), small, n=1)]
+
+
+def _without_zeros(name: str) -> str:
+    """A name in small letters, its numbers without leading zeros."""
+    return re.sub(r"(?<!\d)0+(?=\d)", "", name.lower())
 
 
 def combine(mistakes: Sequence[InputError]) -> InputError:

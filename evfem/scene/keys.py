@@ -116,13 +116,13 @@ def _unknown_key(
     mistake, close = unknown(key, name, known), closest_name(name, known)
     for meant in (name, *([] if close else MEANT.get(name.lower(), "").split())):
         if having := [kind for kind, cls in kinds.items() if meant in names(cls)]:
-            told = f"{meant} is a key of {tag} = {' | '.join(having)}"
-            return InputError(key, mistake.given, f"{mistake.allowed}; {told}")
+            told = f"{meant} with {tag} = {' | '.join(having)}? ({', '.join(known)})"
+            return InputError(key, mistake.given, told)
     home = next((table for table, classes in homes.items() if name in names(*classes)), "")
     here = re.sub(r"\[\d+\]", "", key.rpartition(".")[0])
     if home.strip("[]") in ("", here) or close:
         return mistake
-    return InputError(key, mistake.given, f"{mistake.allowed}; {name} stands in {home}")
+    return InputError(key, mistake.given, f"{name} in {home}? ({', '.join(known)})")
 
 
 def check_size(key: str, path: Path, most: int) -> None:
