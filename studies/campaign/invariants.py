@@ -16,6 +16,7 @@ import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.simulation.history import WIDTHS
 from evfem.simulation.result import COLUMNS
+from evfem.terms.friction import LEAST
 
 #: below these, N/mm and N, forces and energies are rounding: of the skin's stiffness, 1e-12 N/mm
 FORCE, ENERGY = 1e-5, 1e-9
@@ -23,6 +24,13 @@ FORCE, ENERGY = 1e-5, 1e-9
 TOLERANCE = 1e-6
 #: mm: how deep a node may sink in, and how far a node pinned to a jump of friction may be from it
 DEEPEST, NEAR = 1e-6, 1e-6
+#: columns that are empty where this force is not above `LEAST`
+NEEDS = {
+    "friction": "normal_force",
+    "stick_share": "normal_force",
+    "slip_share": "normal_force",
+    "apparent_friction": "applied_force",
+}
 #: statuses of a node in a frame
 OPEN, SLIP = 0, 2
 #: energies of the source's own balance
@@ -89,9 +97,15 @@ def remainder(result: ev.Result) -> Floats:
 
 
 def finite(scene: ev.Scene, result: ev.Result) -> Found:
-    """Every number of rows and frames, but the gaps off the pad and, in three dimensions, widths."""
+    """Every number of rows and frames, but the gaps off the pad, friction where nothing presses and, in three
+    dimensions, widths.
+    """
     left_out = {"motion", *(WIDTHS if result.mesh.dim == 3 else ())}
-    rows = ~np.isfinite([result[name] for name in result.columns if name not in left_out]).all(axis=0)
+    names = [name for name in result.columns if name not in left_out]
+    empty = np.zeros((len(names), len(result.step)), dtype=bool)
+    for name in (name for name in names if name in NEEDS):
+        empty[names.index(name)] = np.asarray(result[NEEDS[name]]) <= LEAST
+    rows = ~(empty | np.isfinite([result[name] for name in names])).all(axis=0)
     steps = [int(step) for step in result.step[rows]]
     for frame in result.frames:
         fields = (frame.displacement, frame.contact_pressure, frame.shear_traction, frame.cauchy_stress)

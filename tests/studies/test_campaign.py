@@ -209,6 +209,17 @@ def test_an_invariant_sees_what_breaks_it(correct, name):
     assert next(one.step for one in found if one.name == name) in (4, 5)
 
 
+@pytest.mark.parametrize("name", [name for name in invariants.NEEDS if name != "apparent_friction"])
+def test_friction_may_be_missing_where_nothing_presses_alone(correct, name):
+    scene, result = correct
+    lost = replace(
+        result, in_rooms=result.in_rooms | {name: np.where(result.step == 4, np.nan, result[name])}
+    )
+    assert [(one.name, one.step) for one in invariants.broken(scene, lost)] == [("finite", 4)]
+    lifted = replace(lost, normal_force=np.where(result.step == 4, 0.0, result.normal_force))
+    assert "finite" not in [one.name for one in invariants.broken(scene, lifted)]
+
+
 def test_a_target_that_is_missed_and_attraction_without_voltage_are_seen(correct):
     scene, result = correct
     deeper = replace(result, indentation=result.indentation + 1e-3)
