@@ -57,6 +57,7 @@ _NAMES = {
     "response.electrical": ("electrical_impedance",),
     "mesh.mesh": ("Mesh",),
     "reporting.page": ("report",),
+    "reporting.watch": ("StopWhen",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),
     "scene.probes": ("Probe",),

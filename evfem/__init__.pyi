@@ -60,6 +60,7 @@ from evfem.mesh.mesh import Mesh as Mesh
 from evfem.newton.strategy import Strategy as Strategy
 from evfem.planning.plan import plan as plan
 from evfem.reporting.page import report as report
+from evfem.reporting.watch import StopWhen as StopWhen
 from evfem.response.design import design as design
 from evfem.response.electrical import electrical_impedance as electrical_impedance
 from evfem.response.impedance import impedance as impedance

@@ -1,1 +1,1 @@
-"""A page about a run, for whoever has to judge it."""
+"""For whoever has to judge a run: what ends it in time, and a page about it."""

@@ -13,7 +13,7 @@ from evfem.simulation.result import SPATIAL, UNITS
 EXCEPTIONS = {
     *("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
     *("MeasuredCurve", "MeasuredValues", "Normal", "Parameter", "Samples", "Sweep", "Uniform"),
-    *("Output", "Playback", "Result"),
+    *("Output", "Playback", "Result", "StopWhen"),
 }
 TABLE = list(rows((DOCS / "words.md").read_text(encoding="utf-8")))
 NAMES = [name for *_, code in TABLE for name in re.findall(r"`(.+?)`", code)]
