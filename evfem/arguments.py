@@ -107,6 +107,8 @@ def _run_options(run: argparse.ArgumentParser) -> None:
     _scene_argument(run)
     _results(run)
     _again(run, "continue the interrupted run in the folder", "replace the files of an earlier run")
+    said = "tell every step, and keep the lines with their times in steps.log in the folder"
+    run.add_argument("-v", "--verbose", action="store_true", help=said)
     run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
 

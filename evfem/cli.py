@@ -194,10 +194,11 @@ def _schema(options: argparse.Namespace) -> None:
 def _run(options: argparse.Namespace) -> int:
     scene = _scene(options.scene)
     from evfem.common.storage import alone_in
+    from evfem.reporting.log import logged
     from evfem.runfolder import RunFolder, finished, kept, saved
 
     path = options.out or Path(f"{scene.name}-out")
-    with alone_in(path):
+    with alone_in(path), logged(path, options.verbose) as telling:
         resume = None
         if not options.overwrite:
             resume = (saved if options.resume else kept)(path, scene)
@@ -205,15 +206,15 @@ def _run(options: argparse.Namespace) -> int:
         if resume is not None and finished(path, scene, resume):
             notices.tell(folder.completed())
             return _report(folder.path, resume.rows, scene)
-        return _simulate(folder)
+        return _simulate(folder, telling)
 
 
-def _simulate(folder: RunFolder) -> int:
+def _simulate(folder: RunFolder, telling: Sequence[Observer]) -> int:
     """Run the scene of a folder, which keeps whatever has converged."""
     from evfem.simulation.run import simulate
 
     scene, path, progress = folder.scene, folder.path, sys.stderr.isatty()
-    observers: list[Observer] = [folder, _Interruption()]
+    observers: list[Observer] = [folder, *telling, _Interruption()]
     if not progress:
         observers.append(_Milestones())
     try:

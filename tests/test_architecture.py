@@ -111,7 +111,7 @@ ROOMS = {
         {"numpy", "scipy", "matplotlib", "PIL"},
         "labels figures fields finger footprint curves sweeps meshes movie response",
     ),
-    "reporting": ({"numpy"}, "watch page"),
+    "reporting": ({"numpy"}, "log watch page"),
     "studio": ({"numpy"}, "state page runs server"),
 }
 #: modules outside the rooms: below all of them, after one of them, and above all of them
