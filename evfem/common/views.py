@@ -15,7 +15,7 @@ from evfem.common.checks import fields_of, keys_of
 #: size of a curve in pixels
 WIDTH, HEIGHT = 240, 48
 LONGEST = 160
-#: columns of what `help` says
+#: columns of what `help` says, and of what objects say of themselves
 COLUMNS = 96
 #: what is shown as 0, in any of our units
 TINY = 1e-12
@@ -52,9 +52,29 @@ def plus(value: float) -> float:
     return 0.0 if abs(value) < TINY else float(value)
 
 
+def plainly(value: Any) -> str:
+    """The call that makes an object of a dataclass, without its defaults; nothing for an object of another
+    class, or with a representation of its own, or of fields that are not compared.
+    """
+    if not is_dataclass(value) or not hasattr(type(value).__repr__, "__wrapped__"):
+        return ""
+    try:
+        return called(type(value).__name__, changed(value))
+    except ValueError:  # of arrays
+        return ""
+
+
+def screen(lines: Sequence[str]) -> str:
+    """Lines broken between words, so that none is longer than a screen is wide."""
+    width: Any = {"break_long_words": False, "break_on_hyphens": False}
+    return "\n".join(fill(one, COLUMNS, subsequent_indent="    ", **width) for one in lines)
+
+
 def short(value: Any) -> str:
-    """The representation of a value on one line, cut to a readable length."""
-    text = " ".join(repr(value).split())
+    """The representation of a value on one line, cut to a readable length; of a dataclass what differs from
+    its defaults.
+    """
+    text = " ".join((plainly(value) or repr(value)).split())
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 

@@ -26,7 +26,7 @@ from evfem.common.checks import (
 )
 from evfem.common.digest import digest
 from evfem.common.rooms import BodyTerm, Foundation, Room, unchangeable
-from evfem.common.views import called, changed, short, table
+from evfem.common.views import called, changed, screen, short, table
 from evfem.electrostatics.breakdown import MODES
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
@@ -180,7 +180,7 @@ class Scene:
         lines.append("  " + ", ".join(called(type(m).__name__, changed(m)) for m in self.motion[:6]))
         lines[-1] += f", ... ({len(self.motion)} motions)" if len(self.motion) > 6 else ""
         own = [f"{name}={short(value)}" for name, value in self._unusual().items()]
-        return "\n".join([*lines, *(["  " + ", ".join(own)] if own else [])])
+        return screen([*lines, *(["  " + ", ".join(own)] if own else [])])
 
     def _repr_html_(self) -> str:
         """For notebooks: the same as a small table."""
@@ -271,7 +271,7 @@ IN_SPACE = "in space there is only one electrode that never ends, under a ground
 
 
 def _volts(voltage: object) -> str:
-    return f"{voltage:g} V" if isinstance(voltage, float) else type(voltage).__name__
+    return f"{voltage:g} V" if isinstance(voltage, float) else short(voltage)
 
 
 def _check_parts(scene: Scene) -> None:

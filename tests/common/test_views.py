@@ -41,21 +41,27 @@ def test_a_finger_shows_what_differs_from_table_2():
     assert rows(ev.FingerPad(ridges=False)._repr_html_())[1]["ridges"] == "none"
 
 
-def test_a_scene_shows_itself_in_at_most_three_lines():
+def test_a_scene_shows_what_is_not_as_usual_and_fits_a_screen():
     scene = ev.default_scene()
     lines = repr(scene).splitlines()
-    assert lines[0].startswith("Scene 'default': FingerPad() on Display(insulator=Layer(thickness=0.09")
-    assert lines[0].endswith("at 1000 V")
+    assert lines[0] == "Scene 'default': FingerPad() on Display(), Kaczmarek() at 1000 V"
     assert lines[1:] == ["  Press(force=0.05), Slide(distance=5.0)"]
+    soft = ev.Display(friction=0.1, elastic=ev.ElasticLayer(E=1.0, nu=0.4, thickness=1.0))
+    still, voltage = [ev.Press(force=0.1), ev.Wait(1e-3, steps=1)], ev.Sine(50.0, 9.0)
+    driven = replace(scene, motion=still, voltage=voltage, drive=ev.Drive(resolved=True))
+    text = repr(replace(driven, surface=soft, law=ev.StrongTroxel()))
+    told = " ".join(text.split())
+    assert "Display(friction=0.1, elastic=ElasticLayer(E=1.0, nu=0.4, thickness=1.0))" in told
+    assert "StrongTroxel() at Sine(frequency=50.0, amplitude=9.0)" in told
+    assert max(map(len, text.splitlines())) <= 96
     special = replace(
         scene, solver=ev.Solver(element="q1"), air_layer=False, motion=[ev.Press(force=0.1)] * 40
     )
     lines = repr(special).splitlines()
-    assert len(lines) == 3
-    assert lines[1].endswith("... (40 motions)")
-    assert "air_layer=False" in lines[2]
-    assert "element='q1'" in lines[2]
-    assert max(map(len, lines)) < 600
+    assert len(lines) == 4
+    assert lines[2] == "    Press(force=0.1), ... (40 motions)"
+    assert lines[3] == "  air_layer=False, solver=Solver(element='q1')"
+    assert max(map(len, lines)) <= 96
     still = ev.Scene(ev.FingerPad(), ev.Flat(), motion=[ev.Press(force=0.1)])
     assert "no attraction" in repr(still)
     signal = replace(scene, voltage=ev.VoltageProfile(np.linspace(0.0, 1.0, 1000), np.zeros(1000)))
