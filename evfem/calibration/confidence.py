@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import comb
 
 import numpy as np
 
@@ -77,3 +78,29 @@ def confidence(jacobian: Floats, residuals: Floats, names: Sequence[str]) -> Con
     ]
     padded = np.concatenate([singular, np.zeros(unknowns - len(singular))])
     return Confidence(errors, correlation, padded, tuple(told))
+
+
+def few_runs(residuals: Floats) -> float:
+    """Probability that residuals (n,) without a pattern have as few runs of one sign as these, or fewer: of
+    their signs every order is as likely (A. Wald, J. Wolfowitz, Ann. Math. Stat. 11 (1940) 147-162).
+
+    >>> few_runs(np.array([1.0, 2.0, 0.5, -1.0, -3.0, -0.2]))
+    0.1
+    """
+    above = residuals > 0.0
+    a, b = int(above.sum()), int((~above).sum())
+    most = 1 + int(np.sum(above[1:] != above[:-1]))
+    return sum(_orders(a, b, runs) for runs in range(1, most + 1)) / comb(a + b, a)
+
+
+def _orders(a: int, b: int, runs: int) -> int:
+    """Orders of a signs and b others that have so many runs."""
+    if a == 0 or b == 0:
+        return int(runs == 1)
+    half, odd = divmod(runs, 2)
+    if not half:
+        return 0
+    parts = [comb(n - 1, half - 1) for n in (a, b)]
+    if not odd:
+        return 2 * parts[0] * parts[1]
+    return comb(a - 1, half) * parts[1] + parts[0] * comb(b - 1, half)

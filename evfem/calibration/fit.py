@@ -16,7 +16,7 @@ shorter; one beside an accepted point is tried on the other side.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from evfem.calibration.confidence import confidence
+from evfem.calibration.confidence import confidence, few_runs
 from evfem.calibration.measured import Measured, MeasuredCurve, MeasuredValues, Question, check_units
 from evfem.calibration.parameters import Given, Parameters, number_at
 from evfem.calibration.result import FitResult
@@ -51,6 +51,8 @@ STEP, UNKNOWNS, SQUARES, MOST_STEPS = 1e-3, 1e-5, 1e-6, 60
 FAR, ROUGH, NOISE = 10.0, 0.3, 1e-6
 #: fraction of the distance between the bounds from which a parameter counts as at one
 AT_BOUND = 1e-3
+#: probability of so few runs of one sign below which residuals have a pattern, and residuals that are none
+PATTERN, TINY = 0.01, 1e-3
 
 
 def fit(
@@ -320,6 +322,7 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
     known = confidence(found.jac, found.fun, parameters.names)
     warnings = [*([] if found.success else [f"not finished after {MOST_STEPS} steps"]), *known.warnings]
     warnings += residuals.roughness(found.x, found.fun, found.jac)
+    patterns = _patterns(problem, found.fun)
     return FitResult(
         parameters=dict(parameters.free),
         values=parameters.values(found.x),
@@ -331,7 +334,7 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
         measured=problem.measured,
         predicted=problem.measured + found.fun * problem.scale,
         scale=problem.scale,
-        warnings=(*warnings, *_at_bounds(parameters, found.x), *_misfit(problem, found.fun)),
+        warnings=(*warnings, *_at_bounds(parameters, found.x), *_misfit(problem, found.fun), *patterns),
         tables=parameters.applied(problem.tables, {}, parameters.values(found.x)),
         paths=problem.paths,
         provenance={**problem.provenance, "runs": runs.computed, "finished": bool(found.success)},
@@ -346,6 +349,19 @@ def _at_bounds(parameters: Parameters, z: Floats) -> list[str]:
             bound = one.low if u - low < near else one.high
             told.append(f"{key} is at its bound {bound:g}: its interval says nothing beyond it")
     return told
+
+
+def _patterns(problem: _Problem, residuals: Floats) -> Iterator[str]:
+    """A warning for each curve whose residuals have too few runs of one sign to be errors (at 1 %)."""
+    first = 0
+    for one in problem.data:
+        own, first = residuals[first : first + len(one.values)], first + len(one.values)
+        if isinstance(one, MeasuredCurve) and np.abs(own).max() > TINY and few_runs(own) < PATTERN:
+            runs = 1 + int(np.sum((own[1:] > 0.0) != (own[:-1] > 0.0)))
+            yield (
+                f"the {len(own)} residuals of {one.column} over {one.over} have {runs} runs of one sign, too "
+                "few for errors of measurement: the scene has another shape, and intervals are too narrow"
+            )
 
 
 def _misfit(problem: _Problem, residuals: Floats) -> list[str]:

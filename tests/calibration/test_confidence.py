@@ -1,10 +1,12 @@
 """Intervals against scipy's curve_fit and a closed form, coverage, and what is not determined."""
 
+from itertools import combinations, groupby
+
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from evfem.calibration.confidence import confidence
+from evfem.calibration.confidence import confidence, few_runs
 
 X = np.linspace(0.0, 2.0, 12)
 
@@ -44,3 +46,14 @@ def test_strong_correlation_is_said_with_its_sign():
     assert warning.startswith(f"a and b are correlated by {known.correlation[0, 1]:.3f}: ")
     assert known.correlation[0, 1] < -0.99
     assert np.isfinite(known.errors).all()
+
+
+@pytest.mark.parametrize("signs", ["+++---", "+-+-+-", "++-++--+", "+---++++++", "-+", "++++"])
+def test_the_probability_of_few_runs_is_that_of_all_orders(signs):
+    """Every order of the same signs, one by one."""
+    numbers = np.array([1.0 if sign == "+" else -1.0 for sign in signs])
+    runs = len(list(groupby(signs)))
+    places = combinations(range(len(signs)), signs.count("+"))
+    orders = [["+" if i in chosen else "-" for i in range(len(signs))] for chosen in map(set, places)]
+    few = sum(len(list(groupby(order))) <= runs for order in orders)
+    assert few_runs(numbers) == few / len(orders)

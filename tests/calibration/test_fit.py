@@ -387,3 +387,24 @@ def test_what_is_not_determined_has_no_standard_deviation(path):
     assert np.isfinite(found.sd[E])
     with pytest.raises(InputError, match=rf"sd\.{layer}: given inf"):
         ev.uncertainty(found.scene, found.sd, correlation=found.correlation)
+
+
+def test_a_curve_of_another_shape_is_told_by_the_pattern_of_its_residuals(path, press):
+    """Twelve points that grow with the power 1.5 of what the scene does, and others with errors
+    alone, or a shape that is a ten thousandth off.
+    """
+    text = PRESS.replace("steps = 3", "steps = 12")
+    run = ev.simulate(scenefile.loads(text, press.parent))
+    (press.parent / "twelve.toml").write_text(text)
+    force, random = run.normal_force, np.random.default_rng(5)
+    largest = float(force.max())
+    curved = largest * (force / largest) ** 1.5
+    errs = force + 0.03 * largest * random.normal(size=12)
+    found = {}
+    slightly = force * (1.0 + 2e-4 * (force / largest - 0.5))
+    for name, values in {"curved": curved, "errs": errs, "slightly": slightly}.items():
+        curve = ev.MeasuredCurve("normal_force", "indentation", run.indentation, values)
+        found[name] = ev.fit(press.parent / "twelve.toml", curve, {E: BOUNDS[E]}, workers=1).warnings
+    (said,) = found["curved"]
+    assert said.startswith("the 12 residuals of normal_force over indentation have 2 runs of one sign")
+    assert found["errs"] == found["slightly"] == ()
