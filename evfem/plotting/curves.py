@@ -7,7 +7,7 @@ along the abscissa: any column that grows or falls, by default the one that the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle, groupby
+from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -128,8 +128,7 @@ def _of_one_kind(
         wide = np.asarray(sd[name])[_drawn(result, over)]
         ends = drawn[name] - wide, drawn[name] + wide
         ax.fill_between(x, *ends, color=texts[name][1], alpha=0.2, linewidth=0)
-    ax.legend()
-    return ax
+    return figures.add_legend(ax)
 
 
 def checked_over(over: str | None, result: Result) -> str:
@@ -174,8 +173,38 @@ def _mark_motions(ax: Axes, result: Result) -> None:
         text.set(ha="center", va="bottom")
 
 
-def history(result: Result, columns: Sequence[str], over: str | None = None) -> figures.Panels:
-    """Columns of the history over `over` (see `forces`), a panel for each kind of quantity."""
+def history(
+    result: Result,
+    columns: Sequence[str],
+    over: str | None = None,
+    ax: Axes | Sequence[Axes] | None = None,
+    log: str = "",
+) -> figures.Panels:
+    """Columns of the history over `over` (see `forces`), a panel for each kind of quantity.
+
+    Parameters
+    ----------
+    result
+        A result.
+    columns
+        Columns of its history; those of one kind and unit share a panel.
+    over
+        As in `forces`.
+    ax
+        Axes to draw in, as many as there are kinds, in their order; None: new ones.
+    log
+        "x", "y" or "xy": axes with logarithmic scales, on which all numbers must be above 0.
+
+    Returns
+    -------
+    Panels
+        The axes of the curves, from the top.
+
+    Raises
+    ------
+    InputError
+        Another column or `over`, another number of axes, or numbers that have no logarithm.
+    """
     if isinstance(columns, str) or not columns:
         raise InputError("columns", describe_value(columns), "a list of at least one column of the history")
     over = checked_over(over, result)
@@ -183,12 +212,16 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
     for name in columns:
         y = along(result, name, over)
         kinds.setdefault(labels.kind_of(name, result.units), {})[name] = y
-    panels, x = figures.new_panels(len(kinds), 1.0 + 1.9 * len(kinds)), along(result, over, over)
-    for ax, drawn in zip(panels, kinds.values(), strict=True):
-        texts = {labels.column_text(name, result.units[name]): y for name, y in drawn.items()}
-        label = labels.column_label if len(drawn) == 1 else labels.axis_label
-        lines = [(x, y, look) for y, look in figures.styled(texts)]
-        figures.curves(ax, lines, "", labels.on_lines(label(next(iter(drawn)), result.units)))
+    x, drawn = along(result, over, over), [y for kind in kinds.values() for y in kind.values()]
+    figures.check_log(log, x=x, y=np.concatenate(drawn))
+    panels = figures.panels_or_new(ax, len(kinds), 1.0 + 1.9 * len(kinds))
+    for panel, ((text, unit), lines) in zip(panels, kinds.items(), strict=True):
+        unit, factor = labels.shown_in(unit, *lines.values())
+        texts = {labels.column_text(name, result.units[name]): factor * y for name, y in lines.items()}
+        text = next(iter(texts)) if len(texts) == 1 else text
+        looks = [(x, y, look) for y, look in figures.styled(texts)]
+        figures.curves(panel, looks, "", labels.on_lines(labels.with_unit(text, unit)))
+        panel.set(**{f"{axis}scale": "log" for axis in log})
     _marked(panels[0], over, result).set_xlabel("")
     panels[-1].set_xlabel(labels.column_label(over, result.units))
     return panels
@@ -204,14 +237,14 @@ def probes(
         raise InputError("result", "a run without probes", "a run of a scene with Output(probes=...)")
     over = checked_over(over, result)
     rows, x, lines = _drawn(result, over), along(result, over, over), []
-    for probe, look in figures.styled(result.probes):
-        values = probe.component(quantity)[rows]
-        for place, y, style in zip(probe.position, values.T, cycle(figures.STYLES)):
-            label = f"{look['label']} ({', '.join(f'{at + 0.0:.3g}' for at in place)})"
-            lines.append((x, y, look | {"label": label, "linestyle": style}))
-    ax = _marked(figures.curves(ax, lines, "", labels.field_label(quantity)), over, result)
-    ax.legend(fontsize="small")
-    return ax
+    values = {name: probe.component(quantity)[rows] for name, probe in result.probes.items()}
+    unit, factor = labels.shown_in(labels.field_unit(quantity), *values.values())
+    for name, probe, looks in figures.probe_looks(result.probes):
+        for place, y, look in zip(probe.position, values[name].T, looks, strict=True):
+            label = f"{name} at ({', '.join(f'{at + 0.0:.3g}' for at in place)}) mm"
+            lines.append((x, factor * y, look | {"label": label}))
+    ax = figures.curves(ax, lines, "", labels.field_label(quantity, unit))
+    return figures.add_legend(_marked(ax, over, result), fontsize="small")
 
 
 def compare(
@@ -219,9 +252,9 @@ def compare(
 ) -> Axes:
     """The same column of several results, each by its name, over `over` (see `forces`)."""
     found, over = _over(results, over)
-    ax = _column(ax, found, column, over, labels.column_label(column, labels.units_of(found)))
-    ax.legend()
-    return ax
+    return figures.add_legend(
+        _column(ax, found, column, over, labels.column_label(column, labels.units_of(found)))
+    )
 
 
 def force_indentation(results: labels.Results, ax: Axes | None = None) -> Axes:
@@ -298,7 +331,7 @@ def spectrum(
 
 
 def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) -> Axes:
-    """Contact pressure, and shear and attraction if there is any (MPa), of the pad over its x (mm)."""
+    """Contact pressure, and shear and attraction if there is any, of the pad over its x (mm)."""
     check_plane(result.mesh)
     shown = frame_of(result, frame)
     pad = np.flatnonzero(np.isfinite(shown.gap))
@@ -309,7 +342,9 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
         for name, (colour, style) in TRACTIONS.items()
         if np.any((y := getattr(shown, name)[pad]) != 0.0) or name == "contact_pressure"
     ]
-    ax = figures.curves(ax, lines, "x (mm)", "traction (MPa)")
+    unit, factor = labels.shown_in("MPa", *(y for _, y, _ in lines))
+    lines = [(x, factor * y, look) for x, y, look in lines]
+    ax = figures.curves(ax, lines, "x (mm)", labels.with_unit("traction", unit))
     touching = x[shown.contact_status[pad] > 0]
     if len(touching):
         margin = 0.25 * (touching[-1] - touching[0]) + 0.2

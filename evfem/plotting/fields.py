@@ -59,7 +59,7 @@ FIELDS = (*CELL_FIELDS, "displacement", *POINT_FIELDS)
 FROM_ZERO = ("von_mises", "gap", "contact_pressure", "electrostatic_traction")
 MIDDLES = {**dict.fromkeys(STRESSES, 0.0), "J": 1.0, "shear_traction": 0.0, "surface_sink": 0.0}
 Window = tuple[float, float, float, float]
-#: most arrows across a picture, and the longest one as a fraction of the surface's depth in it
+#: most arrows across a picture, and the longest one as a fraction of the surface's least depth in it
 MOST_ARROWS, LONGEST = 36, 0.8
 TRACTIONS = ("contact_pressure", "shear_traction", "electrostatic_traction")
 
@@ -69,7 +69,7 @@ def values_of(frame: Frame, field: str) -> Floats:
     if field in STRESSES:
         return frame.cauchy_stress[:, STRESSES.index(field)]
     if field == "displacement":
-        return np.hypot(*frame.displacement.T)
+        return np.hypot.reduce(frame.displacement, axis=1)
     return getattr(frame, field)
 
 
@@ -224,15 +224,28 @@ def half_edges(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
     return np.concatenate([pairs[:, 0], pairs[:, 1]]), halves
 
 
-def draw_arrows(ax: Axes, mesh: Mesh, frame: Frame, field: str, height: Height, window: Window) -> Any:
-    """Tractions on the finger as arrows (a Quiver), of neighbouring nodes that of the largest traction."""
+def reach_of(height: Height, window: Window) -> float:
+    """Length of the longest arrow that has room in a window, as a fraction of the window's width."""
+    left, right, bottom, top = window
+    room = float(height(np.linspace(left, right, 500)).min()) - bottom
+    return LONGEST * max(room, 0.05 * (top - bottom)) / (right - left)
+
+
+def draw_arrows(
+    ax: Axes, mesh: Mesh, frame: Frame, field: str, height: Height, window: Window, scale: Scale, reach: float
+) -> Any:
+    """Tractions on the finger as arrows (a Quiver), of neighbouring nodes that of the largest traction.
+
+    `reach`, a fraction of the window's width, is the length of the largest traction of the scale, and of what
+    lies beyond: panels with one scale and reach have one scale of arrows.
+    """
     values, position = values_of(frame, field), mesh.points + frame.displacement
     nodes = _thinned(position, np.where(within(position, window), np.abs(values), 0.0), window)
     if not nodes.size:
         return None
-    x, size = position[nodes, 0], values[nodes] / np.abs(values[nodes]).max()
+    x, size = position[nodes, 0], np.clip(values[nodes] / max(abs(scale.low), abs(scale.high)), -1.0, 1.0)
     at, width = np.column_stack([x, height(x)]), window[1] - window[0]
-    longest = LONGEST * max(at[:, 1].min() - window[2], 0.05 * (window[3] - window[2]))
+    longest = reach * width
     normal = _normals(height, x, 1e-4 * width)
     if field == "contact_pressure":
         arrows, pivot = size[:, None] * normal * longest, "tip"

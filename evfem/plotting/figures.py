@@ -15,12 +15,13 @@ import io
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import cycle
+from itertools import cycle, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.errors import InputError, describe_value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +32,8 @@ BLUE, VERMILION, PURPLE, YELLOW = "#0072B2", "#D55E00", "#CC79A7", "#F0E442"
 #: one after the other, for curves that have no colour of their own, with styles that differ in print
 CURVES = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 STYLES = ("-", "--", "-.", ":")
+#: one for each round of the colours
+MARKERS = "os^Dv<>P"
 REGIONS = (SKY, ORANGE, BLUE, GREEN, VERMILION, PURPLE, YELLOW)
 #: contact statuses 0, 1, 2
 STATUS = {"open": "#B8B8B8", "stick": BLUE, "slip": VERMILION}
@@ -41,6 +44,7 @@ TISSUE, GROUND, EDGE = "#EFEBE7", "#D0D0D0", "0.25"
 FILES_ONLY = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
 WIDTH, HEIGHT = 7.0, 4.5  # of a figure, in inches
 SLENDER = 25.0  # height of a colour bar over its width
+WIDER = 1.1  # a title over its axes, at most
 #: triangles of smooth colours in a picture, and parts of a side of one, at most
 PARTS, FINEST = 40_000, 6
 #: x, y and look of a curve
@@ -87,10 +91,77 @@ def new_panels(rows: int, height: float, columns: int = 1) -> Panels:
     return Panels(axes.ravel())
 
 
+def panels_or_new(given: Axes | Sequence[Axes] | None, rows: int, height: float) -> Panels:
+    """The given axes, one or a sequence of them, or those of a new figure; InputError for another number."""
+    if given is None:
+        return new_panels(rows, height)
+    panels = Panels(np.ravel(given).tolist())
+    if len(panels) != rows:
+        raise InputError("ax", f"{len(panels)} axes", f"{rows}, one for each kind of quantity")
+    return panels
+
+
 def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:
     """What stands behind each name, and the look of its curve: label, colour and style."""
     for (name, what), colour, style in zip(named.items(), cycle(CURVES), cycle(STYLES), strict=False):
         yield what, {"label": name, "color": colour, "linestyle": style}
+
+
+def probe_looks(named: Mapping[str, Any]) -> Iterator[tuple[str, Any, list[dict[str, Any]]]]:
+    """Name, probe and looks of its points: colours are the probes', styles their points'. Where these begin
+    again, other markers tell the curves apart; a probe's first marker is that of its points in pictures.
+    """
+    rounds = 1 + (len(named) - 1) // len(CURVES)
+    for number, (name, probe) in enumerate(named.items()):
+        again, colour = divmod(number, len(CURVES))
+        looks = [
+            {
+                "color": CURVES[colour],
+                "linestyle": STYLES[point % len(STYLES)],
+                "marker": MARKERS[(again + rounds * (point // len(STYLES))) % len(MARKERS)],
+                "markevery": 0.1,
+                "markersize": 4.5,
+            }
+            for point in range(len(probe.position))
+        ]
+        yield name, probe, looks
+
+
+def add_legend(ax: Axes, **options: Any) -> Axes:
+    """The axes with a legend: where it hides no curve, else at their right if the figure makes room there."""
+    legend, figure = ax.legend(**options), whole_figure(ax)
+    if figure.get_layout_engine() is None:
+        return ax
+    figure.draw_without_rendering()
+    box = legend.get_window_extent()
+    drawn = [line.get_transform().transform_path(line.get_path()) for line in ax.get_lines()]
+    if any(path.intersects_bbox(box, filled=False) for path in drawn if len(path.vertices)):
+        ax.legend(**options, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    return ax
+
+
+def add_title(ax: Axes, text: str, size: str = "medium") -> Axes:
+    """The axes with a title in lines that are no wider than they are, broken after commas."""
+    figure, words = whole_figure(ax), text.split(", ")
+    title, lines = ax.set_title(text, fontsize=size), 1
+    while lines < len(words):
+        figure.draw_without_rendering()
+        if title.get_window_extent().width <= WIDER * ax.get_window_extent().width:
+            break
+        lines += 1
+        ends = [round(len(words) * line / lines) for line in range(lines + 1)]
+        parts = (", ".join(words[a:b]) for a, b in pairwise(ends))
+        title.set_text(",\n".join(parts))
+    return ax
+
+
+def check_log(log: str, **values: Any) -> None:
+    """Raises InputError unless `log` is "", "x", "y" or "xy", and the values along these axes are above 0."""
+    if log not in ("", "x", "y", "xy"):
+        raise InputError("log", describe_value(log), '"", "x", "y" or "xy"')
+    for axis in log:
+        if not np.all(np.asarray(values[axis]) > 0.0):
+            raise InputError("log", describe_value(log), f"numbers above 0 along {axis}")
 
 
 def curves(ax: Axes | None, lines: Sequence[Line], xlabel: str, ylabel: str) -> Axes:
@@ -100,9 +171,7 @@ def curves(ax: Axes | None, lines: Sequence[Line], xlabel: str, ylabel: str) -> 
         ax.plot(x, y, **{"marker": "o" if len(x) < 3 else None, **look})
     ax.set(xlabel=xlabel, ylabel=ylabel)
     ax.grid(alpha=0.3)
-    if len(lines) > 1:
-        ax.legend()
-    return ax
+    return add_legend(ax) if len(lines) > 1 else ax
 
 
 def shaded(ax: Axes, points: Floats, triangles: Ints, values: Floats) -> Any:

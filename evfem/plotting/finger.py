@@ -14,7 +14,7 @@ from evfem.common.checks import choice
 from evfem.errors import InputError, describe_value
 from evfem.mesh.mesh import Mesh
 from evfem.plotting import fields, figures
-from evfem.plotting.labels import field_label, named
+from evfem.plotting.labels import field_label, field_unit, named, shown_in
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
@@ -86,9 +86,8 @@ def picture(view: Any, near: Near, limits: tuple[float | None, float | None], ax
         ax = figures.axes_or_new(None, figure_height(window))
         figures.whole_figure(ax).set_layout_engine("compressed")
     mapped = view.draw(ax, window, scale)
-    ax.set_title(told(view.result, view.frame), fontsize="medium")
-    label_bar(figures.add_colorbar(mapped, ax, field_label(view.field), scale.extend), view.field)
-    return ax
+    label_bar(figures.add_colorbar(mapped, ax, "", scale.extend), view.field, scale)
+    return figures.add_title(ax, told(view.result, view.frame))
 
 
 def side_by_side(
@@ -102,8 +101,8 @@ def side_by_side(
 ) -> figures.Panels:
     """The deformed fingers of several results by their names: whole above, close-ups below.
 
-    All are coloured by one field on one scale, as `deformed` does it; `near=None` leaves out the
-    close-ups. The panels come row by row.
+    All are coloured by one field on one scale, as `deformed` does it, and arrows are as long for as large a
+    traction within a row; `near=None` leaves out the close-ups. The panels come row by row.
     """
     choice("field", field, fields.FIELDS)
     views = {name: View(one, fields.frame_of(one, frame), field) for name, one in named(results).items()}
@@ -116,17 +115,19 @@ def side_by_side(
     figure = figures.new_figure(sum(tall) + 0.75 * len(rows), ACROSS * len(views) + 1.0)
     axes = figure.subplots(len(rows), len(views), squeeze=False, height_ratios=tall)
     for panels, row in zip(axes, rows, strict=True):
+        reach = min(view.reach(window) for view, window in zip(views.values(), row, strict=True))
         for ax, view, window in zip(panels, views.values(), row, strict=True):
-            mapped = view.draw(ax, window, scale)
+            mapped = view.draw(ax, window, scale, reach)
             ax.set_title(told(view.result, view.frame), fontsize="x-small")
-    for ax, name in zip(axes[0], views, strict=True):
-        ax.set_title(name, fontsize="medium")
     for ax in axes[:, 1:].ravel():
         ax.set_ylabel("")
     for ax in axes[:-1].ravel():
         ax.set_xlabel("")
-    bar = figure.colorbar(mapped, ax=axes, label=field_label(field), shrink=0.8, extend=scale.extend)
-    label_bar(bar, field)
+    label_bar(figure.colorbar(mapped, ax=axes, shrink=0.8, extend=scale.extend), field, scale)
+    for ax, (name, view) in zip(axes[0], views.items(), strict=True):
+        figures.add_title(ax, name if near else f"{name}, {told(view.result, view.frame)}")
+    for ax in axes[1:].ravel():
+        figures.add_title(ax, ax.get_title(), "x-small")
     return figures.Panels(axes.ravel())
 
 
@@ -165,8 +166,12 @@ class View:
         there = fields.within(place, window)
         return values[there & np.isfinite(self.frame.gap)] if self.field in POINT_FIELDS else values[there]
 
-    def draw(self, ax: Axes, window: fields.Window, scale: fields.Scale) -> Any:
-        """Draw the view into axes, and return what a colour bar needs."""
+    def reach(self, window: fields.Window) -> float:
+        """Length of the longest arrow as a fraction of a window's width."""
+        return fields.reach_of(fields.height_of(self.result, self.frame), window)
+
+    def draw(self, ax: Axes, window: fields.Window, scale: fields.Scale, reach: float = 0.0) -> Any:
+        """Draw the view into axes, with arrows of a `reach` (0: its own); returns what a colour bar needs."""
         mesh, points = self.result.mesh, self.points
         height = fields.height_of(self.result, self.frame)
         if self.field in POINT_FIELDS:
@@ -180,7 +185,8 @@ class View:
         _draw_surface(ax, height, window)
         _mark_probes(ax, self.result, self.frame, window)
         if self.field in fields.TRACTIONS:
-            fields.draw_arrows(ax, mesh, self.frame, self.field, height, window)
+            longest = reach or self.reach(window)
+            fields.draw_arrows(ax, mesh, self.frame, self.field, height, window, scale, longest)
         ax.set(xlim=window[:2], ylim=window[2:], aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
         return mapped
 
@@ -238,8 +244,12 @@ def told(result: Result, frame: Frame) -> str:
     return text
 
 
-def label_bar(bar: Any, field: str) -> None:
-    """The statuses by their names."""
+def label_bar(bar: Any, field: str, scale: fields.Scale) -> None:
+    """What a bar's colours are, with its unit; the statuses by their names."""
+    unit, factor = shown_in(field_unit(field), [scale.low, scale.high])
+    bar.set_label(field_label(field, unit))
+    if factor != 1.0:
+        bar.ax.yaxis.set_major_formatter(lambda value, _: f"{factor * value:g}")
     if field == "contact_status":
         bar.set_ticks(range(len(figures.STATUS)), labels=list(figures.STATUS))
         bar.ax.tick_params(length=0)
@@ -290,7 +300,7 @@ def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: fields.Window) -> N
 
 def _mark_probes(ax: Axes, result: Result, frame: Frame, window: fields.Window) -> None:
     """The probes' points where the tissue has them, in the colours of their histories, and their names."""
-    for probe, look in figures.styled(result.probes):
+    for name, probe, (look, *_) in figures.probe_looks(result.probes):
         moved = probe.displacement[result.step == frame.step]
         shown = [
             place
@@ -298,10 +308,10 @@ def _mark_probes(ax: Axes, result: Result, frame: Frame, window: fields.Window) 
             if fields.within(place[None], window)[0]
         ]
         for place in shown:
-            ax.plot(*place, "o", color=look["color"], markersize=6.0, markeredgecolor="white", zorder=3.0)
+            ax.plot(*place, look["marker"], color=look["color"], markersize=6.0, mec="white", zorder=3.0)
         if shown:
             box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-            text = ax.annotate(look["label"], shown[-1], (6.0, 0.0), textcoords="offset points", bbox=box)
+            text = ax.annotate(name, shown[-1], (6.0, 0.0), textcoords="offset points", bbox=box)
             text.set(color=look["color"], va="center", fontsize="small", zorder=3.0)
 
 

@@ -9,6 +9,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from evfem.common.checks import choice
 from evfem.errors import InputError
 from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL, UNITS
@@ -86,16 +88,34 @@ def on_lines(label: str) -> str:
     return textwrap.fill(label, LINE, break_long_words=False, break_on_hyphens=False)
 
 
-def field_label(name: str) -> str:
-    """A field of a frame, or a quantity of a probe or a component of it, with its unit.
+def shown_in(unit: str, *values: Any) -> tuple[str, float]:
+    """Unit that values of a unit are drawn in, and what they are multiplied by: stresses below 1 MPa
+    throughout, as those of soft bodies, are in kPa.
+
+    >>> shown_in("MPa", [0.03, -0.2]), shown_in("MPa", [0.03], [2.0]), shown_in("mm", [0.03])
+    (('kPa', 1000.0), ('MPa', 1.0), ('mm', 1.0))
+    """
+    if unit != "MPa" or any(np.abs(one).max(initial=0.0) >= 1.0 for one in map(np.asarray, values)):
+        return unit, 1.0
+    return "kPa", 1000.0
+
+
+def field_unit(name: str) -> str:
+    """Unit of a field of a frame, or of a quantity of a probe."""
+    return next((unit for one, unit in OTHER_UNITS.items() if name.startswith(one)), "MPa")
+
+
+def field_label(name: str, unit: str | None = None) -> str:
+    """A field of a frame, or a quantity of a probe or a component of it, with its unit, or another one.
 
     >>> field_label("cauchy_stress_yy"), field_label("J"), field_label("displacement_x")
     ('Cauchy stress yy (MPa)', 'volume ratio J', 'displacement x (mm)')
+    >>> field_label("von_mises", "kPa")
+    'von Mises stress (kPa)'
     """
     text = name.replace("_", " ").replace("cauchy", "Cauchy").replace("green", "Green")
     text = {"von_mises": "von Mises stress", "J": "volume ratio J"}.get(name, text)
-    unit = next((unit for one, unit in OTHER_UNITS.items() if name.startswith(one)), "MPa")
-    return with_unit(text, unit)
+    return with_unit(text, field_unit(name) if unit is None else unit)
 
 
 def _computed(key: str) -> bool:

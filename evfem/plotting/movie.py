@@ -24,7 +24,7 @@ from evfem.plotting.fields import FIELDS, Scale, Window, scale_of
 from evfem.plotting.figures import BLACK, BLUE, GREEN, VERMILION, WIDTH, add_colorbar
 from evfem.plotting.finger import Near, View, figure_height, label_bar, told
 from evfem.plotting.footprint import SkinView
-from evfem.plotting.labels import field_label, on_lines
+from evfem.plotting.labels import on_lines
 from evfem.simulation.result import POINT_FIELDS, Result
 
 if TYPE_CHECKING:
@@ -158,8 +158,8 @@ class Reel:
             mapped = view.draw(above, window, self.scale)
             above.set_title(told(result, view.frame), fontsize="medium")
             if bar is None:
-                bar = add_colorbar(mapped, above, field_label(field), self.scale.extend)
-                label_bar(bar, field)
+                bar = add_colorbar(mapped, above, "", self.scale.extend)
+                label_bar(bar, field, self.scale)
                 self.figure.align_ylabels([above, below])
             at = getattr(result, column)[result.step == view.frame.step]
             marks = [below.axvline(x, color="0.3", linewidth=1.0) for x in at]

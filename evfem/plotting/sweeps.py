@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 
 #: steps of a grid are uneven where the largest is so many times the smallest
 UNEVEN = 3.0
-#: so many places have their number on a logarithmic abscissa
+#: so many places have their number on an axis
 FEW = 8
-#: one for each line, told apart without colour
-MARKERS = "os^Dv<>P"
 
 
 def sweep(
@@ -38,9 +36,9 @@ def sweep(
     """
     rows = _done(table, x, y, *([by] if by else []))
     names = _names(rows, x)
-    _check_log(log, rows, {"x": x, "y": y})
+    figures.check_log(log, x=_numbers(rows, x), y=_numbers(rows, y))
     groups, lines = ({row[by]: row[by] for row in rows} if by else {None: None}), []
-    for (value, look), marker in zip(figures.styled(groups), cycle(MARKERS), strict=False):
+    for (value, look), marker in zip(figures.styled(groups), cycle(figures.MARKERS), strict=False):
         chosen = [row for row in rows if by is None or row[by] == value]
         across = np.array([names.index(row[x]) if names else row[x] for row in chosen])
         up, order = np.array([row[y] for row in chosen]), np.argsort(across, kind="stable")
@@ -55,9 +53,7 @@ def sweep(
     if names:
         ax.set_xticks(range(len(names)), [str(name) for name in names])
         ax.margins(x=0.15)
-    if by is not None:
-        ax.legend()
-    return ax
+    return ax if by is None else figures.add_legend(ax)
 
 
 def sweep_histogram(table: SweepResult, column: str, ax: Axes | None = None) -> Axes:
@@ -120,20 +116,17 @@ def _ranked(x: Any, y: Any) -> float:
     return float(np.corrcoef(rankdata(x), rankdata(y))[0, 1])
 
 
-def _check_log(log: str, rows: Sequence[dict[str, Any]], keys: dict[str, str]) -> None:
-    if log not in ("", "x", "y", "xy"):
-        raise InputError("log", describe_value(log), '"", "x", "y" or "xy"')
-    for axis in log:
-        if not all(type(row[keys[axis]]) in (int, float) and row[keys[axis]] > 0.0 for row in rows):
-            raise InputError("log", describe_value(log), f"numbers above 0 along {axis}")
+def _numbers(rows: Sequence[dict[str, Any]], key: str) -> list[float]:
+    """A column, with NaN for what is no number."""
+    return [row[key] if type(row[key]) in (int, float) else math.nan for row in rows]
 
 
 def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = None) -> Axes:
     """Column `value` of a sweep of a grid as colours over its columns `x` and `y` of numbers.
 
-    Points without a number stay white. Where the numbers along an axis are far from evenly spaced,
-    as 0.001, 0.01, 0.1, their cells are all of one width, with the numbers below them. Raises
-    InputError where two points have the same x and y.
+    Points without a number stay white. An axis of few numbers has its ticks there. Where the numbers along
+    an axis are far from evenly spaced, as 0.001, 0.01, 0.1, their cells are all of one width, with the
+    numbers below them. Raises InputError where two points have the same x and y.
     """
     rows = _done(table, x, y, value)
     if not all(isinstance(row[key], (int, float)) for row in rows for key in (x, y)):
@@ -181,6 +174,8 @@ def _value(table: SweepResult, by: str | None, value: Any) -> str:
 def _sides(places: Any, axis: Any) -> Any:
     steps = np.diff(places)
     if steps.size == 0 or steps.max() <= UNEVEN * steps.min():
+        if places.size <= FEW:
+            axis.set_ticks(places, [f"{tick:g}" for tick in places])
         return _edges(places)
     axis.set_ticks(range(places.size), [f"{tick:g}" for tick in places])
     return _edges(np.arange(places.size))

@@ -12,7 +12,7 @@ from tools.refusals import refuses
 
 import evfem as ev
 from evfem.plotting import FIELDS, contact_pressure, deformed, figures, regions, side_by_side
-from evfem.plotting.fields import patches, scale_of
+from evfem.plotting.fields import TRACTIONS, patches, scale_of
 from evfem.scene.file import dump
 from evfem.simulation.model import placed
 
@@ -30,7 +30,7 @@ def test_every_field_is_drawn_on_every_kind_of_cell(field, kind):
     assert ax.get_aspect() == 1.0
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (mm)", "y (mm)")
     label = bar_of(ax).get_ylabel()
-    assert label.endswith((" (MPa)", " (mm)")) or field in ("J", "contact_status")
+    assert label.endswith((" (kPa)" if field in TRACTIONS else " (MPa)", " (mm)")) or field in ("J", "contact_status")
     assert label.split()[0].lower() in (field.split("_")[0].lower(), "volume")
 
 
@@ -204,6 +204,18 @@ def with_scene(result, surface):
     return replace(result, provenance=result.provenance | {"parameters": dump(scene)})
 
 
+def test_small_stresses_are_said_in_kPa_and_their_colours_stay_those_of_MPa():
+    result = fake_result()
+    ax = deformed(result, "contact_pressure", vmax=0.02)
+    bar = bar_of(ax)
+    assert bar.get_ylabel() == "contact pressure (kPa)"
+    assert bar.get_ylim() == (0.0, 0.02)
+    ax.figure.draw_without_rendering()
+    said = [float(text.get_text()) for text in bar.get_yticklabels()]
+    np.testing.assert_allclose(said, 1000.0 * bar.get_yticks())
+    assert bar_of(deformed(result, "von_mises", vmin=0.0, vmax=3.0)).get_ylabel() == "von Mises stress (MPa)"
+
+
 def test_the_surface_is_that_of_the_scene_where_it_touches_at_first():
     surface = ev.Sinusoid(friction=0.1)
     result = with_scene(fake_result("quad9"), surface)
@@ -304,9 +316,9 @@ def test_contact_pressure_is_drawn_along_the_current_x_of_the_pad():
     pad = result.mesh.node_sets["pad"]
     x = result.mesh.points[pad, 0] + frame.displacement[pad, 0]
     np.testing.assert_array_equal(lines["contact pressure"].get_xdata(), x)
-    np.testing.assert_array_equal(lines["contact pressure"].get_ydata(), frame.contact_pressure[pad])
+    np.testing.assert_allclose(lines["contact pressure"].get_ydata(), 1000.0 * frame.contact_pressure[pad])
     assert set(lines) == {"contact pressure", "shear traction", "electrostatic traction"}
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (mm)", "traction (MPa)")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (mm)", "traction (kPa)")
 
 
 def test_unknown_fields_frames_and_windows_get_a_sentence():

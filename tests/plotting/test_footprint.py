@@ -66,7 +66,7 @@ def test_statuses_fill_the_shares_of_the_nodes_with_their_colour(result):
 def test_shear_is_a_magnitude_and_has_colours_from_zero(result):
     bar = bar_of(footprint(result, "shear_traction"))
     assert bar.get_ylim()[0] == 0.0
-    assert "shear traction (MPa)" in (bar.get_ylabel(), bar.get_xlabel())
+    assert "shear traction (kPa)" in (bar.get_ylabel(), bar.get_xlabel())
 
 
 def test_a_close_up_is_around_what_touches_or_is_nearest(result):
