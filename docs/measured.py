@@ -25,7 +25,19 @@ from pathlib import Path
 from typing import Any
 
 import others
-from sentences import Found, filled, fingerprint, fingertip, fringe, moisture, parameters, short, soft
+from sentences import (
+    Found,
+    filled,
+    fingerprint,
+    fingertip,
+    fringe,
+    moisture,
+    parameters,
+    readme_why,
+    short,
+    soft,
+    worst,
+)
 
 from evfem.studies import NAMES, paper
 from evfem.studies.common import markdown
@@ -61,12 +73,6 @@ def run(found: Found) -> str:
             lines.append("")
         lines[-1] += f" {word}" if lines[-1] else word
     return "\n".join(lines) + "\n"
-
-
-def worst(numbers: Found, key: str) -> float | None:
-    """The largest error of a run's forces (%), None where there is no reference or no run."""
-    errors = [abs(v) for name, v in numbers.items() if name.startswith(f"{key}.error_percent.")]
-    return max(errors, default=None)
 
 
 def costs(found: Found) -> str:
@@ -274,6 +280,7 @@ MISTAKES = "../../tests/tools/mistakes.toml"
 #: block -> what makes it, and the files in docs/results that it needs
 BLOCKS: dict[str, tuple[Callable[..., str], list[str]]] = {
     "readme": (readme, ["peers.json", "runs.json"]),
+    "readme-why": (readme_why, ["peers.json"]),
     "peers-run": (run, ["peers.json"]),
     "peers-costs": (costs, ["peers.json"]),
     "peers-ratios": (ratios, ["peers.json"]),

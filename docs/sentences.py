@@ -1,4 +1,4 @@
-"""What the gallery says of studies, in sentences with the numbers of their files."""
+"""What README and gallery say of studies, in sentences with the numbers of their files."""
 
 from __future__ import annotations
 
@@ -124,6 +124,25 @@ def moisture(found: Found) -> str:
     )
 
 
+def readme_why(peers: Found) -> str:
+    """README's answer to why not in another package."""
+    n = peers["numbers"]
+    other, own = (f"B.L2.{name}" for name in ("fenicsx_q2", "evfem_q2p1"))
+    times = n[f"{other}.cpu_s"] / n[f"{own}.cpu_s"]
+    return filled(
+        f"FEniCSx takes {short(times)} times the CPU time for the [benchmark](docs/performance.md)'s slide, "
+        f"{short(n[f'{other}.cpu_s'])}\xa0s at an error of {worst(n, other):.2f}\xa0%; evfem takes "
+        f"{short(n[f'{own}.cpu_s'])}\xa0s at {worst(n, own):.2f}\xa0%.",
+        width=88,
+    ).replace("\xa0", " ")
+
+
+def worst(numbers: Found, key: str) -> float | None:
+    """The largest error of a run's forces (%), None where there is no reference or no run."""
+    errors = [abs(v) for name, v in numbers.items() if name.startswith(f"{key}.error_percent.")]
+    return max(errors, default=None)
+
+
 def percent(share: float) -> str:
     """A share in per cent, without digits behind the point."""
     return f"{100.0 * share:.0f} %"
@@ -135,9 +154,9 @@ def spread(numbers: Found, pattern: str) -> str:
     return f"{short(min(values))} to {short(max(values))}"
 
 
-def filled(*sentences: str) -> str:
+def filled(*sentences: str, width: int = 99) -> str:
     """Sentences in lines that fit, each beginning a line."""
-    return "\n".join(textwrap.fill(one, 99, break_on_hyphens=False) for one in sentences) + "\n"
+    return "\n".join(textwrap.fill(one, width, break_on_hyphens=False) for one in sentences) + "\n"
 
 
 def short(value: float | None) -> str:

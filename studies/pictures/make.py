@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Iterable
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,8 +16,10 @@ import numpy as np
 
 import evfem as ev
 from evfem import plotting
+from evfem.simulation.result import Frame, Result
 
 README = Path(__file__).with_name("slide.png")
+WHORL = ev.Fingertip(resolution="coarse", ridges="whorl")
 #: the picture of a print on a texture, which takes minutes
 RELIEF = "relief.png"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -50,24 +53,49 @@ for name in EXAMPLES.split():
 CODE = re.compile(r"^(<!-- not run: .+? -->\n)?```python\n(.*?)^```$", re.M | re.S)
 
 
-def draw_readme(path: Path = README) -> None:
-    """Run the README's example and draw forces, pad and contact pressure."""
+def touchscreen_slides(finger: ev.Fingertip = WHORL) -> dict[str, Result]:
+    """A finger under 0.3 N that slides over a touchscreen, without voltage and at 150 V and 5 kHz."""
+    scene = ev.Scene(
+        finger,
+        ev.Display(ev.TOUCHSCREEN, friction=0.4),
+        ev.StrongTroxel(),
+        150.0 / np.sqrt(2.0),
+        [ev.Press(force=0.3, steps=2), ev.Slide(distance=0.5, steps=10, hold="force")],
+        drive=ev.Drive(5000.0, skin="gabriel_dry", gap_conductivity=1e-8),
+        roughness_gap=ev.ConstantRoughness(0.005, distribution="gaussian"),
+    )
+    off = replace(scene, voltage=0.0, drive=None, law=None, roughness_gap=0.0)
+    return {"150 V": ev.simulate(scene), "0 V": ev.simulate(off)}
+
+
+def draw_story(results: dict[str, Result], path: Path = README) -> plotting.figures.Panels:
+    """Friction over the position, what sticks while some of the skin slips, and the attraction, with letters
+    that are read where the picture is 390 pixels wide.
+    """
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    finger = ev.FingerPad()
-    display = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
-    motion = [ev.Press(force=0.05), ev.Slide(distance=2.0, steps=40, hold="force")]
-    scene = ev.Scene(
-        finger, display, law=ev.Kaczmarek(), voltage=1000.0, motion=motion, output=ev.Output(every=50)
-    )
-    result = ev.simulate(scene)
-    figure = Figure(figsize=(13.0, 4.0), layout="constrained")
-    figure.get_layout_engine().set(wspace=0.04)
-    left, middle, right = figure.subplots(1, 3, width_ratios=[1.0, 1.45, 1.1])
-    plotting.forces(result, ax=left)
-    plotting.deformed(result, ax=middle)
-    plotting.contact_pressure(result, ax=right).set_title("tractions along the pad", fontsize="medium")
-    figure.savefig(path, dpi=90)
+    on, near = results["150 V"], (-2.9, 2.9, -4.1, 4.1)
+    begun = int(np.argmax([_slipping(frame) for frame in on.frames]))
+    with rc_context({"font.size": 15.0, "axes.titlesize": 15.0, "lines.linewidth": 2.5}):
+        figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+        figure.get_layout_engine().set(wspace=0.06, rect=(0.0, 0.0, 0.98, 1.0))
+        left, middle, right = panels = figure.subplots(1, 3, width_ratios=(1.4, 1.0, 1.0))
+        plotting.friction(results, over="position", ax=left).set(xlabel="position (mm)", ylabel="")
+        plotting.footprint(on, "contact_status", begun, middle, near=near).set(xticks=[], yticks=[])
+        plotting.footprint(on, "electrostatic_traction", begun, right, near=near).set(xticks=[], yticks=[])
+        for ax, title in zip(panels, ("friction coefficient", "what slips", "attraction (kPa)"), strict=True):
+            ax.set_title(title, fontsize="medium")
+        for ax in figure.axes[1:]:
+            ax.set(xlabel="", ylabel="")
+        figure.savefig(path, dpi=130)
+    return plotting.figures.Panels(panels)
+
+
+def _slipping(frame: Frame) -> float:
+    """How far the touching nodes are from all sticking or all slipping: 0.25 where half of them slip."""
+    slip = np.mean(frame.contact_status[frame.contact_status > 0] == 2)
+    return float(slip * (1.0 - slip))
 
 
 def draw_relief(path: Path) -> None:
@@ -104,7 +132,7 @@ def main(names: list[str]) -> None:
     """Draw the named pictures, or all of them; each page is run once."""
     wanted = names or [README.name, RELIEF, *OF_PAGES]
     if README.name in wanted:
-        draw_readme()
+        draw_story(touchscreen_slides())
     if RELIEF in wanted:
         draw_relief(DOCS / "pictures" / RELIEF)
     pages: dict[str, list[str]] = {}

@@ -4,6 +4,8 @@ import contextlib
 import io
 import os
 import re
+import runpy
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,9 +16,14 @@ import evfem as ev
 from evfem.scene.file import loads
 from evfem.scene.scene import default_scene
 
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 FINGER = ev.FingerPad(ridges=False, resolution="coarse")
 MOTION = (ev.Press(force=0.05, steps=3), ev.Slide(distance=1.2, steps=6, hold="force"))
+
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PICTURE = ROOT / "studies" / "pictures" / "slide.png"
 
 
 def block(kind):
@@ -77,3 +84,37 @@ def test_the_forces_are_those_of_a_press_and_full_slip(example):
     balance = result.applied_force - (result.normal_force - result.electrostatic_force)
     np.testing.assert_allclose(balance, 0.0, atol=1e-7 * result.normal_force.max())
     assert np.all(result.electrostatic_force > 0.0)
+
+
+def test_badges_say_what_the_project_file_says():
+    shown = dict(re.findall(r"shields\.io/badge/(\w+)-([\w.+]+)-", README))
+    classifiers = " ".join(PROJECT["classifiers"]).lower()
+    assert shown["python"] == PROJECT["requires-python"].removeprefix(">=") + "+"
+    assert shown["licence"] == PROJECT["license"]
+    assert f":: {shown['tested'].lower()}" in classifiers
+    assert f"- {shown['status']}" in classifiers
+    assert len(shown) == README.count("img.shields.io") == 4
+
+
+def test_its_picture_is_small_and_wide_enough_for_two_screens():
+    import matplotlib.image
+
+    high, wide, _ = matplotlib.image.imread(PICTURE).shape
+    assert PICTURE.stat().st_size < 200_000
+    assert wide >= 800
+    assert wide / high > 2.5  # one row
+
+
+def test_its_picture_shows_the_friction_of_both_slides_and_the_skin_while_some_of_it_slips(tmp_path):
+    """The voltage's part of friction is the attraction times the coefficient, by Amontons and Coulomb."""
+    make = runpy.run_path(str(PICTURE.with_name("make.py")))
+    results = make["touchscreen_slides"](finger=ev.Fingertip(resolution="coarse", ridges="none"))
+    off, on = (results[name] for name in ("0 V", "150 V"))
+    panels = make["draw_story"](results, tmp_path / "slide.png")
+    curves = {line.get_label(): line.get_ydata() for line in panels[0].get_lines()}
+    assert off.applied_force[-1] == pytest.approx(0.3, rel=1e-7)
+    assert curves["0 V"][-1] == pytest.approx(0.4, rel=1e-6)
+    assert curves["150 V"][-1] == pytest.approx(0.4 * (1.0 + on.electrostatic_force[-1] / 0.3), rel=1e-6)
+    statuses = panels[1].collections[-1].get_array()
+    assert set(np.unique(statuses)) >= {1.0, 2.0}
+    assert (tmp_path / "slide.png").stat().st_size < 200_000
