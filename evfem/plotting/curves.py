@@ -123,7 +123,9 @@ def _of_one_kind(
         for name, (label, colour, style) in texts.items()
         if name == always or sizes[name] > ZERO * max(sizes.values())
     ]
-    ax = _marked(figures.curves(ax, lines, "", labels.axis_label(always, result.units)), over, result)
+    ax = _marked(
+        figures.curves(ax, lines, "", labels.axis_label(always, result.units), legend=False), over, result
+    )
     for name in (name for name in texts if name in sd):
         wide = np.asarray(sd[name])[_drawn(result, over)]
         ends = drawn[name] - wide, drawn[name] + wide
@@ -243,8 +245,8 @@ def probes(
         for place, y, look in zip(probe.position, values[name].T, looks, strict=True):
             label = f"{name} at ({', '.join(f'{at + 0.0:.3g}' for at in place)}) mm"
             lines.append((x, factor * y, look | {"label": label}))
-    ax = figures.curves(ax, lines, "", labels.field_label(quantity, unit))
-    return figures.add_legend(_marked(ax, over, result), fontsize="small")
+    ax = figures.curves(ax, lines, "", labels.field_label(quantity, unit), legend=False)
+    return figures.add_legend(_marked(ax, over, result))
 
 
 def compare(
@@ -252,9 +254,7 @@ def compare(
 ) -> Axes:
     """The same column of several results, each by its name, over `over` (see `forces`)."""
     found, over = _over(results, over)
-    return figures.add_legend(
-        _column(ax, found, column, over, labels.column_label(column, labels.units_of(found)))
-    )
+    return figures.add_legend(_column(ax, found, column, over, ""))
 
 
 def force_indentation(results: labels.Results, ax: Axes | None = None) -> Axes:
@@ -299,9 +299,10 @@ def signal(results: labels.Results, over: str | None = None) -> figures.Panels:
     """Voltage above, friction force on the bone below, over `over` (see `forces`)."""
     found, over = _over(results, over)
     panels = figures.new_panels(2, 4.8)
-    _column(panels[0], found, "voltage", over, "voltage (V)").set_xlabel("")
-    label = f"friction force ({labels.units_of(found)['tangential_force']})"
-    _column(panels[1], found, "applied_tangential_force", over, label)
+    _column(panels[0], found, "voltage", over, "voltage").set_xlabel("")
+    _column(panels[1], found, "applied_tangential_force", over, "friction force")
+    if len(found) > 1:
+        figures.add_legend(panels[0])
     return panels
 
 
@@ -344,7 +345,7 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
     ]
     unit, factor = labels.shown_in("MPa", *(y for _, y, _ in lines))
     lines = [(x, factor * y, look) for x, y, look in lines]
-    ax = figures.curves(ax, lines, "x (mm)", labels.with_unit("traction", unit))
+    ax = figures.curves(ax, lines, "x (mm)", labels.with_unit("traction", unit), legend=False)
     touching = x[shown.contact_status[pad] > 0]
     if len(touching):
         margin = 0.25 * (touching[-1] - touching[0]) + 0.2
@@ -377,7 +378,7 @@ def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
         ax.vlines(number[own], 0.0, values[own], color=look["color"], linewidth=1.2)
         lines.append((number[own], values[own], look | {"linestyle": "none", "marker": "o"}))
     unit = "sd" if in_sd else "% of root mean square"
-    figures.curves(ax, lines, "measured value", f"computed - measured ({unit})").legend()
+    figures.curves(ax, lines, "measured value", f"computed - measured ({unit})", legend=False).legend()
     ax.set_xlim(0.4, len(values) + 0.6)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     return ax
@@ -389,9 +390,16 @@ def _over(results: labels.Results, over: str | None) -> tuple[dict[str, Result],
     return found, checked_over(over, next(iter(found.values())))
 
 
-def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, label: str) -> Axes:
-    lines = [(along(one, over, over), along(one, column, over), look) for one, look in figures.styled(found)]
-    ax = figures.curves(ax, lines, "", label)
+def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, text: str) -> Axes:
+    """A line for each result, beside the text, or without one the name of the column."""
+    drawn = [along(one, column, over) for one in found.values()]
+    unit, factor = labels.shown_in(labels.units_of(found)[column], *drawn)
+    looks, text = (look for _, look in figures.styled(found)), text or labels.column_text(column, unit)
+    lines = [
+        (along(one, over, over), factor * y, look)
+        for one, y, look in zip(found.values(), drawn, looks, strict=True)
+    ]
+    ax = figures.curves(ax, lines, "", labels.with_unit(text, unit), legend=False)
     largest = max(float(np.abs(labels.values_of(one, "normal_force")).max()) for one in found.values())
     if column.endswith("force") and all(np.abs(y).max() <= ZERO * largest for _, y, _ in lines):
         ax.set_ylim(-largest, largest)  # what rounding leaves is no curve

@@ -44,7 +44,8 @@ TISSUE, GROUND, EDGE = "#EFEBE7", "#D0D0D0", "0.25"
 FILES_ONLY = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
 WIDTH, HEIGHT = 7.0, 4.5  # of a figure, in inches
 SLENDER = 25.0  # height of a colour bar over its width
-WIDER = 1.1  # a title over its axes, at most
+WIDER, SMALLEST = 1.1, 6.0  # a title over its axes, at most; its letters in points, at least
+MANY = 6  # entries of a legend with large letters
 #: triangles of smooth colours in a picture, and parts of a side of one, at most
 PARTS, FINEST = 40_000, 6
 #: x, y and look of a curve
@@ -95,7 +96,7 @@ def panels_or_new(given: Axes | Sequence[Axes] | None, rows: int, height: float)
     """The given axes, one or a sequence of them, or those of a new figure; InputError for another number."""
     if given is None:
         return new_panels(rows, height)
-    panels = Panels(np.ravel(given).tolist())
+    panels = Panels(np.ravel(np.array(given, dtype=object)).tolist())
     if len(panels) != rows:
         raise InputError("ax", f"{len(panels)} axes", f"{rows}, one for each kind of quantity")
     return panels
@@ -127,31 +128,40 @@ def probe_looks(named: Mapping[str, Any]) -> Iterator[tuple[str, Any, list[dict[
         yield name, probe, looks
 
 
-def add_legend(ax: Axes, **options: Any) -> Axes:
+def add_legend(ax: Axes) -> Axes:
     """The axes with a legend: where it hides no curve, else at their right if the figure makes room there."""
+    drawn = [line for line in ax.get_lines() if not str(line.get_label()).startswith("_")]
+    options: dict[str, Any] = {"fontsize": "small" if len(drawn) > MANY else None}
     legend, figure = ax.legend(**options), whole_figure(ax)
     if figure.get_layout_engine() is None:
         return ax
+    legend.set_in_layout(False)  # it may be higher than the figure
     figure.draw_without_rendering()
-    box = legend.get_window_extent()
-    drawn = [line.get_transform().transform_path(line.get_path()) for line in ax.get_lines()]
-    if any(path.intersects_bbox(box, filled=False) for path in drawn if len(path.vertices)):
-        ax.legend(**options, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    box, panel = legend.get_window_extent(), ax.get_window_extent()
+    paths: list[Any] = [line.get_transform().transform_path(line.get_path()) for line in drawn]
+    hidden = any(path.intersects_bbox(box, filled=False) for path in paths if len(path.vertices))
+    if hidden or box.height > panel.height:
+        columns = int(np.ceil(box.height / panel.height))
+        place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0, "ncols": columns}
+        if figure.axes == [ax]:  # the panel keeps its width
+            figure.set_figwidth(figure.get_figwidth() + columns * box.width / figure.dpi)
+        legend = ax.legend(**options, **place)
+    legend.set_in_layout(True)
     return ax
 
 
 def add_title(ax: Axes, text: str, size: str = "medium") -> Axes:
-    """The axes with a title in lines that are no wider than they are, broken after commas."""
+    """The axes with a title hardly wider than they are: broken after commas, then in smaller letters."""
     figure, words = whole_figure(ax), text.split(", ")
-    title, lines = ax.set_title(text, fontsize=size), 1
-    while lines < len(words):
-        figure.draw_without_rendering()
-        if title.get_window_extent().width <= WIDER * ax.get_window_extent().width:
-            break
-        lines += 1
+    title = ax.set_title(text, fontsize=size)
+    for lines in range(1, len(words) + 1):
         ends = [round(len(words) * line / lines) for line in range(lines + 1)]
-        parts = (", ".join(words[a:b]) for a, b in pairwise(ends))
-        title.set_text(",\n".join(parts))
+        title.set_text(",\n".join(", ".join(words[a:b]) for a, b in pairwise(ends)))
+        figure.draw_without_rendering()
+        room = WIDER * ax.get_window_extent().width / title.get_window_extent().width
+        if room >= 1.0:
+            return ax
+    title.set_fontsize(max(SMALLEST, room * float(title.get_fontsize())))
     return ax
 
 
@@ -164,14 +174,14 @@ def check_log(log: str, **values: Any) -> None:
             raise InputError("log", describe_value(log), f"numbers above 0 along {axis}")
 
 
-def curves(ax: Axes | None, lines: Sequence[Line], xlabel: str, ylabel: str) -> Axes:
-    """Lines of x, y and look on a grid, with a legend where there are several; few points are marked."""
+def curves(ax: Axes | None, lines: Sequence[Line], xlabel: str, ylabel: str, *, legend: bool = True) -> Axes:
+    """Lines of x, y and look on a grid; few points are marked. Several have a `legend` if it is wanted."""
     ax = axes_or_new(ax)
     for x, y, look in lines:
         ax.plot(x, y, **{"marker": "o" if len(x) < 3 else None, **look})
     ax.set(xlabel=xlabel, ylabel=ylabel)
     ax.grid(alpha=0.3)
-    return add_legend(ax) if len(lines) > 1 else ax
+    return add_legend(ax) if legend and len(lines) > 1 else ax
 
 
 def shaded(ax: Axes, points: Floats, triangles: Ints, values: Floats) -> Any:

@@ -45,7 +45,7 @@ def deformed(
     Parameters
     ----------
     result
-        A result of a plane finger.
+        A result; of a finger in three dimensions the half behind its middle is shown, without its surface.
     field
         A field of the tissue (stress, `J`, `displacement`) fills the finger. A field of the pad
         (`contact_pressure`, `shear_traction`, `electrostatic_traction`, `gap`, `contact_status`,
@@ -71,11 +71,13 @@ def deformed(
     Raises
     ------
     InputError
-        Another field or frame, or a finger in three dimensions.
+        Another field or frame, or a close-up in three dimensions, which `footprint` has.
     """
+    from evfem.plotting.solid import SolidView
+
     choice("field", field, fields.FIELDS)
-    check_plane(result.mesh)
-    return picture(View(result, fields.frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)
+    kind = SolidView if result.mesh.dim == 3 else View
+    return picture(kind(result, fields.frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)
 
 
 def picture(view: Any, near: Near, limits: tuple[float | None, float | None], ax: Axes | None) -> Axes:
@@ -194,7 +196,7 @@ class View:
 def check_plane(mesh: Mesh) -> None:
     """Raises InputError for a mesh in three dimensions."""
     if mesh.dim == 3:
-        allowed = "a plane finger; footprint(result) and evfem.export.paraview show one in three dimensions"
+        allowed = "a plane finger; deformed(result) and footprint(result) show one in three dimensions"
         raise InputError("mesh", "a finger in three dimensions", allowed)
 
 

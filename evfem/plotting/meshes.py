@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from evfem.common.arrays import Ints
+from evfem.common.arrays import Floats, Ints
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.fields import rounds
 from evfem.plotting.figures import REGIONS, axes_or_new, whole_figure
@@ -52,31 +52,38 @@ def _draw_solid(mesh: Mesh, ax: Axes) -> None:
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
-    faces, region = cut_open(mesh)
-    towards = EYE / np.linalg.norm(EYE)
-    right = np.cross([0.0, 1.0, 0.0], towards)
-    right /= np.linalg.norm(right)
-    corner = mesh.points[faces[:, :4]]
-    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
-    facing = normal @ towards / np.linalg.norm(normal, axis=1)
-    order = np.argsort(corner.mean(axis=1) @ towards)
-    order = order[facing[order] > 0.0]
-    outlines = mesh.points[faces[order][:, AROUND[faces.shape[1]]]]
-    seen = np.stack([outlines @ right, outlines @ np.cross(towards, right)], axis=-1)
+    faces, cells = cut_open(mesh)
+    order, places, facing = seen(mesh.points, faces[:, :4])
+    outlines = places[faces[order][:, AROUND[faces.shape[1]]]]
     colours = dict(zip(mesh.region_names.values(), cycle(REGIONS), strict=False))
-    plain = np.array([to_rgb(colours[number]) for number in region[order].tolist()])
-    shaded = plain * (DIMMEST + (1.0 - DIMMEST) * facing[order])[:, None]
-    ax.add_collection(PolyCollection(list(seen), facecolors=shaded, edgecolors="white", linewidths=0.1))
+    plain = np.array([to_rgb(colours[number]) for number in mesh.region[cells[order]].tolist()])
+    shaded = plain * (DIMMEST + (1.0 - DIMMEST) * facing)[:, None]
+    ax.add_collection(PolyCollection(list(outlines), facecolors=shaded, edgecolors="white", linewidths=0.1))
     for name, number in mesh.region_names.items():
         ax.scatter([], [], marker="s", color=colours[number], label=name.replace("_", " "))
     ax.set_axis_off()
 
 
+def seen(points: Floats, corners: Ints) -> tuple[Ints, Floats, Floats]:
+    """Which faces (K, 4) are turned towards the eye, from the farthest to the nearest (S,); the places (N, 2)
+    of all points in the picture; the cosine (S,) between these faces' normals and the line of sight.
+    """
+    towards = EYE / np.linalg.norm(EYE)
+    right = np.cross([0.0, 1.0, 0.0], towards)
+    right /= np.linalg.norm(right)
+    corner = points[corners]
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    facing = normal @ towards / np.linalg.norm(normal, axis=1)
+    order = np.argsort(corner.mean(axis=1) @ towards)
+    order = order[facing[order] > 0.0]
+    return order, np.column_stack([points @ right, points @ np.cross(towards, right)]), facing[order]
+
+
 def cut_open(mesh: Mesh) -> tuple[Ints, Ints]:
-    """Outer faces (K, 4 or 9), and their regions (K,), of the cells behind the middle of a solid's length."""
+    """Outer faces (K, 4 or 9), and their cells (K,), of the cells behind the middle of a solid's length."""
     middle = 0.5 * (mesh.points[:, 2].min() + mesh.points[:, 2].max())
     kept = mesh.points[mesh.cells[:, :8], 2].mean(axis=1) < middle
     _, of_cell = mesh.sides
     alone = np.bincount(of_cell[kept].ravel(), minlength=len(of_cell) * 6)[of_cell[kept]] == 1
-    region = np.broadcast_to(mesh.region[kept, None], alone.shape)
-    return mesh.cell_sides[kept][alone], region[alone]
+    cells = np.broadcast_to(np.flatnonzero(kept)[:, None], alone.shape)
+    return mesh.cell_sides[kept][alone], cells[alone]

@@ -87,12 +87,10 @@ def impedance(
         sizes.append((one.frequency, np.abs(values), look))
         phases.append((one.frequency, np.degrees(np.angle(values)), look))
     curves(upper, sizes, "", f"magnitude ({units.pop()})")
-    curves(lower, phases, "frequency (Hz)", "phase (degrees)")
+    curves(lower, phases, "frequency (Hz)", "phase (degrees)", legend=False)
     upper.set(xscale="log", yscale="log")
     degrees = np.concatenate([y for _, y, _ in phases])
     if np.ptp(degrees) > 60.0:
         lower.set_yticks(np.arange(-180, 181, 45))
     lower.set_ylim(max(-185.0, degrees.min() - 10.0), min(185.0, degrees.max() + 10.0))
-    if (legend := lower.get_legend()) is not None:
-        legend.remove()
     return Panels((upper, lower))

@@ -45,7 +45,7 @@ def sweep(
         if names or table.provenance.get("samples") is not None or np.unique(across).size < across.size:
             look["linestyle"] = "none"
         lines.append((across[order], up[order], look | {"label": _value(table, by, value), "marker": marker}))
-    ax = figures.curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
+    ax = figures.curves(ax, lines, key_label(x, table.units), key_label(y, table.units), legend=False)
     ax.set(**{f"{axis}scale": "log" for axis in log})
     if "x" in log and (places := np.unique(np.concatenate([line[0] for line in lines]))).size <= FEW:
         ax.set_xticks(places, [f"{tick:g}" for tick in places])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from tools.fakes import fake_result, fake_row, lines_of
 from tools.meshes import square_mesh
 from tools.refusals import refuses
@@ -14,6 +15,7 @@ from evfem.plotting import (
     contact_area,
     deformed,
     energies,
+    figures,
     force_indentation,
     forces,
     friction,
@@ -261,11 +263,70 @@ def test_a_line_for_each_point_of_each_probe_over_its_steps():
     at = columns(2).index("cauchy_stress_xy")
     for line, point in ((first, 0), (second, 1), (deep, 2)):
         np.testing.assert_array_equal(line.get_ydata(), numbers[:, point, at])
+    assert deep.get_label().startswith("deep at (")
+    assert deep.get_label().endswith(") mm")
     assert first.get_color() == second.get_color() != deep.get_color()
     assert ax.get_ylabel() == "Cauchy stress xy (MPa)"
     with pytest.raises(InputError, match=r"quantity: given .*allowed: cauchy_stress_xz. .displacement_x"):
         probes(result, "cauchy_stress_xw")
     refuses("a run without probes", probes, fake_result())
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        {f"point {i}": [[0.1 * i, 1.0]] for i in range(9)},
+        {"all": [[0.1 * i, 1.0] for i in range(9)]},
+        {name: [[0.1 * i, 1.0] for i in range(5)] for name in "abcdefghi"},
+    ],
+)
+def test_probes_are_told_apart(wanted):
+    """No two curves have the same colour, style and marker; a probe's marks have its colour and marker."""
+    count = sum(len(places) for places in wanted.values())
+    numbers = np.random.default_rng(2).normal(size=(4, count, len(columns(2))))
+    result = replace(fake_result(), probes=histories(wanted, 2, numbers))
+    drawn = [line for line in probes(result, over="step").get_lines() if " at (" in line.get_label()]
+    looks = {(line.get_color(), line.get_linestyle(), line.get_marker()) for line in drawn}
+    assert len(looks) == len(drawn) == count
+    marks = {(line.get_color(), line.get_marker()) for line in drawn[:: count // len(wanted)]}
+    shown = deformed(result, near=(-9.0, 9.0, -9.0, 9.0)).get_lines()
+    assert {
+        (line.get_color(), line.get_marker()) for line in shown if line.get_linestyle() == "None"
+    } >= marks
+
+
+def test_a_legend_stands_beside_curves_that_fill_the_panel():
+    waves = {f"wave {i}": np.sin(np.linspace(0.0, 60.0, 300) + i) for i in range(5)}
+    lines = [(np.arange(300), y, look) for y, look in figures.styled(waves)]
+    calm = [(x, 0.0 * y, look) for x, y, look in lines]
+    for drawn, beside in ((lines, True), (calm, False)):
+        ax = figures.curves(None, drawn, "", "")
+        ax.figure.draw_without_rendering()
+        legend, panel = ax.get_legend().get_window_extent(), ax.get_window_extent()
+        assert (legend.x0 >= panel.x1) == beside
+        assert legend.x1 <= ax.figure.bbox.x1
+
+
+def test_a_history_is_drawn_in_given_axes_and_on_logarithmic_scales():
+    result = fake_result()
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    panels = history(result, ["normal_force", "voltage"], "step", ax=[left, right], log="y")
+    assert (panels[0], panels[1]) == (left, right)
+    assert (left.get_xscale(), left.get_yscale(), right.get_yscale()) == ("linear", "log", "log")
+    np.testing.assert_array_equal(lines_of(right)["voltage"].get_ydata(), result.voltage)
+    assert history(result, ["voltage"], "step", ax=left)[0] is left
+    refuses('"", "x", "y" or "xy"', history, result, ["voltage"], log="z")
+    refuses("numbers above 0 along x", history, result, ["voltage"], "position", log="x")
+    refuses("given 1 axes; allowed: 2", history, result, ["normal_force", "voltage"], ax=left)
+
+
+def test_small_pressures_of_a_history_are_said_in_kPa():
+    result = fake_result()
+    small = replace(result, peak_contact_pressure=0.001 * result.step)
+    for ax in (history(small, ["peak_contact_pressure"])[0], compare({"a": small}, "peak_contact_pressure")):
+        assert ax.get_ylabel().replace("\n", " ") == "peak contact pressure (kPa)"
+        np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), small["step"])
 
 
 def test_no_label_of_a_panel_is_cut_or_reaches_into_the_next():

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 from tools.fakes import bar_of, fake_result, lines_of
 from tools.meshes import KINDS, square_mesh
 from tools.refusals import refuses
@@ -30,7 +32,8 @@ def test_every_field_is_drawn_on_every_kind_of_cell(field, kind):
     assert ax.get_aspect() == 1.0
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (mm)", "y (mm)")
     label = bar_of(ax).get_ylabel()
-    assert label.endswith((" (kPa)" if field in TRACTIONS else " (MPa)", " (mm)")) or field in ("J", "contact_status")
+    units = (" (kPa)" if field in TRACTIONS else " (MPa)", " (mm)")
+    assert label.endswith(units) or field in ("J", "contact_status")
     assert label.split()[0].lower() in (field.split("_")[0].lower(), "volume")
 
 
@@ -279,6 +282,34 @@ def test_results_beside_each_other_have_one_scale():
     assert panels[2].get_xlim() == deformed(soft, near="contact").get_xlim()
     assert len(panels.figure.axes) == 5
     assert len(side_by_side({"soft": soft, "hard": hard}, near=None)) == 2
+
+
+@pytest.mark.parametrize("field", ["contact_pressure", "shear_traction", "electrostatic_traction"])
+def test_arrows_of_panels_side_by_side_are_as_long_for_as_large_a_traction(field):
+    """A finger with twice the tractions and half the room below it has arrows twice as long."""
+    result = fake_result()
+    frame = result.frames[-1]
+    twice = replace(frame, **{field: 2.0 * getattr(frame, field)}, displacement=0.5 * frame.displacement)
+    panels = side_by_side({"one": result, "two": replace(result, frames=(twice,))}, field)
+    longest = []
+    for ax in panels[2:]:
+        (arrows,) = [one for one in ax.collections if isinstance(one, Quiver)]
+        longest.append(np.hypot(arrows.U, arrows.V).max() / np.ptp(ax.get_xlim()))
+    assert longest[1] == pytest.approx(2.0 * longest[0], rel=1e-9)
+
+
+def test_titles_are_no_wider_than_what_they_are_above():
+    result = fake_result()
+    long = replace(result, voltage=np.full(4, 1234.0))
+    figure = Figure(figsize=(4.0, 3.0), layout="constrained")
+    for ax in figure.subplots(1, 2):
+        deformed(long, ax=ax)
+        figure.draw_without_rendering()
+        title, axes = ax.title.get_window_extent(), ax.get_window_extent()
+        assert title.width <= 1.1 * axes.width + 1.0
+        assert ax.get_title().replace("\n", " ").startswith("step 4: position ")
+    wide = deformed(long)
+    assert "\n" not in wide.get_title()
 
 
 @pytest.mark.parametrize("kind", KINDS)

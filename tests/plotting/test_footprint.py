@@ -88,8 +88,8 @@ def test_other_fields_fingers_and_pictures_are_refused(result, tmp_path):
     refuses("field", footprint, result, "von_mises")
     refuses("near", footprint, result, near="everything")
     refuses("plane finger", footprint, fake_result())
-    for draw in (deformed, contact_pressure):
-        refuses("three dimensions", draw, result)
+    refuses("three dimensions", contact_pressure, result)
+    refuses("footprint", deformed, result, near="contact")
     refuses("field", animate, result, tmp_path / "stress.gif", "von_mises")
 
 
