@@ -21,6 +21,7 @@ from evfem.common.storage import replacing, write_text
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
+from evfem.mesh.split import nodal_means, split
 from evfem.scene.scene import Scene
 from evfem.simulation.result import CELL_FIELDS, LATER_FIELDS, POINT_FIELDS, Frame, Result, Row
 
@@ -111,14 +112,19 @@ def frame_size(mesh: Mesh, single: bool = False, compressed: bool = False, sinks
     return round(ratio * (nodes + cells) * 4 / 3) + TAGS  # base64
 
 
-def paraview(result: Result, path: str | Path, *, skin: bool = False) -> Path:
+def paraview(result: Result, path: str | Path, *, skin: bool = False, smooth: bool = False) -> Path:
     """Write the frames of `result` as a series: `path` (.pvd) and one .vtu for each frame beside
     it; of a finger in three dimensions the `skin` alone, if that is asked for.
 
-    Returns the path of the index. Raises InputError for another ending, and for the skin of a
-    cross-section; StorageError when the disk refuses.
+    With `smooth` stresses stand at the points too (`nodal_von_mises`, `nodal_cauchy_stress`, `nodal_J`):
+    means of the cells around them, within a region. Points where layers meet are there once for each.
+
+    Returns the path of the index. Raises InputError for another ending, for the skin of a
+    cross-section, and for a smooth skin; StorageError when the disk refuses.
     """
-    series = ParaViewSeries(path, skin=skin)
+    if skin and smooth:
+        raise InputError("smooth", "True, of a skin", "skin=True or smooth=True, in a series each")
+    series = ParaViewSeries(path, skin=skin, smooth=smooth)
     rows = {row["step"]: row for row in result.rows}
     for frame in result.frames:
         series.add(rows[frame.step], frame, result.mesh)
@@ -221,9 +227,16 @@ def skin_of(mesh: Mesh) -> tuple[Mesh, Ints, Ints]:
 
 
 def write_frame(
-    mesh: Mesh, frame: Frame, path: str | Path, *, single: bool = False, compressed: bool = False
+    mesh: Mesh,
+    frame: Frame,
+    path: str | Path,
+    *,
+    single: bool = False,
+    compressed: bool = False,
+    smooth: bool = False,
 ) -> None:
-    """Write one step as a .vtu file: points, displacement and all fields of a `Frame`.
+    """Write one step as a .vtu file: points, displacement and all fields of a `Frame`, `smooth` ones of the
+    cells at the points too.
 
     Field data `region:NAME` hold the numbers of the regions, as in the files of `meshfile.write`.
     `single` precision halves the file.
@@ -238,6 +251,8 @@ def write_frame(
     for name in POINT_FIELDS:
         if name not in LATER_FIELDS or getattr(frame, name).any():
             point_data[name] = real(getattr(frame, name))
+    if smooth:
+        point_data |= {f"nodal_{name}": real(nodal_means(mesh, getattr(frame, name))) for name in CELL_FIELDS}
     point_data["contact_status"] = np.asarray(frame.contact_status, dtype=np.int8)
     cell_data = {"region": [np.asarray(mesh.region, dtype=np.int32)]}
     cell_data |= {name: [real(getattr(frame, name))] for name in CELL_FIELDS}
@@ -269,7 +284,8 @@ class ParaViewSeries:
 
     Files are named after the index: fields.pvd, fields_00001.vtu, ... An entry's value is the time if time
     passes, else the position (`instants`). Files of `earlier` rows, of a run that is continued, stay in the
-    index. `single` and `compressed` as in `write_frame`; with `skin` the pad's surface alone.
+    index. `single` and `compressed` as in `write_frame`; with `skin` the pad's surface alone; with `smooth`
+    regions that share no point, and their stresses at the points.
     """
 
     def __init__(
@@ -280,9 +296,10 @@ class ParaViewSeries:
         single: bool = False,
         compressed: bool = False,
         skin: bool = False,
+        smooth: bool = False,
     ) -> None:
         self.path = Path(path)
-        self.single, self.compressed, self.skin = single, compressed, skin
+        self.single, self.compressed, self.skin, self.smooth = single, compressed, skin, smooth
         if self.path.suffix != ".pvd":
             raise InputError("path", str(path), "a file name that ends in .pvd")
         self._mesh: Mesh | None = None
@@ -309,7 +326,13 @@ class ParaViewSeries:
             mesh, nodes, behind = skin_of(mesh)
             fields = {name: getattr(frame, name)[nodes] for name in ("displacement", *POINT_FIELDS)}
             frame = replace(frame, **fields, **{name: getattr(frame, name)[behind] for name in CELL_FIELDS})
-        write_frame(mesh, frame, path, single=self.single, compressed=self.compressed)
+        if self.smooth:
+            mesh, nodes = split(mesh)
+            frame = replace(
+                frame, **{name: getattr(frame, name)[nodes] for name in ("displacement", *POINT_FIELDS)}
+            )
+        how = {"single": self.single, "compressed": self.compressed, "smooth": self.smooth}
+        write_frame(mesh, frame, path, **how)
         self.rows = [old for old in self.rows if old["step"] < row["step"]] + [row]
 
     def write_index(self) -> None:

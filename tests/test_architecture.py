@@ -38,7 +38,7 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio", "netCDF4", "h5py", "vtkmodules"},
-        "hexahedron mesh archive faces solids quality groups places formats.deck formats.abaqus "
+        "hexahedron mesh split archive faces solids quality groups places formats.deck formats.abaqus "
         "formats.exodus formats.gmsh formats.med formats.medit formats.nastran formats.su2 formats.vtk "
         "formats.xdmf file memory",
     ),
@@ -109,7 +109,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "labels figures fields finger footprint curves sweeps meshes movie response",
+        "labels figures fields meshes solid finger footprint curves sweeps movie response",
     ),
     "reporting": ({"numpy"}, "log watch page"),
     "studio": ({"numpy"}, "state page runs server"),

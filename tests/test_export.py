@@ -209,6 +209,46 @@ def test_the_skin_has_its_nodes_and_the_cells_behind_its_faces(order, tmp_path):
     refuses("three dimensions", skin_of, square_mesh("quad"))
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_smooth_stresses_are_means_within_a_region_and_jump_where_layers_meet(kind, tmp_path):
+    """Of a field that is one number in each region the means are these numbers, on both sides of a border."""
+    result = fake_result(kind)
+    stepped = replace(result.frames[-1], von_mises=2.0 + 3.0 * result.mesh.region)
+    path = paraview(replace(result, frames=(stepped,)), tmp_path / "smooth.pvd", smooth=True)
+    read = meshio.read(next(path.parent.glob("*.vtu")))
+    (cells,), region = read.cells, read.cell_data["region"][0]
+    value = np.broadcast_to(read.cell_data["von_mises"][0][:, None], cells.data.shape)
+    np.testing.assert_allclose(read.point_data["nodal_von_mises"][cells.data], value, rtol=1e-14)
+    owners = [set(cells.data[region == one].ravel()) for one in np.unique(region)]
+    assert len(owners) == 2
+    assert not owners[0] & owners[1]
+    places = [set(map(tuple, read.points[sorted(own)].round(12))) for own in owners]
+    shared = [node for node in range(len(result.mesh.points)) if len(regions_of(result.mesh, node)) == 2]
+    assert {tuple(place[:2]) for place in places[0] & places[1]} == set(
+        map(tuple, result.mesh.points[shared].round(12))
+    )
+    moved = dict(zip(map(tuple, result.mesh.points), stepped.displacement, strict=True))
+    wanted = [moved[tuple(point[:2])] for point in read.points]
+    np.testing.assert_array_equal(read.point_data["displacement"][:, :2], wanted)
+
+
+def regions_of(mesh, node):
+    return set(mesh.region[(mesh.cells == node).any(axis=1)].tolist())
+
+
+def test_a_smooth_stress_between_two_cells_is_their_mean(tmp_path):
+    mesh, frame = solid_result(1)
+    series = ParaViewSeries(tmp_path / "solid.pvd", smooth=True)
+    series.add({"step": 3, "time": 0.0, "position": 0.5}, frame, mesh)
+    read = meshio.read(tmp_path / "solid_00003.vtu")
+    found = read.point_data["nodal_cauchy_stress"]
+    for node, place in enumerate(read.points):
+        around = (np.abs(mesh.points[mesh.cells] - place).max(axis=2) < 1e-12).any(axis=1)
+        same = around & (mesh.region == mesh.region[np.flatnonzero(around)[0]])
+        np.testing.assert_allclose(found[node], frame.cauchy_stress[same].mean(axis=0), rtol=1e-12)
+    refuses("skin=True or smooth=True", paraview, fake_result(), tmp_path / "a.pvd", skin=True, smooth=True)
+
+
 def pressed(**more):
     motion = [
         ev.Press(indentation=0.4, speed=4.0, steps=4),

@@ -16,12 +16,13 @@ from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, describe_value
 from evfem.plotting.fields import CELL_FIELDS, TRACTIONS, Scale, Window, values_of
 from evfem.plotting.figures import EDGE, TISSUE, shaded
-from evfem.plotting.finger import MARGIN, Near
 from evfem.plotting.meshes import cut_open, seen
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+MARGIN = 0.03  # around the finger, as a fraction of its width
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +72,7 @@ class SolidView:
         mean = np.bincount(owned, weights) / np.maximum(np.bincount(owned), 1)
         return mean[faces + count * mesh.region[cells, None]]
 
-    def window(self, near: Near) -> Window:
+    def window(self, near: str | Window | None) -> Window:
         """What is shown: left, right, lower and upper end in the picture; InputError for a close-up."""
         if near is not None:
             raise InputError(
