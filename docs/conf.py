@@ -11,6 +11,7 @@ import evfem
 
 sys.path.insert(0, str(Path(__file__).parent))
 from notebooks import NOTEBOOKS, page
+from thumbnails import with_thumbnails
 
 for name in evfem.__all__:
     getattr(evfem, name)  # and so has its parameters in its docstring
@@ -71,7 +72,14 @@ class Searched(PythonDomain):
             yield *found, -1 if hidden else priority
 
 
+def gallery(app, name, source):
+    """The gallery with thumbnails and downloads."""
+    if name == "gallery":
+        source[0] = with_thumbnails(source[0])
+
+
 def setup(app):
     app.add_domain(Searched, override=True)
     app.connect("autodoc-process-docstring", sections)
     app.connect("source-read", notebook)
+    app.connect("source-read", gallery)

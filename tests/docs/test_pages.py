@@ -297,7 +297,7 @@ def test_every_study_is_on_its_pages_and_in_a_test():
     """A new word in `evfem.studies.NAMES` is told to the readers of two pages, and tried."""
     listed = re.search(r"^The studies are (.+?);", read("docs/commandline.md"), re.M | re.S)[1]
     assert tuple(re.findall(r"`(\w+)`", listed)) == studies.NAMES
-    headings = " ".join(sections(read("docs/gallery.md")))
+    headings = " ".join(sections(read("docs/studies.md")))
     assert sorted(re.findall(r"`(\w+)`", headings)) == sorted(studies.NAMES)
     tests = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests/studies").glob("*.py"))
     assert [name for name in studies.NAMES if f'"{name}"' not in tests] == []

@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.filterwarnings("ignore::ImportWar
 DOCS = Path(__file__).parents[2] / "docs"
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
 #: tables, a wide listing, equations, and examples beside pictures
-PAGES = ("index", "notation", "commandline", "theory", "gallery")
+PAGES = ("index", "notation", "commandline", "theory", "gallery", "studies")
 #: a phone, a small window, and two notebooks
 WIDTHS = (390, 1024, 1366, 1440)
 
@@ -57,6 +57,25 @@ def test_no_page_scrolls_sideways(site, driver):
             if there > shown or shown < width - 20:
                 wide.append((page, width, there, shown))
     assert wide == []
+
+
+def test_thumbnails_lead_to_their_examples_and_downloads_are_beside_them(site, driver):
+    """At the width of a phone two stand in a row; none is wider than its cell."""
+    driver.get((site / "gallery.html").as_uri())
+    size = {"width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": True}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    missing, across, wide = driver.execute_script("""
+        const links = [...document.querySelectorAll(".thumbnails a")];
+        const missing = links.filter((a) => !document.getElementById(a.hash.slice(1)));
+        const top = links[0].getBoundingClientRect().top;
+        const across = links.filter((a) => a.getBoundingClientRect().top === top).length;
+        const wide = links.filter((a) => a.scrollWidth > a.clientWidth + 1);
+        return [missing.length, across, wide.length];
+    """)
+    assert (missing, across, wide) == (0, 2, 0)
+    counts = "return ['.thumbnails a', '.download a'].map((s) => document.querySelectorAll(s).length)"
+    shown, saved = driver.execute_script(counts)
+    assert shown == saved > 20
 
 
 def test_a_picture_grows_on_a_click_and_shrinks_on_another(site, driver):
