@@ -31,7 +31,7 @@ def download(name: str, code: str) -> str:
     """A link that saves the code as a file."""
     coded = b64encode(code.encode()).decode()
     address = f"data:text/x-python;base64,{coded}"
-    return f'<p class="download"><a download="{name}.py" href="{address}">{name}.py</a></p>'
+    return f'<p class="download"><a download="{name}.py" href="{address}">Download {name}.py</a></p>'
 
 
 def slug(title: str) -> str:
