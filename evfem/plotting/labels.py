@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -145,6 +145,18 @@ def key_label(key: str, units: Units = UNITS) -> str:
     short = len(parts) > 1 and len(parts[-1]) <= 2
     text = " ".join(parts[-2:] if short else parts[-1:]).replace("_", " ")
     return with_unit(text, unit)
+
+
+def key_texts(keys: Sequence[str]) -> list[str]:
+    """Dotted keys in words, without units; as they are where two would have the same words.
+
+    >>> key_texts(["finger.materials.dermis.E", "surface.friction"])
+    ['dermis E', 'friction']
+    >>> key_texts(["motion.0.force", "motion.1.force"])
+    ['motion.0.force', 'motion.1.force']
+    """
+    texts = [key_label(key).partition(" (")[0] for key in keys]
+    return [text if texts.count(text) == 1 else key for key, text in zip(keys, texts, strict=True)]
 
 
 def values_of(result: Result, name: str) -> Any:

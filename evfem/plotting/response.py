@@ -9,6 +9,7 @@ import numpy as np
 
 from evfem.errors import InputError
 from evfem.plotting.figures import BLUE, VERMILION, Panels, axes_or_new, curves, new_panels, styled
+from evfem.plotting.labels import key_texts
 from evfem.response.electrical import ElectricalImpedance
 from evfem.response.impedance import Impedance
 
@@ -54,9 +55,9 @@ def tornado(found: Any, column: str = "tangential_force", step: int = -1, ax: Ax
     bars = ax.barh(range(len(order)), [known[key] for key in order], color=colours)
     ax.bar_label(bars, fmt="%.2g", padding=3, fontsize="small")
     ax.margins(x=0.2)
-    ax.set_yticks(range(len(order)), order)
+    ax.set_yticks(range(len(order)), key_texts(order))
     ax.axvline(0.0, color="black", linewidth=0.8)
-    ax.set_xlabel(label)
+    ax.set_xlabel(label.replace("_", " "))
     ax.grid(alpha=0.3, axis="x")
     return ax
 

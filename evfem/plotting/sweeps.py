@@ -51,7 +51,7 @@ def sweep(
         ax.set_xticks(places, [f"{tick:g}" for tick in places])
         ax.set_xticks([], minor=True)
     if names:
-        ax.set_xticks(range(len(names)), [str(name) for name in names])
+        ax.set_xticks(range(len(names)), [str(name).replace("_", " ") for name in names])
         ax.margins(x=0.15)
     return ax if by is None else figures.add_legend(ax)
 
@@ -167,7 +167,7 @@ def _value(table: SweepResult, by: str | None, value: Any) -> str:
     if by is None:
         return ""
     text, _, unit = key_label(by, table.units).removesuffix(")").partition(" (")
-    shown = f"{value:g}" if type(value) is float else str(value)
+    shown = f"{value:g}" if type(value) is float else str(value).replace("_", " ")
     return f"{text} {shown} {unit}".rstrip()
 
 

@@ -35,6 +35,25 @@ def test_lines_of_numbers_say_their_unit():
     assert [line.get_label() for line in ax.get_lines()] == ["voltage 100 V", "voltage 200 V"]
 
 
+def test_names_are_words():
+    rows = [(x, law, 1.0) for x in (0.1, 0.2) for law in ("strong_troxel", "kaczmarek")]
+    lines = sweep(table(rows), GAP, OUT, by=LAW).get_lines()
+    assert [line.get_label() for line in lines] == ["law strong troxel", "law kaczmarek"]
+    ticks = sweep(table(rows), LAW, OUT).get_xticklabels()
+    assert [text.get_text() for text in ticks] == ["strong troxel", "kaczmarek"]
+
+
+def test_ticks_of_a_map_are_at_its_few_numbers():
+    names = ("motion.0.force", "surface.friction", OUT)
+    for count, marked in ((3, True), (20, False)):
+        rows = [(0.02 * (1 + i), y, 1.0 * i) for i in range(count) for y in (0.1, 0.3)]
+        ax = sweep_map(table(rows, names), names[0], names[1], OUT)
+        assert (len(ax.get_xticks()) == count) == marked
+        if marked:
+            np.testing.assert_allclose(ax.get_xticks(), [0.02, 0.04, 0.06])
+            assert [text.get_text() for text in ax.get_xticklabels()] == ["0.02", "0.04", "0.06"]
+
+
 def test_axes_have_the_units_of_the_sweep():
     names = ("motion.0.force", "contact_width.max", OUT)
     rows = [(x, w, x * w) for x in (0.1, 0.2) for w in (1.0, 2.0)]

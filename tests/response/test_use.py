@@ -55,7 +55,9 @@ def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
     assert by_run == pytest.approx(by_derivative, rel=0.05)
     assert f"+1 sd of {key} changes" in repr(found)
     drawn = ev.plotting.tornado(found, "tangential_force")
-    assert [label.get_text() for label in drawn.get_yticklabels()][-1] == key
+    words = {"finger.materials.hypodermis.E": "hypodermis E", "surface.friction": "friction"}
+    assert [label.get_text() for label in drawn.get_yticklabels()][-1] == words[key]
+    assert drawn.get_xlabel() == "tangential force for one sd (N/mm)"
     band = ev.plotting.forces(found.result, sd=found.sd).collections[0].get_paths()[0].vertices
     assert np.ptp(band[:, 1]) > found.result.tangential_force.max()
     with pytest.raises(ev.InputError, match="no column"):
