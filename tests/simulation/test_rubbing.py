@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from tools.builders import resumed
 from tools.fakes import fake_result
 
 import evfem as ev
@@ -168,3 +169,10 @@ def test_words_that_people_try_lead_to_the_column_that_they_mean(slid, asked, me
 def test_friction_of_a_history_without_it_is_the_force():
     """Of columns among which there is none, as those of a fit's curve of an own room."""
     assert "tangential_force?" in str(no_column("column", "friction", ["position", "tangential_force"]))
+
+
+def test_a_run_that_goes_on_has_the_friction_of_one_that_was_not_interrupted(tmp_path):
+    """From the hovering step on, whose friction is an empty cell of the checkpoint's rows."""
+    whole, again = resumed(scene(), 1, folder=tmp_path)
+    for name in (*OWN, "apparent_friction"):
+        assert_array_equal(again[name], whole[name])
