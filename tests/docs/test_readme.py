@@ -116,5 +116,5 @@ def test_its_picture_shows_the_friction_of_both_slides_and_the_skin_while_some_o
     assert curves["0 V"][-1] == pytest.approx(0.4, rel=1e-6)
     assert curves["150 V"][-1] == pytest.approx(0.4 * (1.0 + on.electrostatic_force[-1] / 0.3), rel=1e-6)
     statuses = panels[1].collections[-1].get_array()
-    assert set(np.unique(statuses)) >= {1.0, 2.0}
+    assert 0.25 < np.mean(statuses[statuses > 0.0] == 2.0) < 0.75
     assert (tmp_path / "slide.png").stat().st_size < 200_000

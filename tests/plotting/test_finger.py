@@ -286,11 +286,12 @@ def test_results_beside_each_other_have_one_scale():
 
 @pytest.mark.parametrize("field", ["contact_pressure", "shear_traction", "electrostatic_traction"])
 def test_arrows_of_panels_side_by_side_are_as_long_for_as_large_a_traction(field):
-    """A finger with twice the tractions and half the room below it has arrows twice as long."""
+    """A finger with twice the tractions and less room below its surface has arrows twice as long."""
     result = fake_result()
     frame = result.frames[-1]
-    twice = replace(frame, **{field: 2.0 * getattr(frame, field)}, displacement=0.5 * frame.displacement)
-    panels = side_by_side({"one": result, "two": replace(result, frames=(twice,))}, field)
+    twice = replace(frame, **{field: 2.0 * getattr(frame, field)}, gap=frame.gap + 0.1)
+    both, window = {"one": result, "two": replace(result, frames=(twice,))}, (-0.9, 0.9, -0.5, 0.3)
+    panels = side_by_side(both, field, near=window)
     longest = []
     for ax in panels[2:]:
         (arrows,) = [one for one in ax.collections if isinstance(one, Quiver)]
