@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 #: where a solid is seen from, and what of its colours is left where a face is seen from the side
 EYE, DIMMEST = np.array([0.5, -0.65, 0.9]), 0.6
+#: what is left of a colour that is used again
+DARKER = 0.55
 #: nodes around a face: corners, and on quadratic cells the middles of its edges
 AROUND = {4: (0, 1, 2, 3), 9: (0, 4, 1, 5, 2, 6, 3, 7)}
 
@@ -40,9 +41,9 @@ def _draw_plane(mesh: Mesh, ax: Axes) -> None:
     from matplotlib.collections import PolyCollection
 
     outlines = mesh.points[rounds(mesh)]
-    for (name, number), color in zip(mesh.region_names.items(), cycle(REGIONS), strict=False):
+    for (name, number), colour in zip(mesh.region_names.items(), colours_of(mesh).values(), strict=True):
         cells, label = list(outlines[mesh.region == number]), name.replace("_", " ")
-        patches = PolyCollection(cells, facecolors=color, edgecolors="white", linewidths=0.2, label=label)
+        patches = PolyCollection(cells, facecolors=colour, edgecolors="white", linewidths=0.2, label=label)
         ax.add_collection(patches)
     ax.set_xlabel("x (mm)")
     ax.set_ylabel("y (mm)")
@@ -50,18 +51,26 @@ def _draw_plane(mesh: Mesh, ax: Axes) -> None:
 
 def _draw_solid(mesh: Mesh, ax: Axes) -> None:
     from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgb
 
     faces, cells = cut_open(mesh)
     order, places, facing = seen(mesh.points, faces[:, :4])
     outlines = places[faces[order][:, AROUND[faces.shape[1]]]]
-    colours = dict(zip(mesh.region_names.values(), cycle(REGIONS), strict=False))
-    plain = np.array([to_rgb(colours[number]) for number in mesh.region[cells[order]].tolist()])
+    colours = colours_of(mesh)
+    plain = np.array([colours[number] for number in mesh.region[cells[order]].tolist()])
     shaded = plain * (DIMMEST + (1.0 - DIMMEST) * facing)[:, None]
     ax.add_collection(PolyCollection(list(outlines), facecolors=shaded, edgecolors="white", linewidths=0.1))
     for name, number in mesh.region_names.items():
         ax.scatter([], [], marker="s", color=colours[number], label=name.replace("_", " "))
     ax.set_axis_off()
+
+
+def colours_of(mesh: Mesh) -> dict[int, Floats]:
+    """Number of a region -> its colour (3,); where the colours begin again they are darker."""
+    from matplotlib.colors import to_rgb
+
+    rounds = (divmod(i, len(REGIONS)) for i in range(len(mesh.region_names)))
+    shades = [DARKER**again * np.array(to_rgb(REGIONS[i])) for again, i in rounds]
+    return dict(zip(mesh.region_names.values(), shades, strict=True))
 
 
 def seen(points: Floats, corners: Ints) -> tuple[Ints, Floats, Floats]:

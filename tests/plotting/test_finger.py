@@ -328,6 +328,17 @@ def test_regions_have_their_cells_and_names(kind):
     assert not np.array_equal(soft.get_facecolor(), hard.get_facecolor())
 
 
+def test_ten_regions_are_told_apart():
+    mesh = square_mesh("quad")
+    names = {f"layer {i}": i for i in range(10)}
+    many = replace(mesh, region=np.arange(len(mesh.cells)), region_names=names)
+    drawn = [c for c in regions(many).collections if type(c) is PolyCollection]
+    colours = np.array([c.get_facecolor()[0, :3] for c in drawn if len(c.get_facecolor())])
+    apart = np.linalg.norm(colours[:, None] - colours, axis=2) + np.eye(len(colours))
+    assert len(colours) == 10
+    assert apart.min() > 0.1
+
+
 def test_regions_stay_within_their_figure():
     """Labels and legend beside axes in true proportions are not cut off."""
     ax = regions(ev.FingerPad(resolution="coarse").mesh())
