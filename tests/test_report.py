@@ -89,6 +89,8 @@ def test_the_page_needs_no_other_file_and_runs_nothing(slid, tmp_path):
     assert "url(" not in style
     assert "@import" not in style
     assert len(found.images) == 3
+    softly = 1e3 * slid.frames[-1].contact_pressure.max()
+    assert f"at most {softly:.3g} kPa" in found.images[2]["alt"]
     for image in found.images:
         head, data = image["src"].split(",")
         assert head == "data:image/png;base64"

@@ -192,7 +192,11 @@ def _pictures(result: Result) -> Iterator[str]:
         yield _p("No fields were kept, so there is no picture of the finger.")
         return
     at = f"step {result.frames[-1].step}"
-    pressure = f"{np.nanmax(result.frames[-1].contact_pressure):.3g} MPa"
+    from evfem.plotting.labels import shown_in
+
+    most = np.nanmax(result.frames[-1].contact_pressure)
+    unit, factor = shown_in("MPa", most)
+    pressure = f"{factor * most:.3g} {unit}"
     if result.mesh.dim == 3:
         from evfem.plotting.footprint import footprint
 

@@ -40,7 +40,7 @@ typedef struct {
 
 static void forget(PyObject *capsule) { PyMem_Free(PyCapsule_GetPointer(capsule, BOUNDED)); }
 
-static PyObject *call_bounded(PyObject *self, PyObject *args) {
+static inline PyObject *call_bounded(PyObject *self, PyObject *args) {
     PyObject *array, *capsule = NULL;
     Py_ssize_t end;
     bounded *own = NULL;
@@ -67,7 +67,7 @@ static PyObject *call_bounded(PyObject *self, PyObject *args) {
 
 /* The numbers of a capsule, if there are so many and none leads beyond `size` items; else NULL with an error
    set, as by `hold`. */
-static const int32_t *numbers_of(PyObject *capsule, Py_ssize_t count, Py_ssize_t size) {
+static inline const int32_t *numbers_of(PyObject *capsule, Py_ssize_t count, Py_ssize_t size) {
     if (PyErr_Occurred()) return NULL;
     const bounded *all = PyCapsule_GetPointer(capsule, BOUNDED);
     if (all && all->count != count)
