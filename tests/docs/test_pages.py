@@ -79,7 +79,7 @@ def run(page, wanted, capsys):
     for kind, text, mark, line in blocks(page):
         place = f"{page}:{line + 1}"
         if mark not in wanted:
-            assert mark is None or mark.startswith(("not run: ", "needs ")), place
+            assert mark is None or mark.startswith(("not run: ", "needs ", "takes long")), place
             printed = None
         elif kind == "python":
             exec(compile("\n" * line + text, str(DOCS / page), "exec"), namespace)
