@@ -28,9 +28,11 @@ def split(mesh: Mesh) -> tuple[Mesh, Ints]:
     ), nodes
 
 
-def nodal_means(mesh: Mesh, values: Floats) -> Floats:
-    """Means (N, ...) of the values (E, ...) of the cells around each node."""
-    total = np.zeros((len(mesh.points), *values.shape[1:]))
-    np.add.at(total, mesh.cells.ravel(), np.repeat(values, mesh.cells.shape[1], axis=0))
-    number = np.bincount(mesh.cells.ravel(), minlength=len(mesh.points))
-    return np.asarray(total / number.reshape(-1, *[1] * (values.ndim - 1)))
+def nodal_means(mesh: Mesh, values: Floats, weights: Floats | float = 1.0) -> Floats:
+    """Means (N, ...) of the values (E, ...) of the cells around each node, with `weights` (E,)."""
+    nodes = mesh.cells.ravel()
+    weight = np.repeat(np.broadcast_to(weights, len(mesh.cells)), mesh.cells.shape[1])
+    columns = np.repeat(values.reshape(len(values), -1), mesh.cells.shape[1], axis=0).T
+    total = np.array([np.bincount(nodes, weight * column, len(mesh.points)) for column in columns])
+    means = total / np.bincount(nodes, weight, len(mesh.points))
+    return np.asarray(means.T.reshape(-1, *values.shape[1:]))

@@ -22,6 +22,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import EvfemError, InputError, describe_value
 from evfem.mesh.mesh import Mesh
+from evfem.mesh.split import split
 from evfem.plotting.figures import BOTH_SIGNS, EDGE, ONE_SIGN, STATUS, TISSUE
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
@@ -97,18 +98,13 @@ def areas(outlines: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Triangles (T, 3) between V vertices, own ones in each region: mesh `nodes` (V,), `cells` (E, n)."""
+    """Triangles (T, 3) between V vertices, own ones in each region: of a `mesh` whose regions share no node,
+    from `nodes` (V,) of the whole one.
+    """
 
+    mesh: Mesh
     nodes: Ints
     triangles: Ints
-    cells: Ints
-
-    def averages(self, values: Floats, weights: Floats) -> Floats:
-        """Weighted averages (V,) of what the cells around a vertex say (E,)."""
-        weight = np.broadcast_to(weights[:, None], self.cells.shape).ravel()
-        value = np.broadcast_to(values[:, None], self.cells.shape).ravel()
-        size, vertices = self.nodes.size, self.cells.ravel()
-        return np.bincount(vertices, weight * value, size) / np.bincount(vertices, weight, size)
 
 
 def patches(mesh: Mesh) -> Patches:
@@ -120,19 +116,15 @@ def patches(mesh: Mesh) -> Patches:
     >>> two = patches(Mesh(points, cells, "quad", np.array([0, 1]), {"soft": 0, "hard": 1}))
     >>> len(two.nodes), len(two.triangles)  # nodes 1 and 2 belong to both regions
     (8, 4)
-    >>> two.averages(np.array([1.0, 3.0]), np.ones(2)).tolist()
-    [1.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0]
     """
-    count = len(mesh.points)
-    owned, vertices = np.unique(mesh.cells + count * mesh.region[:, None], return_inverse=True)
-    cells = vertices.reshape(mesh.cells.shape)
+    apart, nodes = split(mesh)
     if mesh.kind == "quad9":  # a fan around the middle node
         fans = [[8, i, 4 + i] for i in range(4)] + [[8, 4 + i, (i + 1) % 4] for i in range(4)]
     elif mesh.kind == "triangle6":  # three corners and the triangle of middle nodes
         fans = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
     else:
         fans = [[0, i, i + 1] for i in range(1, mesh.corners - 1)]
-    return Patches(owned % count, np.concatenate([cells[:, fan] for fan in fans]), cells)
+    return Patches(apart, nodes, np.concatenate([apart.cells[:, fan] for fan in fans]))
 
 
 @dataclass(frozen=True)

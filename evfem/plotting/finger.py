@@ -13,6 +13,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.errors import InputError, describe_value
 from evfem.mesh.mesh import Mesh
+from evfem.mesh.split import nodal_means
 from evfem.plotting import fields, figures
 from evfem.plotting.labels import field_label, field_unit, named, shown_in
 from evfem.plotting.solid import SolidView
@@ -270,7 +271,7 @@ def _draw_tissue(
         ax.add_collection(mapped)
     else:
         pieces = fields.patches(mesh)
-        array = pieces.averages(values, fields.areas(outlines)) if of_cells else values[pieces.nodes]
+        array = nodal_means(pieces.mesh, values, fields.areas(outlines)) if of_cells else values[pieces.nodes]
         mapped = figures.shaded(ax, points[pieces.nodes], pieces.triangles, array)
     scale.apply(mapped)
     mapped.set_rasterized(True)

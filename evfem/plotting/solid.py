@@ -14,6 +14,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, describe_value
+from evfem.mesh.split import nodal_means, split
 from evfem.plotting.fields import CELL_FIELDS, TRACTIONS, Scale, Window, values_of
 from evfem.plotting.figures import EDGE, TISSUE, shaded
 from evfem.plotting.meshes import cut_open, seen
@@ -66,11 +67,9 @@ class SolidView:
 
     def _averages(self, values: Floats, faces: Ints, cells: Ints) -> Floats:
         """Means of the cells around a node, within the region of a face's cell."""
-        mesh, count = self.result.mesh, len(self.result.mesh.points)
-        owned = (mesh.cells + count * mesh.region[:, None]).ravel()
-        weights = np.repeat(values, mesh.cells.shape[1])
-        mean = np.bincount(owned, weights) / np.maximum(np.bincount(owned), 1)
-        return mean[faces + count * mesh.region[cells, None]]
+        mesh, (apart, _) = self.result.mesh, split(self.result.mesh)
+        corners = (mesh.cells[cells][:, :, None] == faces[:, None]).argmax(axis=1)
+        return nodal_means(apart, values)[np.take_along_axis(apart.cells[cells], corners, axis=1)]
 
     def window(self, near: str | Window | None) -> Window:
         """What is shown: left, right, lower and upper end in the picture; InputError for a close-up."""

@@ -123,7 +123,7 @@ def test_smooth_colours_are_averages_by_area_within_each_region(kind, undivided)
                 wanted[node, region] = np.average(frame.von_mises[around], weights=weight)
     pieces = patches(mesh)
     region = np.zeros(len(pieces.nodes), dtype=int)
-    region[pieces.cells[mesh.region == 1]] = 1
+    region[pieces.mesh.cells[mesh.region == 1]] = 1
     assert len(wanted) == len(pieces.nodes)
     keys = zip(pieces.nodes.tolist(), region.tolist(), strict=True)
     values = np.array([wanted[key] for key in keys])
