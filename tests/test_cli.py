@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from tools.commands import called, contents, printed, process_of, run_process
-from tools.fakes import SQUARE_SCENE
+from tools.fakes import PRESS_AND_SLIDE, SQUARE_SCENE
 from tools.meshes import square_mesh
 
 import evfem
@@ -26,18 +26,7 @@ from evfem.simulation.result import COLUMNS
 from evfem.studies.campaign import study
 from evfem.templates import TEMPLATES
 
-SCENE = f"""{SQUARE_SCENE}
-[output]
-every = 2
-[[motion]]
-kind = "press"
-indentation = 0.2
-steps = 2
-[[motion]]
-kind = "slide"
-distance = 0.5
-steps = 3
-"""
+SCENE = f"{SQUARE_SCENE}[output]\nevery = 2\n{PRESS_AND_SLIDE}"
 MANY_STEPS = SCENE.replace("steps = 3", "steps = 30").replace("every = 2", "every = 1")
 RESULTS = [".checkpoint.rows", "checkpoint.npz", "fields.pvd", "forces.png", "history.csv", "summary.json"]
 

@@ -6,23 +6,14 @@ from types import SimpleNamespace
 
 import pytest
 from tools.commands import called
-from tools.fakes import SQUARE_SCENE, fake_row
+from tools.fakes import PRESS_AND_SLIDE, SQUARE_SCENE, fake_row
 from tools.meshes import square_mesh
 
 from evfem.mesh import file as meshfile
 from evfem.reporting.log import Steps, logged
 from evfem.runfolder import result_in
 
-SCENE = f"""{SQUARE_SCENE}
-[[motion]]
-kind = "press"
-indentation = 0.2
-steps = 2
-[[motion]]
-kind = "slide"
-distance = 0.5
-steps = 3
-"""
+SCENE = f"{SQUARE_SCENE}{PRESS_AND_SLIDE}"
 LINE = re.compile(r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d),\d{3}  (.*)")
 
 

@@ -191,10 +191,10 @@ def _pictures(result: Result) -> Iterator[str]:
     if not result.frames:
         yield _p("No fields were kept, so there is no picture of the finger.")
         return
-    at = f"step {result.frames[-1].step}"
     from evfem.plotting.labels import shown_in
 
-    most = np.nanmax(result.frames[-1].contact_pressure)
+    frame = result.frames[-1]
+    most, at = np.max(frame.contact_pressure), f"step {frame.step}"
     unit, factor = shown_in("MPa", most)
     pressure = f"{factor * most:.3g} {unit}"
     if result.mesh.dim == 3:

@@ -22,6 +22,17 @@ nu = 0.3
 kind = "flat"
 friction = 0.2
 """
+#: it is pressed and slides
+PRESS_AND_SLIDE = """
+[[motion]]
+kind = "press"
+indentation = 0.2
+steps = 2
+[[motion]]
+kind = "slide"
+distance = 0.5
+steps = 3
+"""
 
 
 def lines_of(ax):
