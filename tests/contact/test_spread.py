@@ -166,6 +166,17 @@ def test_linear_tractions_along_facets_stay_and_what_alternates_goes():
     assert_allclose(size @ even.evened(drawn, drawn, none), size @ drawn)
 
 
+def test_shear_of_sides_that_stick_stays_within_the_cone():
+    """Two nodes of a side at the bound and one without shear: the linear one of their force is beyond it."""
+    skin, points = facets()
+    rng, even, none = np.random.default_rng(5), Facets(skin, points), np.zeros(len(points), bool)
+    pressure, shear = rng.uniform(1.0, 1.1, len(points)), rng.choice([-0.2, 0.0, 0.2], len(points))
+    bound = 0.2 * even.evened(pressure, pressure, none)
+    found = even.evened(pressure, shear * pressure, none)
+    assert np.abs(found).max() > 0.15
+    assert_allclose(np.maximum(np.abs(found), bound), bound, rtol=1e-12)
+
+
 def test_tractions_stay_where_a_side_touches_in_part():
     skin, points = facets()
     pressure = 1.0 + np.random.default_rng(3).uniform(0.0, 0.1, len(points))
