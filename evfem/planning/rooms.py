@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from evfem.circuit.load import Air, Load, Supply
 from evfem.common.rooms import Room
 from evfem.scene.scene import Scene
-from evfem.terms.friction import Felt, Rubbing
+from evfem.terms.friction import ApparentFriction, OverallFriction
 from evfem.tissue.dynamics import DYNAMICS
 
 
@@ -31,7 +31,13 @@ class Kind:
 
 
 KINDS = (
-    Kind("surface.friction_law", "friction", "terms.friction", lambda scene: scene.has_friction, Rubbing()),
+    Kind(
+        "surface.friction_law",
+        "friction",
+        "terms.friction",
+        lambda scene: scene.has_friction,
+        OverallFriction(),
+    ),
     Kind("surface.elastic", "elastic surface", "terms.foundation", lambda scene: bool(scene.ground.elastic)),
     Kind("solver.contact", "penalties", "terms.foundation", lambda scene: scene.solver.contact != "exact"),
     Kind("electrostatics", "electricity", "terms.attraction", lambda scene: scene.electrics.acts),
@@ -46,10 +52,10 @@ KINDS = (
     Kind("adhesion", "adhesion", "terms.attraction", lambda scene: scene.adhesion is not None),
     Kind(
         "surface.friction",
-        "felt friction",
+        "apparent friction",
         "terms.friction",
         lambda scene: scene.has_friction and scene.is_pulled,
-        Felt(),
+        ApparentFriction(),
     ),
     Kind("solver.dynamics", "time", "tissue.dynamics", lambda scene: bool(DYNAMICS[scene.solver.dynamics])),
     Kind("hand", "hand", "terms.hand", lambda scene: scene.hand is not None),
@@ -62,6 +68,6 @@ def rooms_of(scene: Scene) -> tuple[Kind, ...]:
     >>> from evfem import Display, FingerPad, Kaczmarek, Press
     >>> scene = Scene(FingerPad(), Display(friction=0.3), Kaczmarek(), 100.0, Press(force=0.1))
     >>> [one.name for one in rooms_of(scene)]
-    ['friction', 'electricity', 'breakdown', 'felt friction']
+    ['friction', 'electricity', 'breakdown', 'apparent friction']
     """
     return tuple(kind for kind in KINDS if kind.there(scene))

@@ -10,7 +10,7 @@ from evfem.circuit.load import Air, Load
 from evfem.common.arrays import Floats
 from evfem.terms.charging import ChargeBooks
 from evfem.terms.foundation import ElasticFoundation
-from evfem.terms.friction import COEFFICIENTS, Felt, Rubbing, of_forces
+from evfem.terms.friction import COEFFICIENTS, ApparentFriction, OverallFriction, of_forces
 from evfem.terms.sources import GAP_COLUMNS, ForceSource
 from evfem.terms.traction import force_columns
 
@@ -18,8 +18,8 @@ from evfem.terms.traction import force_columns
 COLUMNS = {
     one.name: one
     for one in (
-        *Rubbing.columns,
-        *Felt.columns,
+        *OverallFriction.columns,
+        *ApparentFriction.columns,
         *force_columns("adhesive", "adhesion"),
         *ElasticFoundation.columns,
         *ChargeBooks.columns,

@@ -52,15 +52,15 @@ COEFFICIENTS = {
 }
 
 
-class Rubbing(Room):
-    """What friction is over all of the contact, and how much of it sticks and slips, as columns: shares of
-    the lengths or areas for which the touching nodes stand, NaN where nothing touches.
+class OverallFriction(Room):
+    """Columns of the friction coefficient of the whole contact, and of the fractions of its length or area
+    that stick and slip (by tributary lengths or areas of nodes), NaN where nothing touches.
     """
 
     columns = (
         Column("friction", "", "tangential_force over normal_force; nan where nothing presses"),
-        Column("stick_share", "", "of what touches, by the nodes' lengths or areas, the part that sticks"),
-        Column("slip_share", "", "of what touches the part that slips"),
+        Column("stick_share", "", "fraction of the real contact that sticks"),
+        Column("slip_share", "", "fraction of the real contact that slips"),
     )
 
     def values(self, model: Any, state: Any) -> Mapping[str, float]:
@@ -74,8 +74,8 @@ class Rubbing(Room):
         return {"friction": of_forces("friction", row)}
 
 
-class Felt(Room):
-    """Friction as a load of so much feels it, where something beside the load presses."""
+class ApparentFriction(Room):
+    """Column of the friction relative to the load alone, where an attraction presses beside it."""
 
     columns = (
         Column("apparent_friction", "", "applied_tangential_force over applied_force; nan without a load"),
