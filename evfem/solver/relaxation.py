@@ -166,13 +166,18 @@ def pull(state: State, target: Target) -> float:
 class DragSchedule:
     """Drag of a release: the `rate` of the next step, the `rate_factor` by which it rises if that fails, the
     last step's `speed` (mm) and its `growth` over the step before. At rates below `rate_to_test_rest` an
-    equilibrium without drag is sought.
+    equilibrium without drag is sought. A rate that `failed` is tried again when the body has slowed down to
+    `speed_to_retry`.
 
     >>> drag = DragSchedule()
     >>> drag.moved(0.5), drag.choose(), drag.moved(0.25), drag.rate, drag.growth
     (None, None, None, 0.5, 0.25)
     >>> drag.failed(), drag.rate, drag.failed(), drag.rate
     (None, 1.0, None, 4.0)
+    >>> drag.moved(0.03), drag.choose(), drag.rate, drag.moved(0.05), drag.choose(), drag.rate
+    (None, None, 2.0, None, None, 2.0)
+    >>> drag.moved(0.03), drag.choose(), drag.rate
+    (None, None, 1.0)
     """
 
     rate: float = 1.0
@@ -180,9 +185,12 @@ class DragSchedule:
     speed: float = np.inf
     growth: float = 0.0
     rate_to_test_rest: float = DRAG_REST
+    rate_failed: float = 0.0
+    speed_to_retry: float = np.inf
 
     def failed(self) -> None:
         """A step failed: raise the rate."""
+        self.rate_failed, self.speed_to_retry = self.rate, self.speed / DRAG_CHANGE
         self.rate, self.rate_factor = self.rate_factor * self.rate, DRAG_CHANGE * self.rate_factor
 
     def moved(self, distance: float) -> None:
@@ -203,7 +211,8 @@ class DragSchedule:
 
     def choose(self) -> None:
         """The rate after a step that succeeded: while an instability grows, drag stays above its rate."""
-        if self.growth < DRAG_GROWTH[0]:
-            self.rate /= DRAG_CHANGE
+        lower = self.rate / DRAG_CHANGE
+        if self.growth < DRAG_GROWTH[0] and (lower > self.rate_failed or self.speed <= self.speed_to_retry):
+            self.rate = lower
         elif self.growth >= DRAG_GROWTH[1]:
             self.rate *= DRAG_CHANGE
