@@ -26,6 +26,8 @@ HEAD = """\
 Each key with type, unit, default and what is allowed, as the reader of the files has them.
 `evfem schema` prints the same as a JSON schema, with which an editor completes and checks keys
 ([how](../commandline.md#keys-in-an-editor)); `evfem init` writes a scene to begin with.
+A number in mm, s, V, MPa, Hz, degrees or the like may also be a text with
+[another unit](../notation.md#units).
 """
 OPTIONS = re.compile("(<!-- importers -->)\n.*?(<!-- end -->)", re.S)
 PUBLIC = re.compile("(<!-- public names -->)\n.*?(<!-- end -->)", re.S)

@@ -34,7 +34,7 @@ ROOMS = {
             "xarray",
             "pypardiso",
         },
-        "constants arrays rooms notices checks views pools digest storage units foreign tables",
+        "constants arrays rooms notices units checks views pools digest storage foreign tables",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio", "netCDF4", "h5py", "vtkmodules"},

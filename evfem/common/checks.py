@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from evfem.common.units import in_unit
 from evfem.errors import InputError, Mistakes, describe_value
 
 MOST_STEPS = 1_000_000
@@ -29,12 +30,17 @@ RENAMED_KEYS = {
 Values = Any  # a number, or an array of numbers: real, or complex in a complex step
 
 
-def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = lambda x: True) -> float:
-    """`value` as a finite float that passes `test`.
+def real(
+    key: str, value: object, allowed: str, test: Callable[[float], bool] = lambda x: True, unit: str = ""
+) -> float:
+    """`value` as a finite float that passes `test`; where there is a `unit`, a text may have another one.
 
     >>> real("gap", 1, "a gap in mm, not negative", lambda gap: gap >= 0)
     1.0
+    >>> real("gap", "15 um", "a gap in mm", unit="mm")
+    0.015
     """
+    value = in_unit(key, value, unit, allowed)
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(key, describe_value(value), _bare(value, allowed))
     try:
@@ -143,7 +149,7 @@ class Within:
 
 def number(allowed: str, test: Callable[[float], bool], unit: str = "") -> dict[str, Any]:
     """Rule of a field that is a finite float and passes `test`; `allowed` says so in words."""
-    check = lambda key, value: real(key, value, allowed, test)  # noqa: E731
+    check = lambda key, value: real(key, value, allowed, test, unit)  # noqa: E731
     return {"allowed": allowed, "check": check, "test": test, "unit": unit}
 
 
@@ -151,8 +157,9 @@ def several(allowed: str, test: Callable[[float], bool], unit: str = "") -> dict
     """Rule of a field that is a number or a list of them, kept as a tuple."""
 
     def check(key: str, entered: Any) -> tuple[float, ...]:
-        values = tuple(entered) if isinstance(entered, Sequence | np.ndarray) else (entered,)
-        return tuple(real(key, value, allowed, test) for value in values)
+        alone = isinstance(entered, str) or not isinstance(entered, Sequence | np.ndarray)
+        values = (entered,) if alone else tuple(entered)
+        return tuple(real(key, value, allowed, test, unit) for value in values)
 
     return {"allowed": allowed, "check": check, "unit": unit, "type": float | list[float]}
 

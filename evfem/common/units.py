@@ -1,4 +1,6 @@
-"""Texts of others: the units they are in, how a header says so, and the numbers in their lines."""
+"""Units: of values written as text, and in the texts of others, how a header says so, and the numbers in
+their lines.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ import re
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from evfem.errors import InputError
+from evfem.errors import InputError, describe_value
 
 #: unit that is meant without a word -> what else it is measured in, and how many of the first that is
 SIZES: Mapping[str, Mapping[str, float]] = {
@@ -32,12 +34,20 @@ SIZES: Mapping[str, Mapping[str, float]] = {
     },
     "mm/s": {"mm/s": 1.0, "um/s": 1e-3, "cm/s": 10.0, "m/s": 1e3, "mm/min": 1.0 / 60.0},
     "1/mm": {"1/mm": 1.0, "mm-1": 1.0, "1/um": 1e3, "1/cm": 0.1, "1/m": 1e-3, "m-1": 1e-3},
+    "degrees": {
+        "degrees": 1.0, "degree": 1.0, "deg": 1.0, "°": 1.0,
+        "rad": 180.0 / math.pi, "mrad": 0.18 / math.pi,
+    },
+    "V/mm": {"V/mm": 1.0, "V/um": 1e3, "V/m": 1e-3, "kV/mm": 1e3, "kV/m": 1.0, "kV/cm": 100.0, "MV/m": 1e3},
+    "t/mm3": {"t/mm3": 1.0, "kg/m3": 1e-12, "g/cm3": 1e-9},
     "1": {"1": 1.0, "-": 1.0, "%": 0.01},
 }  # fmt: skip
+#: those that a value may have as text; a force of the plane is one per mm of width and has none
+WRITTEN = ("mm", "s", "V", "MPa", "Hz", "S/m", "mm/s", "degrees", "V/mm", "t/mm3")
 #: those that no column of evfem has, but by which a line is known as one of units
 OTHERS = (
     "g kg mg lb lbs oz gram grams °C degC °F degF K A mA uA nA C nC uC pC F uF nF pF ohm Ohm kOhm MOhm Ω kΩ "
-    "W mW rad mrad deg ° rpm 1/s 1/min mm/s2 m/s2 N/s mN/s Pa/s MPa/s kPa/s V/s N*m Nm mNm T mT dB lx"
+    "W mW rpm 1/s 1/min mm/s2 m/s2 N/s mN/s Pa/s MPa/s kPa/s V/s N*m Nm mNm T mT dB lx"
 )
 
 
@@ -60,6 +70,8 @@ UNITS: Mapping[str, tuple[str, float]] = {
 } | {spelled: (name, 1.0) for name in OTHERS.split() for spelled in sorted(spellings(name))}
 #: those that a name can end with, and labels (`probe_A`) that are none
 LABELS = ("1", "-", "%", "A", "C", "F", "K", "T", "W")
+#: a number and what follows
+AMOUNT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.].*?)\s*")
 BRACKETS = re.compile(r"\s*[_/,:]?\s*(?:\[([^\]]*)\]|\(([^)]*)\))")
 #: a bracket beside that of the unit that is a word, and no factor as (x10)
 WORD = re.compile(r"(?!x\s*\d)[^\W\d_].*")
@@ -84,6 +96,36 @@ def plain_unit(text: str | None) -> str | None:
     for sign, plain in (("²", "2"), ("⁻¹", "-1"), ("**", ""), ("^", ""), ("·", "*")):
         text = text.replace(sign, plain)
     return text or None
+
+
+def can_be_text(unit: str) -> bool:
+    """Whether a value of this unit may be a text with another one.
+
+    >>> can_be_text("rad"), can_be_text("N/mm")
+    (True, False)
+    """
+    return UNITS.get(unit, ("", 1.0))[0] in WRITTEN
+
+
+def in_unit(key: str, value: object, unit: str, allowed: str) -> object:
+    """A text such as "3 um" as a number of `unit`, another value as it is; `InputError` where it is in a unit
+    of something else.
+
+    >>> in_unit("width", "15 um", "mm", ""), in_unit("phase", "90°", "rad", ""), in_unit("width", 2, "mm", "")
+    (0.015, 1.5707963267948966, 2)
+    >>> in_unit("frequency", "5 ms", "Hz", "a frequency")
+    Traceback (most recent call last):
+    evfem.errors.InputError: frequency: given "5 ms"; allowed: a frequency, with Hz | mHz | kHz | MHz | GHz
+    """
+    found = AMOUNT.fullmatch(value) if isinstance(value, str) and can_be_text(unit) else None
+    if found is None:
+        return value
+    base, size = UNITS[unit]
+    same, factor = UNITS.get(plain_unit(found.group(2)) or "", ("", 1.0))
+    if same != base:
+        raise InputError(key, describe_value(value), f"{allowed}, with {' | '.join(SIZES[base])}")
+    amount = float(found.group(1))
+    return amount * (factor / size) if factor >= size else amount / (size / factor)  # rounded once
 
 
 def named_unit(cell: str) -> tuple[str, str | None]:

@@ -263,8 +263,12 @@ def roughness_of(given: Any, key: str = "roughness_gap") -> RoughnessLaw | None:
         raise InputError(key, f"the class {given.__name__}", "an object of it")
     if isinstance(given, RoughnessLaw):
         return given
-    gap = real(key, given, ALLOWED, Within(0.0, WIDEST))
+    gap = _length(key, given)
     return ConstantRoughness(gap) if gap != 0.0 else None
+
+
+def _length(key: str, given: Any) -> float:
+    return real(key, given, ALLOWED, Within(0.0, WIDEST), "mm")
 
 
 def distribution_of(given: Any, key: str = "roughness_gap") -> str:
@@ -278,7 +282,7 @@ def distribution_of(given: Any, key: str = "roughness_gap") -> str:
 
 def _gap(key: str, given: Any) -> Any:
     distribution_of(given, key)
-    return given if roughness_of(given, key) is given else float(given)
+    return given if roughness_of(given, key) is given else _length(key, given)
 
 
 RoughnessGap = Annotated[

@@ -263,7 +263,7 @@ class Carrier:
     def __post_init__(self) -> None:
         check_fields(self)
         if not isinstance(self.envelope, TimeSignal):
-            envelope = real("envelope", self.envelope, _ENVELOPE, Within(0.0, LARGEST))
+            envelope = real("envelope", self.envelope, _ENVELOPE, Within(0.0, LARGEST), "V")
             set_frozen(self, envelope=envelope)
 
     @property

@@ -61,8 +61,8 @@ def _layers(allowed: str, test: Within, unit: str = "") -> dict[str, Any]:
 
     def check(key: str, value: Any) -> Any:
         if isinstance(value, list) and value:
-            return [real(f"{key}.{i}", one, allowed, test) for i, one in enumerate(value)]
-        return real(key, value, allowed, test)
+            return [real(f"{key}.{i}", one, allowed, test, unit) for i, one in enumerate(value)]
+        return real(key, value, allowed, test, unit)
 
     return {"allowed": allowed, "check": check, "test": test, "unit": unit}
 

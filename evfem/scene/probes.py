@@ -22,6 +22,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Checked, Within, finite, number
 from evfem.common.tables import csv_text
+from evfem.common.units import in_unit
 from evfem.errors import ABSENT, InputError, Mistakes, describe_value
 from evfem.mesh.faces import ON, crossings, inverted
 from evfem.mesh.mesh import Mesh
@@ -44,7 +45,10 @@ _INSIDE = "points of the undeformed tissue"
 
 def _numbers(allowed: str) -> dict[str, Any]:
     def check(key: str, value: Any) -> tuple[float, ...]:
-        found = np.atleast_1d(finite(key, value, allowed))
+        entered = [value] if isinstance(value, str) else value
+        if isinstance(entered, list | tuple):
+            entered = [in_unit(key, one, "mm", allowed) for one in entered]
+        found = np.atleast_1d(finite(key, entered, allowed))
         if found.ndim != 1 or not found.size or found.dtype.kind == "c":
             raise InputError(key, describe_value(value), allowed)
         return tuple(found.tolist())

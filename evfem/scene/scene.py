@@ -317,7 +317,7 @@ def _check_electrostatics(scene: Scene) -> None:
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = f"{VOLTAGE['allowed']}, a VoltageProfile or a signal over time"
-        voltage = real("electrostatics.voltage", scene.voltage, allowed, VOLTAGE["test"])
+        voltage = real("electrostatics.voltage", scene.voltage, allowed, VOLTAGE["test"], "V")
         set_frozen(scene, voltage=voltage)
     if scene.law is None:
         if scene.voltage != 0.0:

@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from evfem.circuit.signals import FOUND
 from evfem.common.checks import Key, Within, keys_of
+from evfem.common.units import AMOUNT, can_be_text
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
 from evfem.finger.fingerpad import Electrical, MeshedFinger
@@ -94,8 +95,10 @@ def _entry(key: Key) -> Entry:
     shape["description"] = key.documented
     if not key.required and isinstance(key.default, (bool, int, float, str)) and key.default != math.inf:
         shape["default"] = key.default
-    default = "" if key.required else _toml(key.default)
-    return Entry(key.name, _spoken(shape), unit, default, key.required, key.allowed, key.meaning, shape)
+    default, spoken = "" if key.required else _toml(key.default), _spoken(shape)
+    if shape.get("type") == "number" and can_be_text(unit):
+        shape |= {"type": ["number", "string"], "pattern": AMOUNT.pattern}
+    return Entry(key.name, spoken, unit, default, key.required, key.allowed, key.meaning, shape)
 
 
 def _shape(types: tuple[Any, ...]) -> Schema:

@@ -96,12 +96,12 @@ class Grating(RigidSurface):
         period = self.period
         groove = 0.5 * period if self.groove_width is None else self.groove_width
         allowed = f"a width in mm above 0 and below the period, {period:g}"
-        groove = real("surface.groove_width", groove, allowed, lambda width: 0.0 < width < period)
+        groove = real("surface.groove_width", groove, allowed, lambda width: 0.0 < width < period, "mm")
         narrower = min(groove, period - groove)
         wall = WALL * narrower if self.wall_width is None else self.wall_width
         widths = f"ridge and groove being {period - groove:g} and {groove:g} wide"
         allowed = f"a width in mm up to {narrower:g}, {widths}"
-        wall = real("surface.wall_width", wall, allowed, lambda width: FINEST <= width <= narrower)
+        wall = real("surface.wall_width", wall, allowed, lambda width: FINEST <= width <= narrower, "mm")
         set_frozen(self, groove_width=groove, wall_width=wall)
 
     def _wall(self, x: Array) -> tuple[Array, Array, Array]:
@@ -164,11 +164,10 @@ class SelfAffine(RigidSurface):
         super().__post_init__()
         period = self.period
         longest = period if self.longest is None else self.longest
-        longest = real(
-            "surface.longest", longest, f"a wavelength in mm up to the period, {period:g}", _within(period)
-        )
+        allowed = f"a wavelength in mm up to the period, {period:g}"
+        longest = real("surface.longest", longest, allowed, _within(period), "mm")
         allowed = f"a wavelength in mm up to the longest, {longest:g}"
-        shortest = real("surface.shortest", self.shortest, allowed, _within(longest))
+        shortest = real("surface.shortest", self.shortest, allowed, _within(longest), "mm")
         set_frozen(self, longest=longest, shortest=shortest)
         if not 1 <= len(self._waves) <= MOST_TERMS:
             problem = f"{len(self._waves)} waves between {longest:g} and {shortest:g} mm"

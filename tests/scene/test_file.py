@@ -327,7 +327,7 @@ WRONG = [
     (DISPLAY, 'law = "kaczmarek"', "gap_eps_r = 2.0", "electrostatics.law", "missing; allowed:"),
     (DISPLAY, "air_layer =", "air_laye =", "electrostatics.air_laye", "allowed: air_layer? (law, voltage,"),
     (DISPLAY, VOLTS, "", "electrostatics.voltage", "missing; allowed:"),
-    (DISPLAY, VOLTS, "voltage = '1 kV'", "electrostatics.voltage", 'given "1 kV"'),
+    (DISPLAY, VOLTS, "voltage = '1 kN'", "electrostatics.voltage", 'given "1 kN"'),
     (DISPLAY, VOLTS, "voltage = 1\nvoltage_file = 'voltage.csv'", "electrostatics.voltage", "exactly"),
     (DISPLAY, VOLTS, "voltage_file = 'scan.csv'", "electrostatics.voltage_file", "position,voltage"),
     (DISPLAY, "insulator_thickness = 0.09", "", "electrostatics.insulator_thickness", "missing; allowed:"),

@@ -4,6 +4,8 @@ of the files, but not stricter.
 
 import re
 import tomllib
+from contextlib import suppress
+from decimal import Decimal
 
 import jsonschema
 import pytest
@@ -11,7 +13,8 @@ import tomli_w
 from tools.meshes import square_mesh
 from tools.refusals import refuses
 
-from evfem import templates
+from evfem import FingerPad, Grating, NeoHookean, Probe, templates
+from evfem.common.units import SIZES, UNITS
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.scene import format as scenefile
@@ -97,6 +100,50 @@ def test_the_defaults_are_those_of_a_scene(scene_schema):
                 assert judged(scene_schema, text) == []
                 tried += 1
     assert tried > 40
+
+
+def test_values_may_be_texts_with_a_unit(scene_schema):
+    """Every number that has a length, time, voltage, ... may be a text with another unit of it: the same
+    scene to the last bit, by the schema and by the reader.
+    """
+    tried = set()
+    for one in scenes.sections():
+        for key in () if one.name.startswith(ELSEWHERE) or one.kind == "mesh" else one.keys:
+            if "string" not in key.schema.get("type", ()) or "minimum" not in key.schema:
+                continue
+            low, high = (Decimal(str(key.schema.get(side, 1e3))) for side in ("minimum", "maximum"))
+            value = (3 * low + high) / 4
+            with suppress(InputError):  # where one key is not enough, as for a voltage that changes
+                scene = loads(put(one, key.name, float(value)))
+                for unit, size in SIZES[UNITS[key.unit][0]].items():
+                    if key.unit != "rad" and 1.0 / size % 10.0 in (0.0, 1.0):
+                        text = put(one, key.name, f"{value / Decimal(str(size))} {unit}")
+                        assert judged(scene_schema, text) == []
+                        assert loads(text) == scene, (one.name, key.name, unit)
+                        tried.add((one.name, one.kind, key.name))
+    assert len(tried) > 30
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "allowed"),
+    [
+        ("width", "18 furlong", "12 to 24 mm, with mm | um | "),
+        ("width", "18 ms", "12 to 24 mm, with mm | um | "),
+        ("width", "30 mm", "12 to 24 mm"),
+        ("width", "18", "a number without quotes and unit, 12 to 24 mm"),
+        ("ridge_phase", "0.1 mm", "a number without quotes and unit"),
+    ],
+)
+def test_texts_of_another_unit_are_refused(key, text, allowed):
+    assert refuses(re.escape(allowed), FingerPad, **{key: text}).key == f"finger.{key}"
+
+
+def test_units_are_those_of_physics():
+    """An angle, a field, a density, a conductivity against values that are known otherwise."""
+    assert Grating(period="2 mm", groove_depth="0.1 mm", angle="0.5236 rad").angle == pytest.approx(30, 1e-4)
+    water = NeoHookean(E="160 kPa", nu=0.45, density="1 g/cm3")
+    assert (water.E, water.density) == (0.16, 1e-9)  # t/mm3
+    assert Probe(x=["-150 um", 0.2], depth="1 mm").x == (-0.15, 0.2)
 
 
 def put(section, key, value, text=SLIDE):
