@@ -170,6 +170,8 @@ def closest_name(name: str, known: Sequence[str]) -> list[str]:
 
     >>> closest_name("tilt", ["width", "posture"]), closest_name("widht", ["width", "posture"])
     (['posture'], ['width'])
+    >>> closest_name("depth", ["phase", "groove_depth"])
+    ['groove_depth']
     >>> closest_name("fig3", ["fig13", "fig03"])
     ['fig03']
     """
@@ -180,6 +182,8 @@ def closest_name(name: str, known: Sequence[str]) -> list[str]:
     small = {one.lower(): one for one in known}
     if meant := [one for one in MEANT.get(name.lower(), "").split() if one in known]:
         return meant[:1]
+    if len(parts := [one for one in known if name.lower() in one.split("_")]) == 1:
+        return parts
     return [small[one] for one in get_close_matches(name[:40].lower(), small, n=1)]
 
 

@@ -135,6 +135,7 @@ def _of_one_kind(
 
 def checked_over(over: str | None, result: Result) -> str:
     """The name of the abscissa."""
+    labels.check_result(result)
     if over is None:
         return abscissa(result)
     return choice("over", over, [name for name in OVER if name in result.columns])
@@ -235,6 +236,7 @@ def probes(
     """A `quantity` of a `ProbeHistory`, or a component (`cauchy_stress_yy`, `principal_stretches_1`), a line
     for each point of all probes, over `over` (see `forces`).
     """
+    labels.check_result(result)
     if not result.probes:
         raise InputError("result", "a run without probes", "a run of a scene with Output(probes=...)")
     over = checked_over(over, result)
@@ -333,6 +335,7 @@ def spectrum(
 
 def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) -> Axes:
     """Contact pressure, and shear and attraction if there is any, of the pad over its x (mm)."""
+    labels.check_result(result)
     check_plane(result.mesh)
     shown = frame_of(result, frame)
     pad = np.flatnonzero(np.isfinite(shown.gap))

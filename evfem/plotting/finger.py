@@ -15,7 +15,7 @@ from evfem.errors import InputError, describe_value
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.split import nodal_means
 from evfem.plotting import fields, figures
-from evfem.plotting.labels import field_label, field_unit, named, shown_in
+from evfem.plotting.labels import check_result, field_label, field_unit, named, shown_in
 from evfem.plotting.solid import SolidView
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
@@ -75,6 +75,7 @@ def deformed(
     InputError
         Another field or frame, or a close-up in three dimensions, which `footprint` has.
     """
+    check_result(result)
     choice("field", field, fields.FIELDS)
     kind = SolidView if result.mesh.dim == 3 else View
     return picture(kind(result, fields.frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)

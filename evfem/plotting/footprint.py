@@ -20,6 +20,7 @@ from evfem.mesh.faces import PLACES, shape_functions
 from evfem.plotting.fields import TRACTIONS, Scale, Window, frame_of, values_of, within
 from evfem.plotting.figures import TISSUE, shaded
 from evfem.plotting.finger import Near, checked_window, picture
+from evfem.plotting.labels import check_result
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 from evfem.surface.skin import Skin, make_skin
 
@@ -72,6 +73,7 @@ def footprint(
     InputError
         Another field or frame, or a plane finger.
     """
+    check_result(result)
     choice("field", field, POINT_FIELDS)
     if result.mesh.dim != 3:
         raise InputError("result", "a plane finger", "a finger in three dimensions; deformed(result) else")

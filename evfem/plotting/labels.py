@@ -165,9 +165,20 @@ def values_of(result: Result, name: str) -> Any:
     return result[name]
 
 
+def check_result(given: object) -> None:
+    """Raise InputError for what is no result."""
+    if not isinstance(given, Result):
+        kind = given.__name__ if isinstance(given, type) else type(given).__name__
+        raise InputError("result", f"a {kind}", "a result, as ev.simulate(scene) or ev.load(folder) gives it")
+
+
 def named(results: Results) -> dict[str, Result]:
     """Results by their names; one alone has none."""
-    found = {"": results} if isinstance(results, Result) else dict(results)
+    if not isinstance(results, Mapping):
+        check_result(results)
+    found = dict(results) if isinstance(results, Mapping) else {"": results}
+    for result in found.values():
+        check_result(result)
     if not found:
         raise InputError("results", "nothing", "a result, or {name: result, ...}")
     if any(result.units != units_of(found) for result in found.values()):

@@ -24,7 +24,7 @@ from evfem.plotting.fields import FIELDS, Scale, Window, scale_of
 from evfem.plotting.figures import BLACK, BLUE, GREEN, VERMILION, WIDTH, add_colorbar
 from evfem.plotting.finger import Near, View, figure_height, label_bar, told
 from evfem.plotting.footprint import SkinView
-from evfem.plotting.labels import on_lines
+from evfem.plotting.labels import check_result, on_lines
 from evfem.simulation.result import POINT_FIELDS, Result
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def animate(
     """
     from matplotlib.animation import FFMpegWriter
 
+    check_result(result)
     path, fps = Path(path), count("fps", fps, 60)
     choice("field", field, POINT_FIELDS if result.mesh.dim == 3 else FIELDS)
     if not result.frames:

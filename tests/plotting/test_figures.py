@@ -1,5 +1,6 @@
 """Pictures show themselves once: by `plt.show()`, below a notebook's cell, or as its last line."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from tools.commands import printed
 from tools.fakes import fake_result
+from tools.refusals import refuses
 from tools.solids import block
 
 import evfem as ev
@@ -180,3 +182,16 @@ def test_faces_towards_the_eye_are_drawn(order):
     assert (own.sum(axis=1) == 1).all()
     assert ((factor[own] >= DIMMEST) & (factor[own] <= 1.0)).all()
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["lower", "upper"]
+
+
+def test_what_is_no_result_is_named(tmp_path):
+    """Where a result belongs people hand over its scene, its folder, or results without names."""
+    scene = ev.Scene(ev.FingerPad(), ev.Flat(), motion=[ev.Press(force=0.05)])
+    p = plotting
+    alone = (p.forces, p.energies, p.probes, p.contact_pressure, p.deformed, p.footprint, p.friction)
+    more = partial(p.history, columns=["gap"]), partial(p.animate, path=tmp_path / "a.gif")
+    for draw in (*alone, p.signal, p.spectrum, *more):
+        refuses("a Scene; allowed: a result, as ev.simulate", draw, scene)
+        refuses("a str; allowed: a result", draw, "run")
+    refuses("a list; allowed: a result", p.compare, [fake_result()], "gap")
+    refuses("a Scene; allowed: a result", p.side_by_side, {"mine": scene})
