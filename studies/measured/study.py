@@ -19,9 +19,9 @@ from .table import Experiment, Row, numbers_of
 LEFT_OUT = {
     "Gueorguiev et al. (2017), doi:10.1098/rsif.2017.0641": "the Weber fraction of a change of friction, "
     "0.11, is a property of people; it is the input of the thresholds",
-    "Guo et al. (2019), doi:10.1109/TOH.2019.2897768": "attraction grows from 0.5 to 4.5 N at constant "
-    "area, which a constant gap cannot give; the power of the load, by which `ev.PowerRoughness` would, is "
-    "their fit and was not to be read in the abstract",
+    "Guo et al. (2019), doi:10.1109/TOH.2019.2897768": "attraction grows as the load rises from 0.5 "
+    "to 4.5 N at constant area, which a constant gap cannot give; the power of the load, by which "
+    "`ev.PowerRoughness` would, is their fit and was not to be read in the abstract",
     "Dzidek et al. (2017), doi:10.1073/pnas.1706233114": "the time in which the real area saturates is the "
     "input of `ev.AgeingFriction`",
     "Monnoyer et al. (2023), doi:10.1098/rsif.2022.0718": "strain is released within 20 ms of a drop of "
