@@ -360,13 +360,26 @@ def result_in(path: Path) -> Result:
             origin = json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"]
             rows = read_rows((path / HISTORY).read_text(encoding="utf-8"))
             found = (path / PROBES).read_text(encoding="utf-8") if (path / PROBES).is_file() else ""
-        scene, series = loads(origin["parameters"]), ParaViewSeries(path / FIELDS, rows)
+        parameters = _with_files_beside(origin["parameters"], path)
+        scene, series = loads(parameters), ParaViewSeries(path / FIELDS, rows)
         mesh, _ = scene_mesh(scene)
         frames = [frame_in(series.frame_path(row["step"]), row, mesh) for row in series.rows]
         probes = read_csv(found, scene.output.probes, mesh.dim, len(rows)) if found else {}
         return Result.from_rows(rows, frames, mesh, origin, probes, scene)
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise InputError("path", f"{path}, damaged: {error}", allowed) from error
+
+
+def _with_files_beside(text: str, path: Path) -> str:
+    """The text of a scene in which a file that is gone is the one of its name beside the run's folder, if
+    there is one: the mesh of a project that was moved or copied.
+    """
+
+    def found(name: re.Match[str]) -> str:
+        file, beside = Path(name[1]), path.resolve().parent / Path(name[1]).name
+        return json.dumps(beside.as_posix()) if not file.exists() and beside.is_file() else name[0]
+
+    return re.sub(r'"(/[^"\n]+)"', found, text)
 
 
 def _without_fields(path: Path) -> str:
