@@ -11,6 +11,7 @@ of the voltage across a gap must not reach, and a layer of the insulator up to t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -73,9 +74,14 @@ class Supply(Room):
         time = seconds if seconds > 0.0 else np.inf
         return {
             "charge": PER_MM * attraction.charging.electrode_charge(charged),
-            "current_rms": PER_MM * float(np.sqrt(square / time)),
+            "current_rms": PER_MM * _root(square / time),
             "power": MILLI * work / time,
         }
+
+
+def _root(mean_square: float) -> float:
+    """Its square root; nan below 0, as differences for the derivatives of a current that is 0 may be."""
+    return math.sqrt(mean_square) if mean_square >= 0.0 else math.nan
 
 
 class Air(Room):

@@ -265,3 +265,17 @@ def test_between_rough_faces_local_gaps_are_in_parallel():
 def test_a_field_that_is_held_has_no_mean_over_local_gaps():
     rough = ev.ConstantRoughness(0.003, "gaussian")
     refuses("limit with a distribution of local gaps", scene, roughness_gap=rough, breakdown="limit")
+
+
+def test_a_charge_without_a_current_has_derivatives_without_a_warning():
+    """The voltage of a prescribed charge against two runs; a current that is 0 has a kink there."""
+    motion, key = [ev.Hover(gap=0.5), ev.Wait(0.1, steps=2)], "electrostatics.insulator_thickness"
+
+    def charged(thickness):
+        surface = ev.Display(ev.Layer(thickness, ev.TOUCHSCREEN.eps_r))
+        return scene(ev.Drive(resolved=True), ev.ChargeControl(0.02), motion, surface=surface)
+
+    found = ev.sensitivities(charged(0.001), key, ["voltage", "current_rms"])
+    wide, thin = (ev.simulate(charged(0.001 + step)).voltage for step in (1e-4, -1e-4))
+    np.testing.assert_allclose(found["voltage", key], (wide - thin) / 2e-4, rtol=1e-6)
+    assert found.result.current_rms.tolist() == [0.0, 0.0, 0.0]
