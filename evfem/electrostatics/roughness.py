@@ -4,7 +4,7 @@ r"""What a force law becomes on faces that touch: rough ones keep a gap, a core 
 
 Skin and glass touch at their highest asperities; the mean separation s of their mean planes falls as the
 contact pressure p grows. A force law then sees the gap g + s (`evfem.terms.attraction`). Without it a node
-that touches an insulator of 1 um at 100 V is pulled by some 80 kPa, which no finger shows.
+that touches an insulator of 1 um at 100 V is pulled by some 190 kPa, which no finger shows.
 
 ==========================  ============================  ==========================================
 law                         s above p_c                   source
