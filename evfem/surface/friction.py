@@ -30,7 +30,7 @@ Where the tangent would be negative without a load (a law that grows faster than
 chord from there takes its place.
 
 Sources: skin on smooth glass, load and ageing: doi:10.1098/rsif.2016.0935,
-doi:10.1073/pnas.1706233114 (the real area grows to 95 % within about 20 s). Friction under a modulated
+doi:10.1073/pnas.1706233114 (the real area saturates within 20 s, taken as 95 %). Friction under a modulated
 voltage of first order, with a cut-off of 13.8 Hz per mm/s of speed: arXiv:2505.11162; read as a length it is
 1/(2 pi 13.8) mm = 11.5 um. Units: mm, MPa, s.
 """
