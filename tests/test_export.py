@@ -28,6 +28,7 @@ from evfem.export import (
 from evfem.mesh.mesh import raised
 from evfem.simulation.model import make_model
 from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS
+from evfem.sweeps.table import SweepResult
 
 POINT_DATA = ("displacement", "gap", "contact_pressure", "shear_traction")
 POINT_DATA += ("electrostatic_traction", "contact_status")
@@ -375,6 +376,36 @@ def test_a_data_set_has_every_column_and_field_with_its_unit():
     np.testing.assert_array_equal(last.cauchy_stress.sel(stress="xy"), result.frames[-1].cauchy_stress[:, 3])
     assert (found.gap.attrs["units"], found.contact_pressure.attrs["units"]) == ("mm", "MPa")
     np.testing.assert_array_equal(found.y, result.mesh.points[:, 1])
+
+
+def written_and_read(data, path, engine):
+    """A data set from the file or folder that this engine of xarray makes of it."""
+    import xarray
+
+    if engine == "zarr":  # which has no consolidated metadata in its third format, and warns of them
+        data.to_zarr(path, consolidated=False)
+    else:
+        data.to_netcdf(path, engine=engine)
+    return xarray.load_dataset(path, engine=engine, **({"consolidated": False} if engine == "zarr" else {}))
+
+
+@pytest.mark.xarray
+@pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf", "scipy", "zarr"])
+def test_files_of_data_sets_hold_all_of_them(tmp_path, engine):
+    """Without frames too, and the table of a sweep of words, truth values and a point without a number."""
+    from xarray.testing import assert_identical
+
+    names = ("electrostatics.law", "finger.ridges", "min_gap.last", "status", "seconds", "message")
+    values = [("kaczmarek", True, 0.1, "done", 1.0, ""), ("kaczmarek", False, None, "failed", 0.5, "µm?")]
+    rows = [{"point": i, **dict(zip(names, row, strict=True))} for i, row in enumerate(values)]
+    grid = {"electrostatics.law": ["kaczmarek"], "finger.ridges": [True, False]}
+    swept = SweepResult(("point", *names), rows, {"grid": grid, "points": {"requested": 2}})
+    for i, one in enumerate((fake_result(), replace(fake_result(), frames=[]), swept)):
+        data = one.to_xarray()
+        found = written_and_read(data, tmp_path / str(i), engine)
+        assert_identical(found, data)
+        kinds = {name: found[name].dtype.kind for name in data.variables}
+        assert [n for n, kind in kinds.items() if kind != data[n].dtype.kind and kind not in "OUT"] == []
 
 
 def test_without_xarray_a_sentence_says_what_to_install(monkeypatch):

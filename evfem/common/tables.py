@@ -99,13 +99,17 @@ def frame(columns: Mapping[str, Any]) -> Any:
 
 
 def dataset(variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Any) -> Any:
-    """An `xarray.Dataset`; InputError where xarray is not installed."""
+    """An `xarray.Dataset`, its words as objects: zarr warns of numpy's texts of fixed length, which its third
+    format does not specify. InputError where xarray is not installed.
+    """
     try:
         from xarray import Dataset
     except ModuleNotFoundError as error:
         problem = f"a data set of xarray, and no {error.name}"
         raise InputError("to_xarray", problem, "pip install 'evfem[xarray]', or table()") from None
-    return Dataset(variables, coordinates, attributes)
+    found = Dataset(variables, coordinates, attributes)
+    words = {name: one.astype(object) for name, one in found.variables.items() if one.dtype.kind == "U"}
+    return found.assign(words) if words else found
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:

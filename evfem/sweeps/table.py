@@ -13,19 +13,21 @@ from typing import Any
 import numpy as np
 
 from evfem.common.storage import disk, write_text
-from evfem.common.tables import csv_rows, frame
+from evfem.common.tables import csv_rows, dataset, frame
 from evfem.errors import InputError, describe_value
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.fingertip import Fingertip
 from evfem.scene.scene import Scene
-from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS, no_column
-from evfem.sweeps.file import FIRST, LAST
+from evfem.simulation.history import ABOUT, SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS, no_column
+from evfem.sweeps.file import FIRST, LAST, STATISTICS
 from evfem.sweeps.folder import PROVENANCE, STATUS, TABLE, cell_of, sweep_csv
 
 Units = Mapping[str, str]
 #: what a plane finger with a depth has of the columns in three dimensions
 AREAS = ("contact_area", "real_contact_area")
 OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name]["unit"] for name in AREAS}}
+#: in a data set, the dimension of samples at each point of a grid, and what it says of a point not computed
+SAMPLE, NOT_COMPUTED = "sample", {"status": "missing", "message": "not computed"}
 
 
 #: last word of a key of a scene file, before a number in a list -> its unit
@@ -93,12 +95,91 @@ class SweepResult:
             raise no_column("column", column, self.columns)
         values = [row[column] for row in self.rows]
         if all(value is None or type(value) in (int, float) for value in values):
-            return np.array([math.nan if value is None else value for value in values])
+            return array_of(values)
         return values
 
     def table(self) -> Any:
         """A row for each point: a `pandas.DataFrame`, without pandas a numpy record array."""
         return frame({name: self[name] for name in self.columns})
+
+    def to_xarray(self) -> Any:
+        """The table as an `xarray.Dataset` with a dimension for each entry of the grid.
+
+        A key's dimension is called by its last word (`gap` of `motion.0.gap`), or by more of them where two
+        keys end alike; named rows are a dimension of their name, along which the keys that change together
+        are coordinates. Samples at every point of a grid are the dimension `sample`. Samples alone, and a
+        table that is no full grid or has lost its `sweep.json`, have the one dimension `point`.
+
+        Variables have the names of the table: outputs and `seconds`, NaN where there is no number, `status`
+        and `message`, which says why. A point that was not computed has the status "missing". Attributes are
+        `units` and `long_name`, of a coordinate its dotted key.
+
+        Returns
+        -------
+        xarray.Dataset
+            Its coordinate `point` is the number of the point in the table.
+
+        Raises
+        ------
+        InputError
+            xarray is not installed (the extra `xarray`), or a point stands twice in the table.
+        """
+        places, axes = [row["point"] for row in self.rows], self._axes
+        if len(set(places)) < len(places):
+            raise InputError("to_xarray", "a table with a point twice", "one row for each point, or table()")
+        dims, shape = [name for name, _, _ in axes], [size for _, size, _ in axes]
+        coordinates: dict[str, Any] = {"point": (dims, np.arange(math.prod(shape)).reshape(shape))}
+        names = short_names(self._varied)
+        for name, _, varied in axes:
+            for key, values in varied.items():
+                about = {"units": self.units.get(key, ""), "long_name": key}
+                coordinates[names[key]] = (name, array_of(values), about)
+        variables = {}
+        for name in (*self._outputs, *LAST):
+            column = [NOT_COMPUTED.get(name)] * math.prod(shape)
+            for place, row in zip(places, self.rows, strict=True):
+                column[place] = row.get(name)
+            variables[name] = (dims, array_of(column).reshape(shape), self._about(name))
+        return dataset(variables, coordinates, {"provenance": json.dumps(self.provenance)})
+
+    @property
+    def _axes(self) -> list[tuple[str, int, dict[str, list[Any]]]]:
+        """Each dimension of the grid: name, size, and by its key the values along it."""
+        names, axes = short_names(self._varied), []
+        for name, entry in (self.provenance.get("grid") or {}).items():
+            varied = {name: list(entry)}
+            for row in entry.values() if isinstance(entry, Mapping) else ():
+                for key, value in row.items():
+                    varied.setdefault(key, []).append(value)
+            axes.append((names.get(name, name), len(entry), varied))
+        count = max([self.provenance["points"].get("requested", 0), *(row["point"] + 1 for row in self.rows)])
+        drawn = (self.provenance.get("samples") or {}).get("count", 1)
+        if not axes or math.prod(size for _, size, _ in axes) * drawn != count:
+            axes, drawn = [], count
+        left = [key for key in self._varied if not any(key in varied for _, _, varied in axes)]
+        if left or not axes:
+            rows = {row["point"] % drawn: row for row in self.rows}
+            found = {key: [rows.get(i, {}).get(key) for i in range(drawn)] for key in left}
+            axes.append((SAMPLE if axes else FIRST[0], drawn, found))
+        return axes
+
+    def _about(self, name: str) -> dict[str, str]:
+        """Attributes of an output, or of one of the last columns, in a data set."""
+        column, *of = name.split(".")
+        if not of:
+            return {"units": "s" if name == "seconds" else "", "long_name": name}
+        words = [str(ABOUT[column]["meaning"]), of[0], *(f"motion {motion}" for motion in of[1:])]
+        return {"units": self.units.get(name, ""), "long_name": ", ".join(words)}
+
+    @property
+    def _outputs(self) -> list[str]:
+        """Columns that are computed."""
+        return [name for name in self.columns if {*name.split(".")[1:2]} & {*STATISTICS}]
+
+    @property
+    def _varied(self) -> list[str]:
+        """Names of rows, and keys that are varied."""
+        return [name for name in self.columns if name not in (*FIRST, *self._outputs, *LAST)]
 
     def statistics(
         self, columns: Sequence[str] | None = None, quantiles: Sequence[float] = (0.05, 0.5, 0.95)
@@ -161,6 +242,37 @@ class SweepResult:
     def __repr__(self) -> str:
         """Numbers of points by status."""
         return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """The last word of each dotted key, or as many as tell it from the others.
+
+    >>> short_names(["motion.0.gap", "finger.materials.skin.E", "finger.materials.dermis.E"])
+    {'motion.0.gap': 'gap', 'finger.materials.skin.E': 'skin_E', 'finger.materials.dermis.E': 'dermis_E'}
+    >>> short_names(["motion.0.force", "motion.1.force", "surface.terms.0.1"])
+    {'motion.0.force': 'motion_0_force', 'motion.1.force': 'motion_1_force', 'surface.terms.0.1': 'terms_0_1'}
+    """
+    ends = {}
+    for key in keys:
+        words = key.split(".")
+        ends[key] = ["_".join(words[i:]) for i in range(len(words))[::-1] if not words[i].isdigit()]
+    counted = Counter([*FIRST, *LAST, SAMPLE, *(end for own in ends.values() for end in {*own})])
+    return {key: next((end for end in own if counted[end] == 1), key) for key, own in ends.items()}
+
+
+def array_of(values: Sequence[Any]) -> Any:
+    """Numbers, NaN for None, or truth values as an array; anything else as its text in the table.
+
+    >>> array_of([1, 2]), array_of([0.5, None]), array_of([True, False])
+    (array([1, 2]), array([0.5, nan]), array([ True, False]))
+    >>> array_of(["flat", [0.1, 2.0]])
+    array(['flat', '[0.1, 2.0]'], dtype=object)
+    """
+    if all(value is None or type(value) in (int, float) for value in values):
+        return np.array([math.nan if value is None else value for value in values])
+    if all(type(value) is bool for value in values):
+        return np.array(values)
+    return np.array(["" if value is None else str(cell_of(value)) for value in values], dtype=object)
 
 
 def is_table(path: Path) -> bool:

@@ -5,7 +5,8 @@ A page's Python blocks run in order, in one namespace and a folder of their own.
 what it prints, `...` standing for anything. TOML blocks are scenes, sweeps or
 sensitivities, `evfem` lines in `sh` blocks
 are understood by the command. `<!-- not run: reason -->` or `<!-- needs vtk -->` before a block says why it
-does not run here; `<!-- takes long -->` that it runs with the slow tests.
+does not run here, `<!-- needs xarray -->` that it runs with the tests of xarray, `<!-- takes long -->` with
+the slow ones.
 """
 
 import doctest
@@ -125,6 +126,13 @@ def test_blocks_that_take_long_run(tmp_path, monkeypatch, capsys):
     for page in slow:
         run(page, {"takes long"}, capsys)
     assert Path("footprint.png").exists()
+
+
+@pytest.mark.xarray
+@pytest.mark.parametrize("page", ["howto/fields.md", "howto/sweep.md"])
+def test_blocks_that_need_xarray_run(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    run(page, {None, "needs xarray"}, capsys)
 
 
 def anchors(page):

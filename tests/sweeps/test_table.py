@@ -1,4 +1,4 @@
-"""The table of a sweep: units in its header, back from its files as it was, statistics of samples."""
+"""The table of a sweep: units in its header, back from its files as it was, statistics, data sets."""
 
 import json
 import math
@@ -129,3 +129,80 @@ def test_the_rank_correlation_is_spearmans():
     x, y = draw.integers(0, 9, 50), draw.normal(size=50)
     assert _ranked(x, y) == pytest.approx(stats.spearmanr(x, y).statistic, rel=1e-12)
     assert math.isnan(_ranked(np.ones(3), np.arange(3.0)))
+
+
+CASES = {
+    "a": {"finger.width": 16, "finger.ridges": True},
+    "b": {"finger.width": 17, "finger.ridges": False},
+}
+DRAWN = ev.Samples({"surface.friction": ev.Uniform(0.1, 0.5)}, count=3, seed=1)
+
+
+def swept(grid, samples=None, lost=()):
+    """The table of a sweep whose output is the square of the point's number, without the points `lost`; the
+    point 1 is refused.
+    """
+    plan = ev.Sweep(ev.default_scene(), grid, samples, [OUT])
+    rows = []
+    for point in plan.points():
+        found = {OUT: float(point.index**2), "status": "done", "seconds": 1.0, "message": ""}
+        if point.index == 1:
+            found |= {OUT: None, "status": "refused", "message": "surface.friction: given"}
+        rows.append({"point": point.index, **point.labels, **point.parameters, **found})
+    provenance = {"grid": plan.grid, "points": {"requested": len(rows)}, "outputs": [OUT]}
+    provenance["samples"] = {"count": samples.count} if samples else None
+    kept = [row for row in rows if row["point"] not in lost]
+    return SweepResult(plan.columns, kept, provenance, table_units([OUT], plan.parameters, [UNITS]))
+
+
+@pytest.mark.xarray
+@pytest.mark.parametrize("samples", [None, DRAWN])
+def test_a_data_set_has_the_value_of_each_point_at_its_parameters(samples):
+    forces = {"motion.0.force": [0.02, 0.05], "surface.y": [0, 1], "case": CASES}
+    table = swept(forces, samples, lost=(4,))
+    found = table.to_xarray()
+    assert found.force.dims == ("force",)
+    assert found.force.attrs == {"units": "N/mm", "long_name": "motion.0.force"}
+    assert found[OUT].attrs == {"units": "N/mm", "long_name": "attraction, downwards, last"}
+    for row in table.rows:
+        at = {"force": row["motion.0.force"], "y": row["surface.y"], "case": row["case"]}
+        one = found.sel(at).isel({"sample": row["point"] % 3} if samples else {})
+        np.testing.assert_equal(float(one[OUT]), math.nan if row[OUT] is None else row[OUT])
+        assert (one.point, one.status, one.message) == (row["point"], row["status"], row["message"])
+        assert (one.width, one.ridges) == (row["finger.width"], row["finger.ridges"])
+        assert not samples or one.friction == row["surface.friction"]
+    lost = found.where(found.point == 4, drop=True).squeeze()
+    assert (str(lost.status.values), str(lost.message.values)) == ("missing", "not computed")
+    assert np.isnan(lost[OUT])
+    assert (found.y.dtype, found.width.dtype, found.ridges.dtype) == (int, int, bool)
+
+
+@pytest.mark.xarray
+def test_a_sweep_of_one_parameter_is_a_curve_with_a_gap_where_a_point_failed(tmp_path):
+    finger = ev.FingerPad(ridges=False, resolution="coarse")
+    scene = ev.Scene(finger, ev.Display(), ev.Kaczmarek(), 1000.0, ev.Hover(gap=0.3))
+    table = ev.sweep(ev.Sweep(scene, {GAP: [0.5, -1.0, 0.3]}, outputs=[OUT]), tmp_path / "out", workers=1)
+    found = table.to_xarray()
+    assert found[OUT].dims == ("gap",)
+    assert found.gap.values.tolist() == [0.5, -1.0, 0.3]
+    np.testing.assert_array_equal(found[OUT], table[OUT])
+    assert np.isnan(found[OUT].values).tolist() == [False, True, False]
+    assert found.status.values.tolist() == ["done", "refused", "done"]
+    assert "allowed: a gap in mm" in str(found.message.sel(gap=-1.0).values)
+    assert ev.load(tmp_path / "out").to_xarray().equals(found)
+
+
+@pytest.mark.xarray
+def test_what_is_no_grid_is_a_list_of_points(tmp_path):
+    table = swept({}, DRAWN, lost=(2,))
+    found = table.to_xarray()
+    assert dict(found.sizes) == {"point": 3}
+    np.testing.assert_array_equal(found.friction, [*table["surface.friction"], math.nan])
+    np.testing.assert_array_equal(found[OUT], [0.0, math.nan, math.nan])
+    assert found.status.values.tolist() == ["done", "refused", "missing"]
+    made().to_csv(tmp_path / "alone.csv")
+    alone = ev.load(tmp_path / "alone.csv").to_xarray()
+    assert alone[OUT].dims == alone.gap.dims == ("point",)
+    assert alone.gap.values.tolist() == ["0.5", "0.25", "-1.0", "[0.1, 2.0]"]
+    table.rows.append(table.rows[0])
+    refuses("to_xarray: given a table with a point twice", table.to_xarray)
