@@ -51,7 +51,7 @@ class Spectrum(NamedTuple):
 
 def spectrum(
     result: Result,
-    column: str,
+    column: str | Floats,
     *,
     start: float | None = None,
     stop: float | None = None,
@@ -64,7 +64,7 @@ def spectrum(
     result
         A result with time.
     column
-        Name of a column of the history.
+        Name of a column of the history, or one value for each step (steps,), as of a point of a probe.
     start, stop
         Rows later than `start` and not later than `stop` (s) are used; without `start` those of the
         last motion.
@@ -81,17 +81,29 @@ def spectrum(
     InputError
         Fewer than two rows, or rows that are not evenly spaced in time.
     """
+    values = _values(result, column)
+    choice("window", window, WINDOWS)
+    used, before = _rows(result, start, stop)
+    step, values = _step(result.time[used], before), values[used]
+    if not np.isfinite(values).all():
+        name = column if isinstance(column, str) else "values"
+        raise InputError("column", f"{name}, not known in all rows", "a column of finite values")
+    amplitude = amplitudes(values, window)
+    return Spectrum(np.arange(amplitude.size) / (values.size * step), amplitude)
+
+
+def _values(result: Result, column: str | Floats) -> Floats:
+    """The values of a column, or those given in its place, one for each step."""
+    if not isinstance(column, str):
+        values = np.asarray(column)
+        if values.dtype.kind not in "iuf" or values.shape != result.step.shape:
+            allowed = f"the name of a column, or {len(result.step)} numbers, one for each step"
+            raise InputError("column", f"values of shape {values.shape}, {values.dtype}", allowed)
+        return values.astype(float)
     if column not in result.columns or column == "motion":
         allowed = ", ".join(name for name in result.columns if name != "motion")
         raise InputError("column", describe_value(column), allowed)
-    choice("window", window, WINDOWS)
-    used, before = _rows(result, start, stop)
-    step = _step(result.time[used], before)
-    values = np.asarray(getattr(result, column), dtype=float)[used]
-    if not np.isfinite(values).all():
-        raise InputError("column", f"{column}, which is not known in all rows", "a column of finite values")
-    amplitude = amplitudes(values, window)
-    return Spectrum(np.arange(amplitude.size) / (values.size * step), amplitude)
+    return np.asarray(result[column], dtype=float)
 
 
 def amplitudes(values: Floats, window: str) -> Floats:

@@ -62,12 +62,21 @@ def test_rows_of_the_last_motion_are_used_or_those_of_a_window_of_time():
     np.testing.assert_allclose(first.amplitude[:2], [5.0, 0.0], atol=1e-12)
 
 
+def test_values_of_ones_own_have_the_spectrum_of_a_column():
+    values = 3.0 + 2.0 * np.sin(2 * np.pi * 5.0 * TIMES)
+    found = ev.spectrum(column(np.zeros(100), motion=[0] * 60 + [1] * 40), values)
+    np.testing.assert_allclose(found.amplitude[:3], [3.0, 0.0, 2.0], atol=1e-12)  # 5 Hz over 0.4 s
+
+
 @pytest.mark.parametrize(
     ("make", "options", "key"),
     [
         (lambda: column(TIMES), {"column": "tangent"}, "column"),
         (lambda: column(TIMES), {"column": "motion"}, "column"),
         (lambda: column(np.full(100, np.nan)), {}, "column"),
+        (lambda: column(TIMES), {"column": np.zeros((100, 2))}, "column"),
+        (lambda: column(TIMES), {"column": np.full(100, np.inf)}, "column"),
+        (lambda: column(TIMES), {"column": ["a"] * 100}, "column"),
         (lambda: column(TIMES), {"window": "flat"}, "window"),
         (lambda: column(TIMES, np.zeros(100)), {}, "time"),
         (lambda: column(TIMES, TIMES**2), {}, "time"),
