@@ -138,6 +138,7 @@ class _Problem:
             path = Path(scene)
             self.tables, self.paths = tables_of("scene", read_text("scene", path)), path.parent.resolve()
             self.name = path.stem
+        self.output = {key: value for key, value in self.tables.items() if key == "output"}
         # fields are not needed, and no run ends between two of them
         self.tables = {"version": VERSION, **self.tables, "output": {"every": 10**6}}
         self.data: list[Measured] = [data] if isinstance(data, Measured) else list(data)
@@ -184,6 +185,11 @@ class _Problem:
     def text(self, keys: Mapping[str, Any], values: Mapping[str, float]) -> str:
         """The scene of one run as a text."""
         return tomli_w.dumps(self.parameters.applied(self.tables, keys, values))
+
+    def fitted(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """The scene with these parameters as tables, with its own output, which the runs leave out."""
+        tables = self.parameters.applied(self.tables, {}, values)
+        return {key: value for key, value in tables.items() if key != "output"} | self.output
 
     @property
     def digest(self) -> str:
@@ -335,7 +341,7 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
         predicted=problem.measured + found.fun * problem.scale,
         scale=problem.scale,
         warnings=(*warnings, *_at_bounds(parameters, found.x), *_misfit(problem, found.fun), *patterns),
-        tables=parameters.applied(problem.tables, {}, parameters.values(found.x)),
+        tables=problem.fitted(parameters.values(found.x)),
         paths=problem.paths,
         provenance={**problem.provenance, "runs": runs.computed, "finished": bool(found.success)},
     )

@@ -85,7 +85,9 @@ class FitResult:
 
     @property
     def scene(self) -> Scene:
-        """The scene with the fitted parameters."""
+        """The scene with the fitted parameters, and its own output: `ev.simulate(found.scene)` is the run of
+        the fit with its fields and probes, which a fit does not keep.
+        """
         return loads(tomli_w.dumps(self.tables), self.paths, str(self.provenance.get("fit", "fit")))
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:

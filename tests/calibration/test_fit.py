@@ -114,6 +114,20 @@ def test_a_synthetic_finger_is_recovered(exact):
     np.testing.assert_allclose(found.predicted[3:], fitted.tangential_force[3:], rtol=1e-9)
 
 
+def test_the_best_run_has_the_fields_and_probes_that_the_scene_asks_for(press, tmp_path):
+    """The runs of a fit have none."""
+    asked = "[output]\nevery = 2\n[output.probes]\nown = [[0.5, 0.5]]\n"
+    file = press.with_name("asks.toml")
+    file.write_text(PRESS + asked)
+    found = ev.fit(file, measured(press, noise=0.0)[0], {E: BOUNDS[E]}, workers=1)
+    found.save(tmp_path / "fit.json")
+    for one in (found, ev.load(tmp_path / "fit.json")):
+        best = ev.simulate(one.scene)
+        assert [frame.step for frame in best.frames] == [2, 3]
+        assert best.probes["own"].J.shape == (3, 1)
+        np.testing.assert_allclose(found.predicted, best.normal_force, rtol=1e-9)
+
+
 def test_with_noise_it_is_recovered_within_its_interval(noisy):
     found = noisy
     assert found[E] == pytest.approx(0.07, rel=0.01)
