@@ -20,6 +20,7 @@ import tomllib
 from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import patch
 
 import pytest
@@ -133,6 +134,25 @@ def test_blocks_that_take_long_run(tmp_path, monkeypatch, capsys):
 def test_blocks_that_need_xarray_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     run(page, {None, "needs xarray"}, capsys)
+
+
+def test_the_slider_of_a_notebook_steps_a_loop_and_draws_its_force(monkeypatch):
+    """A stand-in for ipywidgets moves it twice."""
+    from matplotlib import pyplot
+
+    found, drawn, rows = list(blocks("howto/loop.md")), [], {}
+    (code,) = [text for _, text, mark, _ in found if mark == "needs ipywidgets"]
+    moved = SimpleNamespace(
+        FloatSlider=lambda value, **_: value,
+        interact=lambda move, **_: [move(position=x, voltage=1000.0) for x in (0.0, 0.4)],
+    )
+    monkeypatch.setitem(sys.modules, "ipywidgets", moved)
+    monkeypatch.setattr(pyplot, "show", lambda: drawn.append(pyplot.gca().lines[0].get_xydata()))
+    exec(found[0][1] + code, rows)
+    pyplot.close("all")
+    assert drawn[-1].tolist() == [[row.position, row.tangential_force] for row in rows["rows"]]
+    assert [len(one) for one in drawn] == [1, 2]
+    assert drawn[-1][1, 1] > 0.005
 
 
 def anchors(page):
