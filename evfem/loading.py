@@ -66,7 +66,7 @@ def load(path: str | Path) -> Found:
     if not path.is_file():
         raise InputError("path", f"{path}, which does not exist", ALLOWED)
     reader = READERS.get(path.suffix.lower(), _archive)
-    if reader is not _archive and _is_of_a_run(path):
+    if path.suffix.lower() != ".npz" and _is_of_a_run(path):
         raise InputError("path", f"{path}, one file of a run", f"the run's folder, {path.parent}")
     return reader(path)
 

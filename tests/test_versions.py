@@ -66,6 +66,6 @@ def test_its_run_is_not_continued_and_says_what_to_do(place):
     refuses("the checkpoint of a run; allowed: `evfem run --resume`", ev.load, place / "run/checkpoint.npz")
 
 
-@pytest.mark.parametrize("name", ["history.csv", "fields_00002.vtu"])
+@pytest.mark.parametrize("name", ["history.csv", "fields.pvd", "fields_00002.vtu"])
 def test_one_file_of_a_run_leads_to_its_folder(place, name):
     refuses(r"one file of a run; allowed: the run's folder, .*run", ev.load, place / "run" / name)
