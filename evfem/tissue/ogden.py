@@ -126,7 +126,8 @@ class Ogden(Hyperelastic):
     """Ogden's law with a volumetric part in ln J.
 
     psi = sum over p of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + K/2 (ln J)^2 with l_i =
-    J^(-1/3) times the principal stretches. The initial shear modulus is the sum of mu_p alpha_p / 2; K is
+    J^(-1/3) times the principal stretches. The initial shear modulus is the sum of mu_p alpha_p / 2: where a
+    paper, or Abaqus, has 2 mu_p/alpha_p^2, take 2/alpha_p times its mu_p. K is
     `bulk`, or that of Poisson's ratio at small strain, `nu`. Source: Ogden, Proc. R. Soc. Lond. A 328 (1972)
     567-583, doi:10.1098/rspa.1972.0096.
 
@@ -134,7 +135,7 @@ class Ogden(Hyperelastic):
     1.2
     """
 
-    mu: Annotated[float | Sequence[float], _MU, "moduli of the terms"]
+    mu: Annotated[float | Sequence[float], _MU, "moduli of the terms (mu alpha / 2 in shear)"]
     alpha: Annotated[float | Sequence[float], _ALPHA, "exponents of the terms"]
     nu: PoissonOrNone = None
     bulk: Bulk = None
