@@ -4,6 +4,7 @@ The force laws take the voltage of the moment, squared, so that the attraction h
 than the voltage. With w = 2 pi f, on a gap that does not change::
 
     Sine      U = B + A sin w t             U^2 = B^2 + A^2/2 + 2 A B sin w t - (A^2/2) cos 2 w t
+    Square    U = B +- A                    U^2 = B^2 + A^2 +- 2 A B
     Carrier   U = E(t) sin w t              U^2 = (E^2/2) (1 - cos 2 w t)
 
 A sine without bias attracts at twice its frequency; with the bias B the part at w is 4 B/A times
@@ -137,31 +138,38 @@ class Sine(_Periodic):
 
 @dataclass(frozen=True)
 class Square(_Periodic):
-    """+`amplitude` in the first half of each period and -`amplitude` in the second.
+    """`bias` + `amplitude` in the first half of each period and `bias` - `amplitude` in the second.
+
+    Without a bias its square, and so the attraction, is constant. On and off is half the voltage as both.
 
     >>> Square(frequency=50.0, amplitude=100.0)([0.0, 0.009, 0.01, 0.02]).tolist()
     [100.0, 100.0, -100.0, 100.0]
+    >>> Square(frequency=50.0, amplitude=40.0, bias=40.0)([0.0, 0.01]).tolist()
+    [80.0, 0.0]
     """
 
     frequency: Frequency
     amplitude: Amplitude
+    bias: Annotated[float, _BIAS, "mean voltage"] = 0.0
     kind = "square"
     crest = 1.0
     harmonics = staticmethod(square_harmonics)
 
     def powers(self) -> tuple[float, Floats, Floats]:
         """Effective voltage (V), orders and shares."""
-        return self.amplitude, *self.harmonics()
+        order, weight = self.harmonics()
+        square = (self.amplitude / self.crest) ** 2 * weight
+        return shares(np.append(0.0, order), np.append(self.bias**2, square))
 
     @property
     def largest(self) -> float:
         """Largest magnitude (V)."""
-        return self.amplitude
+        return abs(self.bias) + self.amplitude
 
     def __call__(self, time: Values) -> Values:
         """Voltage (V) at `time` (s, any shape); a flip within rounding of a time has happened."""
         half = np.floor(2.0 * self.frequency * np.asarray(time) + FLIP)
-        return to_python(self.amplitude * (1.0 - 2.0 * np.mod(half, 2.0)))
+        return to_python(self.bias + self.amplitude * (1.0 - 2.0 * np.mod(half, 2.0)))
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ def test_a_carrier_of_a_constant_height_is_a_sine_and_its_mean_a_number():
     [
         (SLOW, 80.0, 10.0),
         (ev.Sine(10.0, 30.0, -50.0), 80.0, 10.0),
+        (ev.Square(10.0, 30.0, -50.0), 80.0, 10.0),
         (ev.Carrier(300.0, SLOW), 80.0, 310.0),
         (ev.Carrier(300.0, SLOW, resolved=False), 80.0 / np.sqrt(2.0), 10.0),
         (ev.Carrier(300.0, ev.Carrier(20.0, 10.0)), 10.0, 320.0),
@@ -66,6 +67,17 @@ def test_signals_say_how_large_and_how_fast_they_are(signal, largest, highest):
     assert values.shape == (7, 1)
     assert np.abs(values).max() <= largest * (1 + 1e-12)
     assert type(signal(0.1)) is float
+
+
+def test_a_square_wave_with_a_bias_is_on_and_off():
+    """(B +- A)^2 is B^2 + A^2 in the mean, of which B^2 is direct and 8 / (pi n)^2 of A^2 at each odd n."""
+    signal = ev.Square(50.0, 40.0, bias=40.0)
+    assert signal([0.0, 0.0099, 0.01, 0.0199, 0.02]).tolist() == [80.0, 80.0, 0.0, 0.0, 80.0]
+    effective, order, share = signal.powers()
+    assert effective == pytest.approx(80.0 / np.sqrt(2.0), rel=1e-12)
+    assert order[:3].tolist() == [0.0, 1.0, 3.0]
+    assert share[:3] == pytest.approx([0.5, 4.0 / np.pi**2, 4.0 / (3.0 * np.pi) ** 2], rel=1e-12)
+    assert ev.Square(50.0, 80.0).powers()[0] == pytest.approx(80.0, rel=1e-12)
 
 
 def test_samples_are_linear_in_between_and_constant_outside():
