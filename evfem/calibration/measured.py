@@ -188,7 +188,7 @@ class MeasuredCurve:
         for name, of in zip((over, *others, "sd"), (over, *others, *others), strict=True):
             if name in wanted:  # per mm of depth, or in all
                 bases = (UNITS.get(of), SPATIAL_UNITS.get(of)) if depth is None else (_whole(of),) * 2
-                more = "" if depth is None else ", in all, as a depth is given"
+                more = _hint(of) if depth is None else f"{_hint(of)}, in all, as a depth is given"
                 more += f'; or factors={{"{name}": how many {bases[0] or bases[1] or 1} one of these is}}'
                 key = f"data.columns.{name}"
                 like = wanted[others[0]] if name == "sd" else None
@@ -255,12 +255,19 @@ class MeasuredValues:
         set_frozen(self, where=where, **_measured(self.values, self.sd, count, "a list of numbers"))
 
     @classmethod
-    def from_csv(cls, path: str | Path, sd: float | None = None) -> MeasuredValues:
+    def from_csv(
+        cls, path: str | Path, sd: float | None = None, depth: float | None = None
+    ) -> MeasuredValues:
         """The values in a file with the header `KEY,...,OUTPUT[,sd]`, keys as `motion.0.gap`, perhaps with
-        units: `motion.0.gap [um]`.
+        units: `motion.0.gap [um]`. With a `depth` (mm) its forces, areas and energies are over it, as those
+        of `Result.total`, and are divided by it, `sd` too.
         """
         table, said = _without_units(read_table(Path(path), "data"))
-        spread = sd if "sd" not in table else table.pop("sd")
+        if sd is not None and "sd" not in table:
+            table["sd"] = np.asarray(sd)
+        if depth is not None:
+            table, said = _per_depth(table, said, DEPTH["check"]("data.depth", depth)), {}
+        spread = table.pop("sd", None)
         *keys, last = table
         return cls(last, table[last], {key: table[key] for key in keys}, spread, said)
 
@@ -331,7 +338,7 @@ def check_units(one: Measured, scene: Scene) -> None:
         own = columns.get(name.split(".")[0]) or unit_of(name, "N" if space else "N/mm")
         if unit != own:
             kind = "in three dimensions" if space else "in the plane"
-            over = f"{own}, or `depth`, the mm that it was measured over, in MeasuredCurve.from_csv"
+            over = f"{own}, or `depth`, the mm that it was measured over, in `from_csv`"
             raise InputError(f"data.{name}", f"{unit} for a finger {kind}", own if space else over)
 
 
@@ -353,7 +360,7 @@ def _without_units(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
             column = name.split(".")[0]
             bases = {unit_of(name), unit_of(name, "N"), UNITS.get(column), SPATIAL_UNITS.get(column)}
         if name != "sd" or unit is not None:
-            size = factor(f"data.{name}", name, unit, bases)
+            size = factor(f"data.{name}", name, unit, bases, _hint(name.split(".")[0]))
         if name != "sd" and unit is not None and unit in KNOWN and len(bases - {None, ""}) > 1:
             said[name] = KNOWN[unit][0]
         if size != 1.0 and isinstance(values, list):
@@ -362,6 +369,26 @@ def _without_units(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
             )
         found[name] = values if size == 1.0 else values * size
     return found, said
+
+
+def _per_depth(table: Mapping[str, Any], said: Mapping[str, str], depth: float) -> dict[str, Any]:
+    """Columns of a table of runs over a depth (mm), per mm of it; a deviation is as the column before it."""
+    found: dict[str, Any] = {}
+    own = whole = ""
+    for name, values in table.items():
+        column = name.split(".")[0]
+        if name != "sd":
+            own = unit_of(name) or UNITS.get(column, "")
+            whole = unit_of(name, "N") or _whole(column) or ""
+        if own != whole and said.get(name) == own:
+            raise InputError(f"data.{name}", f"{name} in {own}", f"{whole}, in all, as a depth is given")
+        found[name] = values if own == whole else np.asarray(values) / depth
+    return found
+
+
+def _hint(column: str) -> str:
+    """What a column with a unit may have been meant to be."""
+    return "; a friction force is tangential_force" if column == "friction" else ""
 
 
 def _factors(factors: Mapping[str, float] | None, wanted: Collection[str]) -> dict[str, float]:

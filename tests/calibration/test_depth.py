@@ -82,3 +82,46 @@ def test_values_of_runs_have_forces_as_the_scene_has_them(tmp_path, scene, head,
     values = ev.MeasuredValues.from_csv(path)
     sentence = f"data.{key}: given N for a finger in the plane; allowed: N/mm"
     refuses(sentence, ev.fit, scene, values, {E: (0.01, 1.0)}, workers=1)
+
+
+def test_values_of_runs_over_a_depth_are_divided_by_it(tmp_path, scene):
+    """Presses by three loads in N over 2 mm, of which the indentations follow."""
+    scene.write_text(SCENE.replace("indentation = 0.2", "force = 0.01"))
+    path, loads = tmp_path / "runs.csv", (0.01, 0.015, 0.02)
+    pressed = [
+        ev.simulate(scenefile.loads(scene.read_text().replace("0.01", f"{f}"), tmp_path)) for f in loads
+    ]
+    rows = [f"{2.0 * f},{1e3 * run.indentation[-1]},3" for f, run in zip(loads, pressed, strict=True)]
+    path.write_text("\n".join(["motion.0.force [N],indentation.last [um],sd [um]", *rows]))
+    values = ev.MeasuredValues.from_csv(path, depth=2.0)
+    assert values.where["motion.0.force"] == pytest.approx(loads, rel=1e-12)
+    assert values.sd == pytest.approx([0.003] * 3, rel=1e-12)  # a length has no depth in it
+    found = ev.fit(scene, values, {E: (0.01, 1.0)}, workers=1)
+    assert found[E] == pytest.approx(0.1, rel=1e-4)
+
+
+def test_deviations_are_over_the_depth_of_their_values(tmp_path):
+    path = tmp_path / "runs.csv"
+    for head, more in (
+        ("electrostatics.voltage,tangential_force.last [mN],sd", {}),
+        ("electrostatics.voltage,tangential_force.last [mN]", {"sd": 0.02}),
+    ):
+        path.write_text(f"{head}\n0,200{',20' if not more else ''}\n500,400{',40' if not more else ''}\n")
+        values = ev.MeasuredValues.from_csv(path, depth=10.0, **more)
+        assert values.values == pytest.approx([0.02, 0.04], rel=1e-12)
+        assert values.sd[0] == pytest.approx(0.002, rel=1e-12)
+        assert values.where["electrostatics.voltage"] == [0.0, 500.0]
+    path.write_text("electrostatics.voltage,tangential_force.last [N/m]\n0,2\n")
+    sentence = "tangential_force.last in N/mm; allowed: N, in all, as a depth is given"
+    refuses(sentence, ev.MeasuredValues.from_csv, path, depth=10.0)
+
+
+def test_a_coefficient_in_newtons_is_told_the_name_of_the_force(tmp_path):
+    path, sentence = (
+        tmp_path / "drag.csv",
+        "friction in N; allowed: no unit; a friction force is tangential_force",
+    )
+    path.write_text("position [mm],friction [N]\n1,0.2\n2,0.2\n")
+    refuses(sentence, ev.MeasuredCurve.from_csv, path, motion=1)
+    path.write_text("electrostatics.voltage [V],friction.last [N]\n0,0.2\n")
+    refuses(sentence.replace("friction in", "friction.last in"), ev.MeasuredValues.from_csv, path)
