@@ -247,7 +247,7 @@ def _climbed(rows: Sequence[Row]) -> Iterator[str]:
         first, count = rows[int(climbed.argmax())]["step"], int(climbed.sum())
         yield (
             f"{count} steps in time, the first of them step {first}, pass an energy barrier that the inertia "
-            "cannot carry the finger over: shorter steps may end elsewhere"
+            "cannot carry the finger over: shorter steps may end elsewhere; `evfem check` compares"
         )
 
 
@@ -263,7 +263,13 @@ def _missed(rows: Sequence[Row]) -> Iterator[str]:
             yield (
                 f"{_steps([row['step'] for row in group])}: target {_span(found + _column(group, name), 3)}, "
                 f"reached {_span(found, 3)} {unit} at {_span(volts, 4)} V"
+                + (", part of the contact sticks" if _sticks(group, name) else "")
             )
+
+
+def _sticks(rows: Sequence[Row], missed: str) -> bool:
+    """Whether friction that is `missed` in each of the rows has yet to grow with the travel."""
+    return missed == "missed_force" and all(row.get("stick_share", 0.0) > 0.0 for row in rows)
 
 
 def _steps(numbers: list[int]) -> str:

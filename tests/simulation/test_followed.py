@@ -66,7 +66,9 @@ def test_while_the_pad_sticks_it_is_said_too_and_the_wish_comes_later():
     result = slid(0.035, 6)
     missed = np.flatnonzero(result.missed_force)
     assert missed.tolist() == [2, 3]
-    assert [one.split(":")[0] for one in result.warnings if "target" in one] == ["step 3", "step 4"]
+    said = [one for one in result.warnings if "target" in one]
+    assert [one.split(":")[0] for one in said] == ["step 3", "step 4"]
+    assert all(one.endswith(" V, part of the contact sticks") for one in said)
     assert result.voltage[2] == 0.0
     assert result.voltage[3] > result.voltage[4]
     assert result.applied_tangential_force[3] < 0.035
