@@ -77,7 +77,7 @@ class NamedFriction(Named):
 
 @dataclass(frozen=True)
 class Coulomb(NamedFriction, kind="coulomb"):
-    """Coulomb's law, which a scene has without any.
+    """Coulomb's law, which a scene has without any; its coefficient is the `friction` of the surface.
 
     >>> Coulomb().bound(0.01, 0.3, 5.0, 0.0)
     0.003
