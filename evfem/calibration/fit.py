@@ -220,6 +220,7 @@ class _Residuals:
     def __init__(self, problem: _Problem, runs: Runs, progress: bool) -> None:
         self.problem, self.runs, self.progress = problem, runs, progress
         self.failed = ""
+        self.told = np.zeros(0)
         self.exact = problem.exact
 
     def _answers(self, points: Sequence[Floats], by: Sequence[str]) -> list[list[Answer]]:
@@ -242,7 +243,8 @@ class _Residuals:
     def __call__(self, z: Floats) -> Floats:
         """(run - measured) / scale, (N,)."""
         residuals = self._residuals(*self.predicted([z], self.exact))
-        if self.progress:
+        if self.progress and not np.array_equal(z, self.told):  # the search asks for its start again
+            self.told = z.copy()
             told = ", ".join(f"{k} {v:.5g}" for k, v in self.problem.parameters.values(z).items())
             size = math.sqrt(float(np.mean(residuals**2)))
             notices.tell(f"fit: {told}: rms residual {size:.4g}, {self.runs.computed} runs so far")

@@ -2,11 +2,13 @@
 
 A run is known by the fingerprint of its scene, of what is asked of it and of the version. Those of
 a folder are read instead of computed, so that a fit that was interrupted is there again in no time:
-its steps follow from the numbers alone.
+its steps follow from the numbers alone. The scenes at the start warn as every run does; those of the
+search, hundreds with numbers of their own, do not repeat it.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -30,15 +32,15 @@ from evfem.sweeps.run import answered, compute
 
 Asked = tuple[Question, ...]
 Outputs = dict[str, float | None]
-#: scene as text, folder of its paths, what is asked, keys by which it is differentiated
-Job = tuple[str, str, Asked, tuple[str, ...]]
+#: scene as text, folder of its paths, what is asked, keys by which it is differentiated, whether it warns
+Job = tuple[str, str, Asked, tuple[str, ...], bool]
 #: fraction of a parameter over which answers are differenced along the derivatives of the history
 ALONG = 1e-5
 
 
 def work(job: Job) -> Answer:
     """Run one scene and ask it all questions; whatever happens to it is in the answer."""
-    text, folder, questions, keys = job
+    text, folder, questions, keys, warns = job
     columns = sorted({column for q in questions for column in q.columns})
     exact = keys and all(map(differentiable, columns))
 
@@ -47,7 +49,10 @@ def work(job: Job) -> Answer:
             return sensitivities(scene, keys, columns)
         return simulate(scene)
 
-    return answered(text, folder, lambda found: _outputs(found, questions), run if exact else simulate)
+    with warnings.catch_warnings():
+        if not warns:
+            warnings.simplefilter("ignore", UserWarning)
+        return answered(text, folder, lambda found: _outputs(found, questions), run if exact else simulate)
 
 
 def _answers(result: Result, questions: Asked) -> Outputs:
@@ -88,7 +93,7 @@ class Runs:
         """The answers to the questions about each scene, and if there are any their derivatives `by` keys."""
         keys = [self._key(text, questions, by) for text, questions in wanted]
         jobs: dict[str, Job] = {
-            key: (text, str(self.paths), questions, by)
+            key: (text, str(self.paths), questions, by, not self.answers)
             for key, (text, questions) in zip(keys, wanted, strict=True)
             if key not in self.answers
         }

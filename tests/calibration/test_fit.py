@@ -273,6 +273,7 @@ def test_progress_is_a_line_for_each_step(press, capsys):
     assert lines[0].startswith(f"evfem: fit: {E} 0.1: rms residual 0.")
     assert lines[0].endswith(", 1 runs so far")
     assert 2 < len(lines) < 12
+    assert lines[1].split(":")[2] != lines[0].split(":")[2]  # the start once
 
 
 def test_a_trial_that_is_not_solved_is_stepped_back_from(press, monkeypatch):
@@ -286,7 +287,7 @@ def test_a_trial_that_is_not_solved_is_stepped_back_from(press, monkeypatch):
         if modulus > 0.09001:
             failed.append(modulus)
             return Answer("not_converged", 0.0, "step 1 did not converge", {})
-        return work((*job[:3], ()))
+        return work((*job[:3], (), True))
 
     monkeypatch.setattr(runs, "work", fragile)
     found = ev.fit(
@@ -304,7 +305,7 @@ def test_outputs_that_are_counted_are_said(press, monkeypatch):
     work = runs.work
 
     def counted(job):
-        answer = work((*job[:3], ()))
+        answer = work((*job[:3], (), True))
         outputs = {name: 5e-5 * round(value / 5e-5) for name, value in answer.outputs.items()}
         return Answer(answer.status, answer.seconds, answer.message, outputs)
 
@@ -422,3 +423,33 @@ def test_a_curve_of_another_shape_is_told_by_the_pattern_of_its_residuals(path, 
     (said,) = found["curved"]
     assert said.startswith("the 12 residuals of normal_force over indentation have 2 runs of one sign")
     assert found["errs"] == found["slightly"] == ()
+
+
+RASH = """
+[electrostatics]
+law = "strong_troxel"
+insulator = "film"
+[electrostatics.signal]
+kind = "sine"
+frequency = 50.0
+amplitude = 100.0
+[[motion]]
+kind = "wait"
+duration = 0.06
+steps = 10
+"""
+
+
+def test_only_the_scenes_at_the_start_of_a_fit_warn(path, recwarn):
+    """3.33 steps in a period are warned of; once a run, and once a fit of many."""
+    scene = path.with_name("rash.toml")
+    scene.write_text(PRESS + RASH)
+    pressed = ev.simulate(scene)
+    told = [str(one.message) for one in recwarn.list]
+    assert any("3.33 steps in a period" in one for one in told)
+    recwarn.clear()
+    at, force = pressed.indentation[:2], 1.5 * pressed.normal_force[:2]  # of 0 V, and so of E
+    curve = ev.MeasuredCurve("normal_force", "indentation", at, force, motion=0)
+    found = ev.fit(scene, curve, {E: (0.02, 0.5)}, workers=1)
+    assert found[E] == pytest.approx(0.15, rel=1e-4)
+    assert [str(one.message) for one in recwarn.list] == told
