@@ -242,6 +242,7 @@ def told(result: Result, frame: Frame) -> str:
     """Where the finger of a frame is, in a line."""
     text = f"step {frame.step}: position {frame.position + 0.0:.4g} mm"
     for row in np.flatnonzero(result.step == frame.step)[:1]:
+        text += f", z {along:.4g} mm" if (along := float(result.position_z[row])) else ""
         text += f", load {result.applied_force[row] + 0.0:.3g} {result.units['applied_force']}"
         text += f", {result.voltage[row]:.4g} V" if np.any(result.voltage != 0.0) else ""
     return text

@@ -98,3 +98,15 @@ def test_curves_have_newtons_and_square_millimetres(result, tmp_path):
     assert contact_area(result).get_ylabel() == "area (mm²)"
     path = animate(result, tmp_path / "slide.gif", "contact_pressure", near="contact", progress=False)
     assert path.stat().st_size > 1000
+
+
+def test_the_title_says_how_far_along_the_finger_it_is(result):
+    """A slide of 0.2 mm at 60 degrees ends at x 0.1 and z 0.1732 mm."""
+    for draw in (footprint, deformed):
+        assert (
+            draw(result)
+            .get_title()
+            .replace("\n", " ")
+            .startswith("step 3: position 0.1 mm, z 0.1732 mm, load")
+        )
+    assert ", z " not in footprint(result, frame=0).get_title()  # the press
