@@ -26,7 +26,7 @@ import numpy as np
 
 from evfem.common.arrays import DenseSolver, Floats, Ints, Memory, block, inverse, product
 from evfem.common.constants import DISC_OWN, LARGE_SYSTEM, ROUNDING, SMALLEST_PIVOT, STABLE, WEAK
-from evfem.contact.below import RIGID_BELOW, RigidBelow
+from evfem.contact.below import LEVEL, RIGID_BELOW, Level, RigidBelow
 from evfem.contact.follower import Candidates, FollowerStiffness, local
 from evfem.contact.signorini import (
     OPEN,
@@ -192,8 +192,8 @@ class LinearContactStep:
         horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
-        foundation = self.below.displacement(whole)
-        return StepSolution(moved - foundation, force, status, extra, solves, reduced, foundation)
+        body, foundation = self.below.displacement(moved, whole, self._present)
+        return StepSolution(body, force, status, extra, solves, reduced, foundation)
 
     def _settled(self, active: Any, unloaded_motion: Floats, body_motion: Floats) -> ContactOfCandidates:
         """Contact of the `active` nodes (c,) bool, to which penetrating ones are added until none is left."""
@@ -207,7 +207,7 @@ class LinearContactStep:
             whole[self.body.rows(nodes)] = pushed
             moved = unloaded_motion[:, 0] + unloaded_motion[:, 1:] @ found.extra
             moved += product(self.relative_compliance, whole)
-            gap = known.surface.normal_gap + self._along_normal(moved)
+            gap = known.surface.normal_gap + self._along_normal(self.below.moved(moved, self._present))
             gap[nodes] = 0.0  # solved in the dense problem
             penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(known.surface.gap)))
             if not penetrated.size:
@@ -221,9 +221,9 @@ class LinearContactStep:
         self, active: Any, unloaded_motion: Floats, body_motion: Floats
     ) -> ContactOfCandidates | None:
         """The same in the plane in compiled code; None without it, for large systems, which are solved faster
-        otherwise, where statuses cycle, and where a pad may snap.
+        otherwise, above surfaces that tilt, where statuses cycle, and where a pad may snap.
         """
-        if (settle := contact_loop()) is None or active.sum() > LARGE_SYSTEM:
+        if (settle := contact_loop()) is None or active.sum() > LARGE_SYSTEM or self.below.tilts:
             return None
         known, c, p = self.candidates, len(active), len(self.unknowns)
         none = np.zeros(c)
@@ -306,11 +306,13 @@ class LinearContactStep:
         known, rows, dim = self.candidates[active_nodes], self.body.rows(active_nodes), self.body.dim
         follower = FollowerStiffness.of(known.follower_rate(self._own[active_nodes]))
         C, W, present = self.among(active_nodes), unloaded_motion[rows], self._present[rows]
-        if follower.loaded.size:
+        tilt = self.tilt(active_nodes)
+        if follower.loaded.size or self.below.tilts:
             W[:, 0] += product(C, present)
-            C, W = follower.apply(C, W)
-            W[:, 0] -= C @ present  # the unknowns are whole forces again, not increments
-        problem = self._problem(known, (C, W), self._bone_balance(rows, body_motion, (C, W), follower))
+            C, W = follower.apply(tilt.compliance(C), tilt.motion(W))
+            W[:, 0] -= C @ tilt.shift(present)  # the unknowns are whole forces again, not increments
+        balance = self._bone_balance(rows, body_motion, (C, W), (follower, tilt))
+        problem = self._problem(known, (C, W), balance)
         attraction = AttractionStiffness(
             known.negative_stiffness, known.surface.normal_gap, known.gain_on_closing, known.by_force
         )
@@ -325,7 +327,15 @@ class LinearContactStep:
         force = np.einsum("ka,kab->kb", pressed, known.surface.axes).ravel()
         if follower.loaded.size:
             force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
-        return found, force
+        return found, tilt.force(force, present)
+
+    def tilt(self, nodes: Ints) -> Level:
+        """What tilts below these candidates."""
+        if not self.below.tilts:
+            return LEVEL
+        known = self.candidates[nodes]
+        turned = known.surface.tilted(known.force)
+        return self.below.tilt(nodes, self.body.rows(nodes), turned, self._present)
 
     def _problem(
         self, known: Candidates, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
@@ -366,13 +376,18 @@ class LinearContactStep:
         return carried, pivot, value, np.where(bone, floor, 0.0)
 
     def _bone_balance(
-        self, rows: Ints, body_motion: Floats, active: tuple[Floats, Floats], follower: FollowerStiffness
+        self,
+        rows: Ints,
+        body_motion: Floats,
+        active: tuple[Floats, Floats],
+        turns: tuple[FollowerStiffness, Level],
     ) -> tuple[Floats, Floats, Floats] | None:
         """These equations with the follower forces of the active nodes, at `rows` (dim k,)."""
         if not self.unknowns:
             return None
-        (C, W), (carried, pivot, value, floor) = active, self._far_balance(body_motion)
-        row = carried[:, rows]
+        (C, W), (follower, tilt) = active, turns
+        carried, pivot, value, floor = self._far_balance(body_motion)
+        row, value = tilt.equations(carried[:, rows], value, self._present[rows])
         if follower.loaded.size:
             through = follower.transposed(row)
             row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]

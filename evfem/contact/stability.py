@@ -71,7 +71,8 @@ def _free_compliance(step: LinearContactStep, nodes: Ints, slipping: Ints, opene
     """Compliance (f, f) of slips and gaps of these nodes, contact fixed, the bone free where it is loaded."""
     known, bone = step.candidates[nodes], _bone(step, nodes)
     axes, closed, stick = known.surface.axes, np.flatnonzero(known.status != OPEN), known.status == STICK
-    C = local(axes, local(axes, step.among(nodes)).T).T + np.diag(_interface_compliance(known).ravel())
+    C = step.tilt(nodes).compliance(step.among(nodes))
+    C = local(axes, local(axes, C).T).T + np.diag(_interface_compliance(known).ravel())
     held, free = np.append(2 * closed, 2 * np.flatnonzero(stick) + 1), np.append(2 * slipping + 1, 2 * opened)
     ratio, moving = (known.friction * known.shear_direction[:, 0])[closed], np.vstack([C, bone.rows])
     pushes = moving[:, held]
@@ -101,8 +102,10 @@ def _bone(step: LinearContactStep, nodes: Ints) -> ExtraUnknowns:
     pushes = np.column_stack([unknown.push for unknown in step.unknowns])
     moved = step.body.compliance @ pushes[:-2]
     S, by_unknowns, wanted, carried = step.equations
-    pivot, carried = S[:, :-2] @ moved + by_unknowns, local(axes, carried[:, rows].T).T
-    return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(wanted.size))
+    tilt, pivot = step.tilt(nodes), S[:, :-2] @ moved + by_unknowns
+    row, _ = tilt.equations(carried[:, rows], wanted, np.zeros(rows.size))
+    carried = local(axes, row.T).T
+    return ExtraUnknowns(local(axes, tilt.motion(moved[rows])), carried, pivot, np.zeros(wanted.size))
 
 
 def _largest_eigenvalue(A: Floats, stiffness: Floats, least: float) -> tuple[float, Floats]:

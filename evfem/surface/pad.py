@@ -321,9 +321,13 @@ class SurfaceState:
         """Rotation of forces (P, 1 + d) along n, t1[, t2] with the surface: their change along (y, x[, z])
         per displacement of the node along x[, z], (P, 1 + d, d).
         """
-        (p, q, first, r), d = self._sizes, self.slope.shape[1]
         if not self.curvature.any():
-            return np.zeros((p.size, 1 + d, d))
+            return np.zeros((*force.shape, self.slope.shape[1]))
+        return np.asarray(self.tilted(force) @ self.curvature)
+
+    def tilted(self, force: Floats) -> Floats:
+        """The same per change of the slopes along x[, z], (P, 1 + d, d)."""
+        (p, q, first, r), d = self._sizes, self.slope.shape[1]
         # rates at which n turns towards t1 and t2, and t1 towards t2, by p and by q
         a, b, c = (np.zeros((p.size, d)) for _ in range(3))
         a[:, 0] = -1.0 / (first * r)
@@ -333,8 +337,7 @@ class SurfaceState:
             b[:, 0], b[:, 1], c[:, 0] = p * q / (first * r**2), -first / r**2, q / (first**2 * r)
             two = force[:, 2:]
             changes = [changes[0] - b * two, changes[1] - c * two, b * normal + c * one]
-        by_slope = np.einsum("paj,pak->pkj", np.stack(changes, axis=1), self.axes)
-        return np.asarray(by_slope @ self.curvature)
+        return np.asarray(np.einsum("paj,pak->pkj", np.stack(changes, axis=1), self.axes))
 
 
 def surface_state(surface: Any, position: Floats) -> SurfaceState:

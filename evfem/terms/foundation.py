@@ -23,7 +23,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints, block
 from evfem.common.rooms import Column, Foundation, Room
-from evfem.contact.below import RIGID_BELOW, RigidBelow
+from evfem.contact.below import RIGID_BELOW, Level, RigidBelow, Tilt
 from evfem.contact.condensed import COMPONENTS
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
@@ -64,19 +64,23 @@ class Yielding:
 
     def among(self, nodes: Ints) -> Floats:
         """Compliance (dim c, dim c) of these nodes, 0 of those outside the loaded zone."""
+        return self.picked(self.compliance, nodes)
+
+    def picked(self, matrix: Floats, nodes: Ints) -> Floats:
+        """The same of a matrix (dim k, dim k)."""
         dim = len(self.slope) + 1
         (_, own, there) = np.intersect1d(nodes, self.over, assume_unique=True, return_indices=True)
         found = np.zeros((dim * nodes.size, dim * nodes.size))
         rows, columns = ((dim * at[:, None] + np.arange(dim)).ravel() for at in (own, there))
-        found[np.ix_(rows, rows)] = self.compliance[np.ix_(columns, columns)]
+        found[np.ix_(rows, rows)] = matrix[np.ix_(columns, columns)]
         return found
 
 
 @dataclass(frozen=True, eq=False)
 class BelowCandidates(RigidBelow):
-    """An elastic surface below the candidates: its `compliance` (2 c, 2 c), in the order of the body's, and
-    its increment without contact forces towards its displacement under the present attraction, `pulled`
-    (2 c,) in mm.
+    """An elastic surface below the candidates: its `compliance` (dim c, dim c), in the order of the body's,
+    and its increment without contact forces towards its displacement under the present attraction, `pulled`
+    (dim c,) in mm.
     """
 
     compliance: Floats
@@ -91,8 +95,42 @@ class BelowCandidates(RigidBelow):
     def unloaded(self, free: Floats) -> Floats:
         return free + np.pad(self.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
 
-    def displacement(self, whole: Floats) -> Any:
-        return self.pulled + self.compliance @ whole
+    def displacement(self, motion: Floats, whole: Floats, present: Floats) -> tuple[Floats, Any]:
+        body = motion - self.pulled - self.compliance @ whole
+        return body, self.moved(motion, present) - body
+
+
+@dataclass(frozen=True, eq=False)
+class TiltingBelow(BelowCandidates):
+    """The same in the plane, with the derivatives S of the compliance by x, `slope` (2 c, 2 c), the present
+    `attraction` (2 c,), and what the slopes lack of those under it, `lacking` (c,).
+    """
+
+    slope: Floats
+    attraction: Floats
+    lacking: Floats
+    tilts = True
+
+    def tilt(self, nodes: Ints, rows: Ints, turned: Floats, present: Floats) -> Level:
+        S, one = block(self.slope, rows, rows), np.eye(rows.size)
+        by_slope = turned[:, :, 0].copy()  # along y and x
+        by_slope[:, 1] -= self.attraction[2 * nodes + 1]
+        K = -(by_slope[:, :, None] * S[::2][:, None, :]).reshape(S.shape)
+        lacking = (self.slope[1::2] @ present + self.lacking)[nodes, None]
+        L = block(self._by_loads(present), rows, rows)
+        return Tilt(np.linalg.inv(one - K), np.linalg.inv(one - L), -(by_slope * lacking).ravel())
+
+    def moved(self, motion: Floats, present: Floats) -> Floats:
+        L = self._by_loads(present)
+        loaded = np.flatnonzero(L.any(axis=0))
+        own = np.linalg.solve(np.eye(loaded.size) - block(L, loaded, loaded), motion[loaded])
+        return np.asarray(motion + L[:, loaded] @ own)
+
+    def _by_loads(self, present: Floats) -> Floats:
+        """L (2 c, 2 c) of the head of `evfem.contact.below`."""
+        found, F = np.zeros_like(self.slope), present + self.attraction
+        found[:, ::2] = -(self.slope[:, ::2] * F[::2] + self.slope[:, 1::2] * F[1::2])
+        return found
 
 
 #: names in a state's memory: C F, the contribution of the surface to the relative positions of the pad's
@@ -319,8 +357,13 @@ class ElasticFoundation(Rigid):
 
     def of(self, position: Floats, state: Any, c: Ints) -> RigidBelow:
         below = self.under(position, state)
-        pulled = below.given(state.attraction) - self.displacement(state)
-        return BelowCandidates(below.among(c), pulled[c].ravel())
+        pulled = (below.given(state.attraction) - self.displacement(state))[c].ravel()
+        compliance = below.among(c)
+        if len(below.slope) > 1:
+            return BelowCandidates(compliance, pulled)
+        lacking = (below.change(state.attraction) - state.memory[GRADIENT])[c, 0, 1]
+        slope, attraction = below.picked(below.slope[0], c), state.attraction[c].ravel()
+        return TiltingBelow(compliance, pulled, slope, attraction, lacking)
 
     def sunk(
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]

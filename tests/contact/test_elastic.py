@@ -208,3 +208,16 @@ def test_the_compliance_in_space_is_symmetric_positive_and_has_that_slope(thickn
 def test_what_no_surface_can_be_is_refused(make, message):
     with pytest.raises(ev.InputError, match=message):
         make()
+
+
+def test_a_soft_wave_is_pressed_without_friction_in_few_iterations():
+    """The surface tilts under the forces that turn with it: a step that leaves this out fails, and ends in
+    releases, of which 40 s see no end.
+    """
+    wave = ev.Sinusoid(friction=0.0, elastic=ev.ElasticLayer(E=0.2, nu=0.48, thickness=2.0))
+    pad = ev.FingerPad(resolution="coarse")
+    kept = ev.Solver(strategy=ev.Strategy(patience=0.0))  # a new tangent in every iteration
+    result = ev.simulate(ev.Scene(pad, wave, motion=[ev.Press(force=0.02, steps=4)], solver=kept))
+    assert result["substeps"].max() == 1
+    assert result["newton_iterations"].sum() <= 40
+    assert result["normal_force"][-1] == pytest.approx(0.02, rel=1e-7)

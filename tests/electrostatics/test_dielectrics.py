@@ -104,7 +104,7 @@ def test_impossible_questions_are_refused():
         refuses("frequency", SKINS["gabriel_dry"].permittivity, frequency)
     refuses("frequencies in Hz that grow", ev.DielectricTable, [10.0, 1.0], [2.0, 2.0], [0.0, 0.0])
     refuses("equally many", ev.DielectricTable, [10.0, 11.0], [2.0], [0.0, 0.0])
-    refuses('skin: given "dry"; allowed: seed', dielectric, "dry")
+    refuses('skin: given "dry"; allowed: gabriel_dry', dielectric, "dry")
     refuses("f_high", SKINS["raicu"].debye, 10.0, 1.0)
 
 
