@@ -11,6 +11,7 @@ import errno
 import json
 import math
 import os
+import tempfile
 import warnings
 import zipfile
 import zlib
@@ -135,6 +136,13 @@ def disk(doing: str) -> Iterator[None]:
     except OSError as error:
         reason = "it is a file, not a folder" if error.errno == errno.EEXIST else error.strerror
         raise StorageError(f"cannot {doing}: {reason or error}") from error
+
+
+@contextmanager
+def passing_folder() -> Iterator[Path]:
+    """A folder for temporary files, removed at the end; StorageError where the disk refuses, inside too."""
+    with disk("use the folder for temporary files"), tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
 
 
 @contextmanager

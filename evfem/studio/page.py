@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from evfem.circuit.signalfile import write_signal
 from evfem.common.arrays import Floats
 from evfem.common.checks import Key, choice, keys_of
+from evfem.common.storage import passing_folder
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.estimate.display import Device, Rendering, playback, render, render_exact, spectrum_of
 from evfem.estimate.estimate import Estimate, estimate
@@ -24,6 +24,8 @@ from evfem.textures.importers import IMPORTERS, friction_profile, importer_of
 
 #: points of a curve that is drawn
 POINTS = 401
+#: letters of an uploaded file's name that are kept, each of up to 4 bytes: a disk takes 255
+LETTERS = 60
 #: what the buttons give: name of the file, and its type
 FILES = {
     "csv": ("voltage.csv", "text/csv"),
@@ -133,24 +135,24 @@ def file(state: State, kind: str) -> bytes:
     if kind == "friction":
         return found.curve.rows().encode()
     profile = found.signal.profile
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"file.{kind}"
+    with passing_folder() as folder:
+        path = folder / f"file.{kind}"
         write_signal(path, profile, playback(profile, state.touch, state.device))
         return path.read_bytes()
 
 
 def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
     """The texture in an uploaded file as the page keeps it; `options` are an importer's, `mean` and `rms`."""
-    safe = "".join(c for c in Path(name).name if c.isalnum() or c in "._- ")[-80:] or "file"
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / safe
+    safe = "".join(c for c in Path(name).name if c.isalnum() or c in "._- ").strip(". ")[-LETTERS:] or "file"
+    with passing_folder() as folder:
+        path = folder / safe
         path.write_bytes(data)
         _, importer = importer_of(path)
         known: dict[str, Any] = {}
         for key in keys_of(importer):
             if text := options.get(key.name):
                 known[key.name] = _number(text) if float in key.types else text
-        texture = read(importer, known | {"name": Path(safe).stem[:80] or "file"}, "")(path)
+        texture = read(importer, known | {"name": Path(safe).stem or "file"}, "")(path)
     if texture.quantity == "friction_spectrum":
         mean, rms = (_number(options.get(key) or usual) for key, usual in (("mean", "0.4"), ("rms", "0.02")))
         texture = friction_profile(texture, mean, rms, length=20.0)

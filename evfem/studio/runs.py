@@ -10,15 +10,14 @@ from __future__ import annotations
 import base64
 import io
 import os
-import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from evfem.common.pools import Worker
+from evfem.common.storage import passing_folder
 from evfem.errors import EvfemError, InputError
 from evfem.protocols import Observer
 from evfem.studio.state import State, parse
@@ -109,6 +108,6 @@ def _animation(result: Any) -> str:
     """The frames of the slide as a GIF in base 64."""
     from evfem.plotting.movie import animate
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = animate(result, Path(folder) / "slide.gif", near="contact", progress=False)
+    with passing_folder() as folder:
+        path = animate(result, folder / "slide.gif", near="contact", progress=False)
         return base64.b64encode(path.read_bytes()).decode()

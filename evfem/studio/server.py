@@ -116,8 +116,16 @@ class Handler(BaseHTTPRequestHandler):
         if self.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
             raise Refused(HTTPStatus.FORBIDDEN, "another site asks")
 
+    def _asked(self) -> tuple[str, dict[str, str]]:
+        """Path and options of the request's address."""
+        try:
+            parts = urlsplit(self.path)
+        except ValueError:  # as http://[/
+            raise Refused(HTTPStatus.BAD_REQUEST, "the address of a request must be one") from None
+        return parts.path, dict(parse_qsl(parts.query))
+
     def _get(self) -> None:
-        path = urlsplit(self.path).path
+        path, _ = self._asked()
         if path == "/library":
             self._say([{"name": name, "about": about(name)} for name in names()])
         elif path in ASSETS:
@@ -128,7 +136,7 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(HTTPStatus.NOT_FOUND, "there is no such page")
 
     def _post(self) -> None:
-        path, query = urlsplit(self.path).path, dict(parse_qsl(urlsplit(self.path).query))
+        path, query = self._asked()
         body = self._body(MOST_UPLOAD if path == "/upload" else MOST_STATE)
         if path == "/answer":
             self._say(page.answer(parse(body)))
@@ -146,7 +154,7 @@ class Handler(BaseHTTPRequestHandler):
     def _body(self, most: int) -> bytes:
         """The request's body; what is too long is not read."""
         length = self.headers.get("Content-Length", "")
-        if not length.isdigit() or len(length) > 12:
+        if not (length.isascii() and length.isdigit()) or len(length) > 12:
             raise Refused(HTTPStatus.LENGTH_REQUIRED, "the length of a request must be said")
         if int(length) > most:
             sentence = f"{int(length) / 1e6:.1f} MB are too much; allowed: {most / 1e6:g} MB"

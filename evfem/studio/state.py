@@ -110,7 +110,10 @@ def _curve(key: str, state: Mapping[str, Any], names: tuple[str, ...], kind: Cal
         raise InputError(key, "another shape", f"as many numbers in each of {', '.join(names)}")
     if not 16 <= columns[0].size <= MOST_ROWS:
         raise InputError(key, f"{columns[0].size} numbers", f"16 to {MOST_ROWS} in each column")
-    found = [one.astype(float) for one in columns]
+    try:
+        found = [one.astype(float) for one in columns]
+    except OverflowError:  # a whole number of more than 308 digits
+        raise InputError(key, "numbers out of range", "a curve of the model") from None
     if not all(np.isfinite(one).all() for one in found) or not (np.diff(found[0]) > 0.0).all():
         raise InputError(key, "numbers that are not finite or do not rise", "a curve of the model")
     if any(np.abs(one).max() > LARGEST[name] for one, name in zip(found, names, strict=True)):

@@ -1,5 +1,6 @@
 """The server: who is answered, what is too much, and what a run does when nobody listens."""
 
+import errno
 import http.client
 import json
 import multiprocessing
@@ -106,12 +107,35 @@ def test_what_is_too_long_is_refused_before_it_is_read(server, path, most):
         ("POST", "/upload?name=a.wav&licence=CC0&speed=10", "RIFF....", 400),
         ("POST", "/upload?name=a.csv", "x,height\n0,0\n", 400),
         ("POST", "/run", '{"method": 1}', 400),
+        ("GET", "http://[/", None, 400),
+        ("POST", "http://[/", "{}", 400),
+        ("POST", "/upload?name=..&licence=CC0", "x,height\n0,0\n", 400),
+        ("POST", f"/upload?name={'%F0%A0%80%80' * 300}.csv&licence=CC0", "x,height\n0,0\n", 400),
     ],
 )
 def test_mistakes_get_a_status_and_a_sentence(server, method, path, body, status):
     found, _, answer = ask(server, method, path, body)
     assert found == status
     assert json.loads(answer)["error"]
+
+
+@pytest.mark.parametrize("length", ["-1", "abc", "5, 5", "\u00b2"])
+def test_a_length_that_is_no_number_is_refused(server, length):
+    status, _, body = ask(server, "POST", "/answer", "{}", Content_Length=length)
+    assert (status, json.loads(body)) == (411, {"error": "the length of a request must be said"})
+
+
+@pytest.mark.parametrize(
+    ("path", "body"), [("/file?kind=png", "{}"), ("/upload?name=a.csv&licence=CC0", "x,height\n0,0\n")]
+)
+def test_a_disk_that_is_full_is_said(server, monkeypatch, path, body):
+    def full(*given, **more):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("tempfile.TemporaryDirectory", full)
+    status, _, answer = ask(server, "POST", path, body)
+    told = "cannot use the folder for temporary files: No space left on device"
+    assert (status, json.loads(answer)) == (500, {"error": told})
 
 
 def test_a_file_has_its_name(server):

@@ -41,6 +41,7 @@ DRAWN = {"x": [0.0, 0.5, 1.0, 1.5], "values": [0.0, 0.01, 0.0, -0.01], "licence"
         ({"model": {"x": list(range(20)), "friction": ["a"] * 20}}, "model: given"),
         ({"model": {"x": [0.0] * 20, "friction": [0.3] * 20}}, "model: given"),
         ({"model": {"x": list(range(20)), "friction": [1e9] * 20}}, "model: given"),
+        ({"model": {"x": list(range(20)), "friction": [10**400] * 20}}, "model: given numbers out of range"),
         ({"exact": {"x": list(range(20)), "voltage": [1.0] * 20}}, "exact: given"),
         ({"exact": {"x": list(range(20)), "voltage": [1e6] * 20, "friction": [0.3] * 20}}, "exact: given"),
     ],
