@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 
@@ -42,9 +43,9 @@ def write(template: str, path: Path) -> list[Path]:
     for file in contents:
         if file.exists():
             raise InputError("FILE", f"{file}, which exists", "a file that is not there yet")
-    for file, content in contents.items():
-        with replacing(file) as temporary:
-            temporary.write_bytes(content)
+    with ExitStack() as stack:  # all of them are on the disk before one has its name
+        for file, content in contents.items():
+            stack.enter_context(replacing(file)).write_bytes(content)
     return list(contents)
 
 

@@ -18,11 +18,14 @@ from tools.commands import called, contents, run_process
 import evfem
 from evfem import runfolder
 from evfem.common.storage import load_arrays, packed, save_arrays, unpacked
+from evfem.errors import StorageError
 from evfem.scene.file import load
 from evfem.simulation.checkpoint import CHECKPOINT_FORMAT, rows_of
 from evfem.simulation.history import csv_header
 from evfem.simulation.result import COLUMNS
 from evfem.simulation.run import simulate
+from evfem.textures import texture
+from evfem.textures.texture import Texture
 
 
 @pytest.mark.parametrize(
@@ -316,3 +319,26 @@ def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_l
     assert run(place, "--resume")[0] == 0
     # the last digits may differ: PARDISO's depend on where its memory lies
     assert kills.difference(place / "stopped", whole) < 1e-12
+
+
+@pytest.mark.parametrize("room", [0, 1])
+def test_a_texture_stays_whole_where_the_disk_is_full_under_the_next(tmp_path, monkeypatch, room):
+    """Its rows are in a file of their own; those of another texture under its name would be a third one."""
+    texture.write(Texture("one", "drawn", [0.0, 1.0], [0.0, 0.01], "CC0-1.0"), tmp_path / "a.json")
+    before = contents(tmp_path)
+    other = Texture("two", "drawn", [0.0, 1.0], [0.02, 0.0], "CC0-1.0")
+    Full(room, monkeypatch)
+    with pytest.raises(StorageError, match=r"cannot write .*a\.(csv|json): No space left"):
+        texture.write(other, tmp_path / "a.json")
+    monkeypatch.undo()
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("room", [0, 1])
+def test_a_template_that_the_disk_refused_is_written_later(tmp_path, monkeypatch, room):
+    Full(room, monkeypatch)
+    status, out, err = called(tmp_path, "init", "--template", "mesh")
+    monkeypatch.undo()
+    assert (status, out, "No space left" in err) == (4, "", True)
+    assert contents(tmp_path) == {}
+    assert called(tmp_path, "init", "--template", "mesh")[0] == 0

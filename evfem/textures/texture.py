@@ -19,7 +19,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import above, choice, real, set_frozen
-from evfem.common.storage import disk, write_text
+from evfem.common.storage import disk, replacing
 from evfem.common.tables import csv_text, numbers, read_bytes, read_columns
 from evfem.common.views import plus
 from evfem.errors import InputError, describe_value
@@ -133,8 +133,9 @@ class Texture:
 def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
     """Write a `.json` and its `.csv`, or both into a folder (a path without ending).
 
-    The `.json` is written last: without it there is no texture. Returns both paths. Raises InputError
-    if the `.csv` was not written by evfem, such as a measurement of the same name.
+    The `.json` is written last: without it there is no texture; an earlier texture stays whole until both
+    are on the disk. Returns both paths. Raises InputError if the `.csv` was not written by evfem, such as
+    a measurement of the same name, and StorageError when the disk refuses.
 
     >>> wave = Texture("wave", "drawn", [0.0, 1.0], [0.0, 0.01], "CC0-1.0", period=2.0)
     >>> [path.name for path in write(wave, "wave.json")], read("wave.json").period
@@ -153,11 +154,12 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
         raise InputError("path", problem, f"another name, as {path.stem}-texture.json")
     header, units = QUANTITIES[texture.quantity]
     rows = zip(texture.x.tolist(), texture.values.tolist(), strict=True)
-    write_text(data, csv_text([header, *rows]))
     document: dict[str, Any] = {"format": FORMAT, "data": data.name}
     document["units"] = dict(zip(header, units, strict=True))
     document = {key: document[key] if key in document else getattr(texture, key) for key in KEYS}
-    write_text(path, json.dumps(document, indent=1) + "\n")
+    with replacing(path) as head, replacing(data) as table:
+        table.write_text(csv_text([header, *rows]), encoding="utf-8", newline="\n")
+        head.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8", newline="\n")
     return path, data
 
 
