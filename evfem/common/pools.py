@@ -17,7 +17,7 @@ from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import islice
-from multiprocessing import Pipe, current_process, get_context, parent_process
+from multiprocessing import Pipe, current_process, get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -70,6 +70,22 @@ def _here(function: Callable[[Any], Any], tasks: Mapping[Any, Any]) -> Iterator[
         yield key, function(task)
 
 
+@contextmanager
+def without_ctrl_c() -> Iterator[None]:
+    """Inside, processes are started whom Ctrl-C does not reach, which a terminal sends to all of a command's;
+    for this one it comes at the end. On Windows it reaches them all.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # who starts it lets signals through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class Worker:
     """A fresh interpreter, BLAS on one thread, without Ctrl-C, that calls `function(line, *arguments)`."""
 
@@ -77,7 +93,8 @@ class Worker:
         self.line, theirs = Pipe()
         job = (function, theirs, *arguments)
         self._process = get_context("spawn").Process(target=_begin, args=job, daemon=True)
-        self._process.start()
+        with without_ctrl_c():
+            self._process.start()
         theirs.close()
 
     def end(self) -> int | None:
@@ -196,7 +213,8 @@ def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
         if scheduler == "local":
             n, port = workers or cores(), "127.0.0.1:0"  # the usual port may belong to another cluster
             how: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": port}
-            cluster = LocalCluster(n_workers=n, silence_logs=logging.ERROR, **how)
+            with without_ctrl_c():
+                cluster = LocalCluster(n_workers=n, silence_logs=logging.ERROR, **how)
             address = stack.enter_context(cluster)
             stack.push(partial(_end_at_once, cluster))
         try:

@@ -339,6 +339,19 @@ def test_a_killed_sweep_leaves_whole_points_and_goes_on(plan, tmp_path, number):
     assert {name: now[name] for name in kept} == kept
 
 
+@pytest.mark.parametrize("options", [("--workers", "2"), ("--workers", "1", "--scheduler", "local")])
+def test_ctrl_c_while_processes_start_is_one_line(plan, tmp_path, options):
+    """A terminal sends it to all of them, and Python says where each was."""
+    words = [sys.executable, "-m", "evfem.cli", "sweep", str(plan), "--out", str(tmp_path / "out"), *options]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, start_new_session=True) as run:
+        until(lambda: len(children(run.pid)) >= 2)  # one beside multiprocessing's tracker
+        time.sleep(0.1)  # it imports
+        os.killpg(run.pid, signal.SIGINT)
+        message = run.communicate(timeout=60)[1]
+    told = f"interrupted; finished points are in {tmp_path / 'out'}, the same command goes on there"
+    assert [line for line in message.splitlines() if "valid scene" not in line] == [f"evfem: {told}"]
+
+
 def test_a_folder_in_which_a_sweep_is_at_work_is_refused(plan, tmp_path, capsys):
     out = tmp_path / "out"
     with alone_in(out):
