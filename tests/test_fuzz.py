@@ -45,7 +45,7 @@ def test_damaged_files_are_read_or_refused_with_one_sentence(kind, count):
             folder = Path(name)
             words = hostile.damaged(kind, folder, rng)
             before = contents(folder)
-            status, error = loaded(folder) if words[0] == "load" else called(folder, *words)[::2]
+            status, error = loaded(folder / words[1]) if words[0] == "load" else called(folder, *words)[::2]
             statuses.add(status)
             assert status in (0, 2, 3), error
             assert not (folder / "owned").exists()  # a pickled object would have made it
@@ -60,10 +60,10 @@ def test_damaged_files_are_read_or_refused_with_one_sentence(kind, count):
     assert 2 in statuses
 
 
-def loaded(folder):
-    """Exit status and message that loading the result would give."""
+def loaded(path):
+    """Exit status and message that loading a file, and showing what is in it, would give."""
     try:
-        ev.result.load(folder / "run.npz")
+        repr(ev.load(path))
     except ev.InputError as error:
         return 2, f"{error}\n"
     return 0, ""
@@ -176,6 +176,11 @@ HOSTILE = {
     "tag.msh": (MSH.format(1, f"1\n1 15 2 1 1 {2**62}"), "out of bounds|too large"),
     "absent.msh": (MSH.format("2\n3 1 0 0", "1\n1 1 2 1 1 1 2"), "nodes that do not exist"),
     "none.msh": (MSH.format(0, "0"), "."),
+    "cut.msh": (
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n1 0 0 0\n1 0 0 0 0\n"
+        "$Nodes\n1 1 1 1\n2 1 0 1\n1\n0 0 0\n$EndNodes\n",
+        r"cut\.msh \(\$Entities not closed by \$EndEntities\.",
+    ),
     "words.msh": (MSH.replace("0 0 0", "0 0 x").format(1, "1\n1 15 2 1 1 1"), "could not be read|reshape"),
 }
 

@@ -212,6 +212,7 @@ def check_numbers(raw: meshio.Mesh) -> None:
 def _reason(error: BaseException, said: str, path: Path) -> str:
     """Why meshio could not read a file, on one line, without the folder."""
     reason = (said if isinstance(error, SystemExit) else str(error)).replace(str(path), path.name)
+    reason = re.sub(r"\b(Warning|Error): ", "", reason)  # as meshio prints them
     if isinstance(error, ModuleNotFoundError):
         reason = f"a format that needs {error.name}: pip install 'evfem[meshes]'"
     elif isinstance(error, KeyError):

@@ -2,6 +2,7 @@
 in a folder and returns the words of the command that reads it.
 """
 
+import json
 import re
 from functools import cache
 from pathlib import Path
@@ -9,11 +10,13 @@ from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
+from scipy.io import savemat
 
 import evfem as ev
 from evfem.common.storage import save_arrays
 from evfem.mesh import file as meshfile
 from evfem.scene.file import load
+from evfem.textures import texture
 from tools.commands import called, contents
 from tools.kills import head
 from tools.meshes import block
@@ -51,8 +54,33 @@ SOLVER = '[solver]\nelement = "q1"\ntolerance = 1e-8\nthreads = 1\n[output]\neve
 PRESS = '[[motion]]\nkind = "press"\nindentation = 0.1\nsteps = 1\n'
 MOTIONS = PRESS + '[[motion]]\nkind = "slide"\ndistance = -0.5\nsteps = 3\nhold = "force"\nspeed = 20.0\n'
 RAMP = '[[motion]]\nkind = "hover"\ngap = 0.2\n[[motion]]\nkind = "voltage"\nvoltage = 50.0\nsteps = 2\n'
+SWEEP = """version = 1
+scene = "mesh_vtu.toml"
+outputs = ["normal_force.last"]
+[grid]
+surface.friction = [0.1, 0.2]
+[samples]
+count = 4
+seed = 1
+[samples.parameters]
+motion.0.indentation = { normal = [0.1, 0.01], between = [0.05, 0.15] }
+"""
 SCAN = "x,height\n" + "".join(f"{0.1 * k - 2.0!r},{0.01 * (k % 3)!r}\n" for k in range(41))
 SIGNAL = "position,voltage\n" + "".join(f"{0.2 * k!r},{20.0 * (k % 5)!r}\n" for k in range(12))
+
+
+WRITTEN = Path(__file__).parents[1] / "mesh" / "written"
+#: meshes that libraries of other programs wrote
+MESHES = {
+    "mesh_msh4": "gmsh_quad9_4.1.msh",
+    "mesh_inp": "gmsh_quad9.inp",
+    "mesh_bdf": "gmsh_quad.bdf",
+    "mesh_mesh": "gmsh_quad.mesh",
+    "mesh_su2": "gmsh_quad9.su2",
+    "mesh_med": "gmsh_quad9.med",
+    "mesh_exo": "exodus_quad9.exo",
+    "mesh_xdmf": "dolfinx_quad9.xdmf",
+}
 
 
 def _presses(mesh, surface, law=""):
@@ -93,7 +121,24 @@ def _whole():
             (folder / f"{kind}.toml").write_text(text)
         assert called(folder, "run", "checkpoint.toml", "--no-plots", "--no-fields")[0] == 0
         ev.simulate(load(folder / "checkpoint.toml")).save(folder / "run.npz")
+        _others(folder)
         return contents(folder)
+
+
+def _others(folder):
+    """Tables, haptics, a fit, a sweep and a texture, and the meshes of other programs."""
+    (folder / "sweep.toml").write_text(SWEEP)
+    savemat(folder / "signal.mat", {"position": np.arange(9.0), "voltage": 20.0 * np.arange(9.0)})
+    profile = ev.VoltageProfile([0.0, 0.5, 1.0], [0.0, 100.0, 50.0])
+    device = ev.Playback(full_scale=100.0, speed=20.0, friction=(0.4, 0.6))
+    ev.write_signal(folder / "signal.hjif", profile, device)
+    forces = ev.MeasuredValues("normal_force.last", [2e-3, 3e-3], {"motion.0.indentation": [0.05, 0.1]})
+    free = {"finger.materials.tissue.E": (0.01, 0.2)}
+    ev.fit(folder / "mesh_vtu.toml", forces, free, workers=1).save(folder / "fit.json")
+    wave = ev.Texture("wave", "drawn", [0.0, 0.1, 0.2], [0.0, 0.01, 0.005], "CC0-1.0", period=0.3)
+    texture.write(wave, folder / "wave.json")
+    for name in (*MESHES.values(), "dolfinx_quad9.h5"):
+        (folder / name).write_bytes((WRITTEN / name).read_bytes())
 
 
 def damaged(kind, folder, rng):
@@ -105,8 +150,10 @@ def damaged(kind, folder, rng):
         (folder / "scene.toml").write_text(_scene(rng))
     name, damage = FORMATS[kind]
     damage(folder / name, rng)
-    if kind in ("scene", "result"):
-        return ["plan" if kind == "scene" else "load", name]
+    if kind == "scene":
+        return ["plan", name]
+    if kind not in SCENES:
+        return ["load", name]
     return ["run", f"{kind}.toml", "--no-plots", "--no-fields", *(["--resume"] * (kind == "checkpoint"))]
 
 
@@ -236,6 +283,37 @@ def _other_values(array, rng):
     return changed
 
 
+#: what values in JSON are replaced with
+LEAVES = (
+    *(10**400, 2**63, -1, 0, 1.5, 1e308, -1e308, 5e-324, float("nan"), float("inf"), True, None),
+    *("", "text", "a" * 100_000, "\ud800", "two\nlines", [], {}, [[]], [1e300] * 40, [[1, 2], [3, 4]]),
+)
+
+
+def _json(path, rng):
+    """Values replaced, numbers scaled, lists repeated, keys lost; sometimes words of the text too."""
+    table = json.loads(path.read_text())
+    for _ in range(rng.choice((1, 1, 2))):
+        holder, key = rng.choice(_places(table) or [({"": 0}, "")])
+        value = holder[key]
+        new = [rng.choice(LEAVES)] * 2
+        new += [value * rng.choice((-1, 0, 1e3, 1e-9, 1e300))] if type(value) in (int, float) else []
+        new += [value * rng.choice((0, 2, 100))] if isinstance(value, list) else []
+        holder[key] = rng.choice(new)
+        if rng.random() < 0.1:
+            del holder[key]
+    path.write_text(json.dumps(table))
+    if rng.random() < 0.2:
+        _text(path, rng)
+
+
+def _places(table):
+    """What holds each value of some JSON, and its key or number there."""
+    found = [(table, key) for key in (table if isinstance(table, dict) else range(len(table)))]
+    inner = [holder[key] for holder, key in found if isinstance(holder[key], (dict, list))]
+    return [*found, *(place for one in inner for place in _places(one))]
+
+
 class _Payload:
     """Runs a function when unpickled."""
 
@@ -261,4 +339,10 @@ FORMATS = {
     "mesh_msh": ("square.msh", _text),
     "result": ("run.npz", _archive),
     "checkpoint": ("checkpoint-out/checkpoint.npz", _archive),
+    "sweep": ("sweep.toml", _text),
+    "fit": ("fit.json", _json),
+    "texture": ("wave.json", _json),
+    "haptics": ("signal.hjif", _json),
+    "table_mat": ("signal.mat", _bytes),
+    **{kind: (name, _bytes if kind in ("mesh_med", "mesh_exo") else _text) for kind, name in MESHES.items()},
 }
