@@ -61,12 +61,13 @@ def run(
         raise InputError(
             "study", f"scenes, seed, workers or limit for {name}", "these options with campaign alone"
         )
-    from .common import BEGIN
+    from .common import BEGIN, ready
 
     more = {"out": out, "sample": sample or Sample()} if name == "campaign" else {}
     token = BEGIN.set(time.perf_counter())
     try:
-        return module(name).main(quick, **more).finish(out, quick)  # type: ignore[no-any-return]
+        with ready(out):
+            return module(name).main(quick, **more).finish(out, quick)  # type: ignore[no-any-return]
     finally:
         BEGIN.reset(token)
 

@@ -4,12 +4,13 @@ import json
 import platform
 import subprocess
 import time
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, TypeVar
 
 import numpy as np
@@ -144,6 +145,26 @@ def make_folder(out: str | Path) -> Path:
     with disk(f"create the folder {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
     return folder
+
+
+@contextmanager
+def ready(out: Path | None) -> Iterator[None]:
+    """Inside, `out` is a folder that can be written to, which is known before hours are computed; removed if
+    made for this and left empty. StorageError where the disk refuses.
+    """
+    if out is None:
+        yield
+        return
+    made = not out.exists()
+    folder = make_folder(out)
+    try:
+        with disk(f"write into {folder}"), TemporaryFile(dir=folder):
+            pass
+        yield
+    finally:
+        if made:
+            with suppress(OSError):  # it is not empty
+                folder.rmdir()
 
 
 def series_text(series: Iterable[Series]) -> str:

@@ -6,6 +6,7 @@ import os
 import shutil
 import time
 import zlib
+from importlib import import_module
 from pathlib import Path
 from random import Random
 
@@ -17,6 +18,7 @@ from tools.commands import called, contents, run_process
 
 import evfem
 from evfem import runfolder
+from evfem.arguments import studies
 from evfem.common.storage import load_arrays, packed, save_arrays, unpacked
 from evfem.errors import StorageError
 from evfem.scene.file import load
@@ -342,3 +344,22 @@ def test_a_template_that_the_disk_refused_is_written_later(tmp_path, monkeypatch
     assert (status, out, "No space left" in err) == (4, "", True)
     assert contents(tmp_path) == {}
     assert called(tmp_path, "init", "--template", "mesh")[0] == 0
+
+
+@pytest.mark.parametrize("case", ["below a file", "read-only"])
+def test_a_study_whose_folder_cannot_be_written_computes_nothing(tmp_path, monkeypatch, case):
+    (tmp_path / "file").touch()
+    out = "file/out" if case == "below a file" else "out"
+    told = {"below a file": "create the folder file/out: Not", "read-only": "write into out: Read"}
+
+    def refuse(dir):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    if case == "read-only":
+        monkeypatch.setattr(import_module(f"{studies().__name__}.common"), "TemporaryFile", refuse, False)
+    monkeypatch.setattr(studies(), "module", None)
+    status, _, error = called(tmp_path, "study", "section321", "--quick", "--out", out)
+    assert status == 4
+    assert error.splitlines()[-1].startswith(f"evfem: cannot {told[case]}")
+    assert contents(tmp_path) == {"file": b""}
+    assert not (tmp_path / "out").exists()
