@@ -199,6 +199,18 @@ def _end_at_once(cluster: Any, error: type[BaseException] | None, *told: Any) ->
 
 
 @contextmanager
+def _silent(name: str) -> Iterator[None]:
+    """Inside, this logger says nothing."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+
+
+@contextmanager
 def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
     if workers is not None and scheduler != "local":
         allowed = "no workers beside the address of a scheduler, which has its own"
@@ -209,6 +221,7 @@ def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
         allowed = 'no scheduler without Dask: pip install "evfem[dask]"'
         raise InputError("scheduler", describe_value(scheduler), allowed) from error
     with ExitStack() as stack:
+        stack.enter_context(_silent("distributed.client"))  # a traceback where the scheduler goes away
         address: Any = scheduler
         if scheduler == "local":
             n, port = workers or cores(), "127.0.0.1:0"  # the usual port may belong to another cluster

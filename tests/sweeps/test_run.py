@@ -374,6 +374,27 @@ def test_a_dask_cluster_gives_the_same_numbers(plan):
             np.testing.assert_array_equal(other[name], alone[name])
 
 
+CLUSTER = """from distributed import LocalCluster
+with LocalCluster(n_workers=1, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp") as cluster:
+    print(cluster.scheduler_address, flush=True)
+    input()
+"""
+
+
+def test_a_cluster_that_goes_away_is_one_line(plan, tmp_path):
+    """Dask's client logs where it was."""
+    plan.write_text(LONG)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([sys.executable, "-c", CLUSTER], **pipes, text=True) as cluster:
+        run = started(plan, tmp_path / "out", "--scheduler", cluster.stdout.readline().strip())
+        until(lambda: any((tmp_path / "out" / "points").glob("[!.]*")))
+        cluster.kill()
+        message = run.communicate(timeout=60)[1]
+    told = f"evfem: {plan}: scheduler: given a cluster that went away; allowed: resume on another"
+    lines = [line for line in message.splitlines() if " of " not in line]
+    assert (run.returncode, lines) == (2, [told])
+
+
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
