@@ -40,6 +40,7 @@ from evfem.simulation.checkpoint import ANOTHER, Checkpoint, rows_of
 from evfem.simulation.checkpoint import PROBES as AT_PROBES
 from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import columns_of, csv_header, csv_line, read_rows
+from evfem.simulation.provenance import sound
 from evfem.simulation.result import Frame, Result, Row, Saved, provenance
 from evfem.sweeps.manifest import Manifest
 
@@ -357,7 +358,7 @@ def result_in(path: Path) -> Result:
         raise InputError("path", f"{path}, without {SUMMARY} or {HISTORY}", allowed)
     try:
         with disk(f"read {path}"):
-            origin = json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"]
+            origin = sound(json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"])
             rows = read_rows((path / HISTORY).read_text(encoding="utf-8"))
             found = (path / PROBES).read_text(encoding="utf-8") if (path / PROBES).is_file() else ""
         parameters = _with_files_beside(origin["parameters"], path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import fields
 from datetime import UTC, datetime
@@ -63,6 +64,27 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
         },
         "solver": {"tolerance": scene.solver.tolerance, **solver},
     }
+
+
+#: kinds of what is read of a provenance, and of its scene
+KINDS: Mapping[str, type] = {
+    **dict.fromkeys(("scene", "mesh", "solver", "versions"), dict),
+    **dict.fromkeys(("warnings", "columns"), list),
+    **dict.fromkeys(("parameters", "date"), str),
+}
+OF_SCENE = {"name": (str,), "total_steps": (int,), "depth": (int, float, type(None))}
+
+
+def sound(found: Any) -> dict[str, Any]:
+    """The provenance in a file; ValueError for one of another kind, or with text that no file can hold."""
+    wrong = [] if isinstance(found, dict) else ["itself"]
+    wrong = wrong or [key for key in KINDS.keys() & found if not isinstance(found[key], KINDS[key])]
+    scene = {} if wrong else found.get("scene", {})
+    wrong += [key for key in OF_SCENE.keys() & scene if type(scene[key]) not in OF_SCENE[key]]
+    if wrong:
+        raise ValueError(f"no provenance: {', '.join(sorted(wrong))}")
+    json.dumps(found, ensure_ascii=False).encode()  # halves of letters
+    return dict(found)
 
 
 class Told:

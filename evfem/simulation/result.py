@@ -51,7 +51,7 @@ from evfem.simulation.history import (
 from evfem.simulation.history import (
     INTEGERS as INTEGERS,
 )
-from evfem.simulation.provenance import Told
+from evfem.simulation.provenance import Told, sound
 from evfem.simulation.provenance import provenance as provenance
 
 #: components of a stress, in the plane without those across it
@@ -384,11 +384,9 @@ def load(path: str | Path) -> Result:
         names = [name for name in there if name not in (*COLUMNS, *SPATIAL)]
         in_rooms = {name: _column_of(arrays, name) for name in names}
         frames = _frames_from(arrays, mesh)
-        provenance = json.loads(str(arrays["provenance"]))
+        provenance = sound(json.loads(str(arrays["provenance"])))
         if len({len(column) for column in (*columns.values(), *in_space.values(), *in_rooms.values())}) > 1:
             raise ValueError("columns of different length")
-        if not isinstance(provenance, dict):
-            raise ValueError("no provenance")
         probes = _probes_from(arrays, len(columns["step"]))
         kept: dict[str, Any] = {"provenance": provenance, "in_space": in_space, "in_rooms": in_rooms}
         kept["probes"] = probes

@@ -150,6 +150,8 @@ def _refuse_no_points(files: Sequence[Path]) -> None:
 
 
 def _sound(answer: Answer) -> bool:
+    if not isinstance(answer.outputs, dict) or not isinstance(answer.over, dict):
+        return False
     numbers = [answer.seconds, *(value for value in answer.outputs.values() if value is not None)]
     told = (answer.message, *answer.over.values())
     words = answer.status in STATUS and all(isinstance(word, str) for word in told)

@@ -306,9 +306,11 @@ def read(path: Path) -> SweepResult:
 def _provenance(path: Path) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(found["points"], dict) or not isinstance(found["outputs"], list):
+        counts = [found["points"][name] for name in ("requested", *STATUS)]
+        values = [found["outputs"], *(found.get("grid") or {}).values()]
+        if {*map(type, counts)} != {int} or not all(isinstance(one, (list, dict)) for one in values):
             raise ValueError("no sweep")
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise InputError("path", f"{path.name} ({error})", f"the {PROVENANCE} of a sweep") from None
     return dict(found)
 
@@ -324,7 +326,7 @@ def _value(name: str, cell: str, known: Mapping[str, Any]) -> Any:
         return cell
     try:
         return known[cell] if cell in known else json.loads(cell) if cell else None
-    except ValueError:
+    except (ValueError, RecursionError):
         return cell
 
 

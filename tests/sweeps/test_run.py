@@ -339,6 +339,16 @@ def test_a_killed_sweep_leaves_whole_points_and_goes_on(plan, tmp_path, number):
     assert {name: now[name] for name in kept} == kept
 
 
+@pytest.mark.parametrize("more", [{"outputs": "none"}, {"outputs": {"a": 1.0}, "over": ["b"]}])
+def test_a_point_whose_outputs_are_none_is_damaged(tmp_path, more):
+    folder = sweepfolder.SweepFolder(tmp_path)
+    (tmp_path / "points").mkdir()
+    told = {"format": sweepfolder.FORMAT, "status": "done", "seconds": 1.0, "message": "", "outputs": {}}
+    for changed, known in (({}, True), (more, False)):
+        (tmp_path / "points" / "a.json").write_text(json.dumps(told | changed))
+        assert (folder.read("a") is not None) == known
+
+
 @pytest.mark.parametrize("options", [("--workers", "2"), ("--workers", "1", "--scheduler", "local")])
 def test_ctrl_c_while_processes_start_is_one_line(plan, tmp_path, options):
     """A terminal sends it to all of them, and Python says where each was."""

@@ -11,6 +11,7 @@ from tools.refusals import refuses
 import evfem as ev
 from evfem.common import tables
 from evfem.simulation.history import UNITS
+from evfem.sweeps.folder import STATUS
 from evfem.sweeps.table import SweepResult, read, table_units, told
 
 GAP, LAW, LABEL, OUT = "motion.0.gap", "electrostatics.law", "case", "electrostatic_force.last"
@@ -206,3 +207,23 @@ def test_what_is_no_grid_is_a_list_of_points(tmp_path):
     assert alone.gap.values.tolist() == ["0.5", "0.25", "-1.0", "[0.1, 2.0]"]
     table.rows.append(table.rows[0])
     refuses("to_xarray: given a table with a point twice", table.to_xarray)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"points": {"requested": 4}},
+        {"points": dict.fromkeys(("requested", *STATUS), "4")},
+        {"grid": {GAP: 1}},
+    ],
+)
+def test_a_provenance_of_another_kind_is_refused(folder, change):
+    (folder / "sweep.json").write_text(json.dumps(made().provenance | change))
+    refuses(r"path: given sweep\.json \(.*\); allowed: the sweep\.json of a sweep", read, folder)
+
+
+def test_a_cell_too_deep_for_json_is_text(folder):
+    deep = "[" * 99_999
+    table = folder / "sweep.csv"
+    table.write_text(table.read_text().replace("kaczmarek", deep))
+    assert read(folder).rows[0][LAW] == deep
