@@ -39,8 +39,8 @@ ROOMS = {
     "mesh": (
         {"numpy", "scipy", "meshio", "netCDF4", "h5py", "vtkmodules"},
         "hexahedron mesh split archive faces solids quality groups places formats.deck formats.abaqus "
-        "formats.exodus formats.gmsh formats.med formats.medit formats.nastran formats.su2 formats.vtk "
-        "formats.xdmf file memory",
+        "formats.classic formats.exodus formats.gmsh formats.med formats.medit formats.nastran formats.su2 "
+        "formats.vtk formats.xdmf file memory",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},

@@ -1,9 +1,11 @@
 """Hostile input: damaged files of every format, and files made to take all memory or time, get a sentence."""
 
 import io
+import struct
 import tracemalloc
+import warnings
 import zipfile
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from PIL import Image as Picture
 from tools import hostile
 from tools.commands import called, contents
 from tools.fakes import fake_result
@@ -23,6 +26,7 @@ from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import check
 from evfem.scene.file import load, loads
+from evfem.studio import page
 
 SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
 
@@ -219,6 +223,15 @@ def test_arrays_that_nobody_wrote_are_not_read(name, make, tmp_path):
         refuses(r"declares (1.6|3.2) GB of numbers", meshfile.read, tmp_path / name)
 
 
+@pytest.mark.parametrize("at", [12, 16])
+def test_counts_in_the_header_of_a_mesh_are_compared_with_its_length(at, tmp_path):
+    """netCDF took 5 GB and 20 s for dimensions that a file of 3 kB declares, or for the name of the first."""
+    content = bytearray((hostile.WRITTEN / "exodus_quad9.exo").read_bytes())
+    content[at : at + 4] = (2**27).to_bytes(4, "big")
+    (tmp_path / "a.exo").write_bytes(content)
+    refuses(r"a\.exo \(it declares more than it has bytes\)", meshfile.read, tmp_path / "a.exo")
+
+
 def of_matlab(path):
     from scipy.io import savemat
 
@@ -385,3 +398,57 @@ def test_results_whose_arrays_do_not_fit_get_a_sentence(name, value, tmp_path):
     with open(tmp_path / "run.npz", "wb") as file:
         np.savez(file, **{key: array for key, array in arrays.items() if array is not None})
     assert "\n" not in str(refuses(r"damaged|another format", ev.result.load, tmp_path / "run.npz"))
+
+
+def of_tiff(tag, count):
+    """A grey picture whose header says that one of its tags has so many values."""
+    file = io.BytesIO()
+    Picture.fromarray(np.arange(1200, dtype="u1").reshape(30, 40)).save(file, "TIFF")
+    entry = file.getvalue().index(struct.pack("<H", tag), 8)
+    content = bytearray(file.getvalue())
+    content[entry + 4 : entry + 8] = struct.pack("<I", count)
+    return bytes(content)
+
+
+TOLD = {
+    "twice.csv": (b"x,height\n0,1\n1,2\n1,3\n2,2\n3,0\n", "rising numbers"),
+    "swing.csv": (
+        b"time,height\n" + b"".join(b"%d,%de200\n" % (k, k % 3) for k in range(40)),
+        "whose squares",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_damage_in_heights_is_one_sentence_without_warnings(name):
+    """numpy warns, which `pytest` makes an error here."""
+    content, words = TOLD[name]
+    options = {"licence": "CC0-1.0", "speed": "20", "longest": "1000"}
+    refuses(words, page.uploaded, content, name, options)
+
+
+@pytest.mark.parametrize("tag", [256, 257, 258, 259, 273])
+def test_damage_in_tags_of_a_picture_gives_no_warnings(tag):
+    """Pillow tells which tags it skips."""
+    with warnings.catch_warnings(record=True) as told, suppress(ev.InputError):
+        warnings.simplefilter("always")
+        page.uploaded(of_tiff(tag, 10**6), "a.tif", {"licence": "CC0-1.0", "pixel": "0.1", "depth": "0.1"})
+    assert not told
+
+
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        (
+            "frequency [kHz],eps_r,conductivity\n1e307,10,1\n1e308,9,1\n",
+            ev.electrostatics.DielectricTable.from_csv,
+        ),
+        (
+            "indentation,normal_force,sd\n0.1,1,1e300\n0.1,1,1\n",
+            lambda path: ev.MeasuredCurve.from_csv(path, 0),
+        ),
+    ],
+)
+def test_numbers_that_overflow_are_refused_without_warnings(text, read, tmp_path):
+    (tmp_path / "a.csv").write_text(text)
+    refuses("finite|positive|above", read, tmp_path / "a.csv")

@@ -412,7 +412,8 @@ def _branch(rows: Floats, branch: str | None) -> Floats:
     number = np.diff(starts, append=len(rows))[:, None]
     mean = np.add.reduceat(rows, starts) / number if len(rows) else rows
     if rows.shape[1] == 3 and len(rows):
-        mean[:, 2] = np.sqrt(np.add.reduceat(rows[:, 2] ** 2, starts)) / number[:, 0]
+        with np.errstate(over="ignore"):  # infinite ones are refused
+            mean[:, 2] = np.sqrt(np.add.reduceat(rows[:, 2] ** 2, starts)) / number[:, 0]
     return mean
 
 

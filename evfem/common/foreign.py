@@ -55,10 +55,12 @@ def read_grey(
     try:
         if path.stat().st_size > MOST_BYTES:
             raise InputError(key, f"{path.name}, which is too long", allowed)
-        with Image.open(path, formats=formats) as image:
-            if image.width * image.height > most_pixels or min(image.size) < 1:
-                raise InputError(key, f"{path.name}, {image.width} x {image.height} pixels", allowed)
-            values, white = _values(image)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Pillow tells of tags that it skips
+            with Image.open(path, formats=formats) as image:
+                if image.width * image.height > most_pixels or min(image.size) < 1:
+                    raise InputError(key, f"{path.name}, {image.width} x {image.height} pixels", allowed)
+                values, white = _values(image)
     except InputError:
         raise
     except Exception as error:  # whatever the many decoders raise for a damaged file

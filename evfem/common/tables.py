@@ -220,7 +220,8 @@ class Headed:
         if unit is None and like is not None:
             unit = self._called(self.index(key, like), like)[1]
         size = units.factor(key, name, unit, bases, more) if factor is None else factor
-        return self.columns[i] if size == 1.0 else self.columns[i] * size
+        with np.errstate(over="ignore"):  # infinite ones are refused
+            return self.columns[i] if size == 1.0 else self.columns[i] * size
 
     def base(self, key: str, entry: int | str) -> str | None:
         """The unit that a column, whose own is known, is given in."""

@@ -348,7 +348,12 @@ def spectrum_of(samples: Floats, rate: float, size: int) -> tuple[Floats, Floats
         raise InputError("file", f"{samples.size} samples", "at least 8 samples that differ")
     from scipy.signal import welch  # half a second
 
-    frequency, density = welch(samples, rate, nperseg=size)
+    with np.errstate(over="ignore", invalid="ignore"):
+        frequency, density = welch(samples, rate, nperseg=size)
+    if not np.isfinite(density).all():
+        raise InputError(
+            "file", f"samples of {np.abs(samples).max():.3g}", "samples whose squares are numbers"
+        )
     return frequency[1:-1], np.sqrt(2.0 * rate / size * density[1:-1])
 
 

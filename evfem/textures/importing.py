@@ -124,7 +124,8 @@ class Heights(Importer):
     def heights(self, path: Path, kind: str, x: Floats, height: Floats, notes: list[str]) -> Texture:
         """The texture of raw heights; a note says if they are too steep to be meant."""
         x, height, done = self.cleaned(x, height)
-        slope = float(np.sqrt(np.mean((np.diff(height) / np.diff(x)) ** 2)))
+        with np.errstate(all="ignore"):  # places that do not rise are refused below
+            slope = float(np.sqrt(np.mean((np.diff(height) / np.diff(x)) ** 2)))
         if slope > STEEP:
             steeper = "steeper than any surface that a finger slides over: is each unit right?"
             done.append(f"Rms slope {slope:.3g}, {steeper}")

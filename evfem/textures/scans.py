@@ -64,7 +64,8 @@ def _tmd(data: bytes, row: float) -> Line:
     end = data.index(b"\0", 32) + 1
     columns, rows, width, *_ = struct.unpack_from("<IIffff", data, end)
     heights = np.frombuffer(data, "<f4", rows * columns, end + 24).reshape(rows, columns)
-    return _of_grid(width / columns, heights.astype(np.float64), row)
+    with np.errstate(invalid="ignore"):  # numbers that signal that they are none
+        return _of_grid(width / columns, heights.astype(np.float64), row)
 
 
 def _x3p(path: Path, row: float) -> Line:

@@ -15,6 +15,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.foreign import check_declared
+from evfem.mesh.formats.classic import check_header
 from evfem.mesh.groups import Group, Name
 from evfem.mesh.mesh import sides_of
 
@@ -50,6 +51,7 @@ def read(path: Path) -> meshio.Mesh:
     import meshio
     import netCDF4
 
+    check_header(path.read_bytes())
     with netCDF4.Dataset(path) as file:
         file.set_auto_mask(False)
         read = [one for name, one in file.variables.items() if not name.startswith("vals_")]
