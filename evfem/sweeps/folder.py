@@ -155,6 +155,8 @@ def _sound(answer: Answer) -> bool:
     numbers = [answer.seconds, *(value for value in answer.outputs.values() if value is not None)]
     told = (answer.message, *answer.over.values())
     words = answer.status in STATUS and all(isinstance(word, str) for word in told)
+    if words:
+        "".join(told).encode()  # ValueError for half a letter, which no table can hold
     return words and all(type(number) in (int, float) for number in numbers)
 
 

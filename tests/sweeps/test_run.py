@@ -339,8 +339,10 @@ def test_a_killed_sweep_leaves_whole_points_and_goes_on(plan, tmp_path, number):
     assert {name: now[name] for name in kept} == kept
 
 
-@pytest.mark.parametrize("more", [{"outputs": "none"}, {"outputs": {"a": 1.0}, "over": ["b"]}])
-def test_a_point_whose_outputs_are_none_is_damaged(tmp_path, more):
+@pytest.mark.parametrize(
+    "more", [{"outputs": "none"}, {"outputs": {"a": 1.0}, "over": ["b"]}, {"message": "\ud800"}]
+)
+def test_a_point_that_no_table_can_hold_is_damaged(tmp_path, more):
     folder = sweepfolder.SweepFolder(tmp_path)
     (tmp_path / "points").mkdir()
     told = {"format": sweepfolder.FORMAT, "status": "done", "seconds": 1.0, "message": "", "outputs": {}}
