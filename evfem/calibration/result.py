@@ -166,8 +166,11 @@ def load(path: str | Path) -> FitResult:
         arrays["errors"][np.isnan(arrays["errors"])] = np.inf
         parameters = {key: Parameter(**one) for key, one in content.pop("parameters").items()}
         warnings, paths = tuple(content.pop("warnings")), Path(content.pop("paths"))
-        return FitResult(parameters=parameters, warnings=warnings, paths=paths, **arrays, **content)
+        found = FitResult(parameters=parameters, warnings=warnings, paths=paths, **arrays, **content)
+        with np.errstate(all="ignore"):
+            repr(found)  # whose parts fit together then
+        return found
     except OSError as error:
         raise InputError("fit", f"{path} ({error.strerror})", allowed) from error
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InputError("fit", f"{path}, damaged or of another kind: {error}", allowed) from error

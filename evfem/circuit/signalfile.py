@@ -271,7 +271,8 @@ def _from_hjif(path: Path) -> VoltageProfile:
     try:
         full_scale = float(told["reference_devices"][0]["maximum_voltage"])
         ((natural, largest),) = (map(float, pair) for pair in FRICTIONS.findall(told["description"]))
-        fraction = (friction - natural) / (largest - natural)
+        with np.errstate(over="ignore"):
+            fraction = (friction - natural) / (largest - natural)
         voltage = full_scale * np.sqrt(np.clip(fraction, 0.0, 1.0))
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, ZeroDivisionError):
         raise InputError("path", f"{path.name}, without them", allowed) from None

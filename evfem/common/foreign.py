@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import struct
 import warnings
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,8 @@ MOST_BYTES = 64_000_000
 BOOKS, MOST_ROWS = (".xlsx", ".xlsm", ".mat"), 1_000_001
 #: bytes of numbers and texts that a file may declare: what nobody wrote, or is alike, takes no room in it
 MOST_DECLARED = 10**9
+#: types of parts of a file of MATLAB: of numbers and letters, of parts, and compressed
+PLAIN, MATRIX, COMPRESSED = frozenset((*range(1, 8), 9, 12, 13, 16, 17, 18)), 14, 15
 #: tag of TIFF that says whether 0 is white
 PHOTOMETRIC = 262
 
@@ -168,6 +172,7 @@ def _matlab(path: Path, key: str) -> list[list[str]]:
     from scipy.io import loadmat, whosmat
 
     check_declared(8 * math.prod(shape) for _, shape, _ in whosmat(path))
+    _check_types(path.read_bytes())
     arrays: dict[str, Any] = {}
     for name, array in _arrays(loadmat(path, simplify_cells=True)):
         if name in arrays and array.dtype.kind in "iuf" and array.size > 1:
@@ -199,6 +204,34 @@ def _matlab(path: Path, key: str) -> list[list[str]]:
         )
     rows = zip(*(array.tolist() for array in columns.values()), strict=True)
     return [[*columns], *([repr(x) for x in row] for row in rows)]
+
+
+def _check_types(data: bytes) -> None:
+    """ValueError for a part of a type that is none of MATLAB's format (version 5), before scipy reads it."""
+    if 0 in data[:4]:  # version 4
+        return
+    order = "<" if data[126:128] == b"IM" else ">"
+    waiting = [*_parts(data[128:], order)]
+    while waiting:
+        kind, body = waiting.pop()
+        if kind == MATRIX:
+            waiting += _parts(body, order)
+        elif kind == COMPRESSED:
+            waiting += _parts(zlib.decompressobj().decompress(body, MOST_DECLARED), order)
+        elif kind not in PLAIN:
+            raise ValueError(f"a part of type {kind}")
+
+
+def _parts(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """Type and bytes of each part; up to 4 bytes stand within its head."""
+    at = 0
+    while at + 8 <= len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, at)
+        short = kind >> 16
+        start = at + (4 if short else 8)
+        kind, size = (kind & 0xFFFF, short) if short else (kind, size)
+        yield kind, data[start : start + size]
+        at = at + 8 if short else start + size + (-size % 8 if kind != COMPRESSED else 0)
 
 
 def _arrays(found: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -70,6 +70,8 @@ def schema() -> Schema:
 
 #: most points of a sweep
 MOST_POINTS = 100_000
+#: most dots of a key of a distribution
+DEEPEST = 20
 STATISTICS = ("last", "mean", "min", "max")
 OUTPUTS = (
     "applied_force.last",
@@ -348,6 +350,8 @@ def _grid(table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys and values of tables in tables; distributions are values."""
+    if prefix.count(".") > DEEPEST:
+        raise InputError(shown(prefix[:40]), "tables in tables", f"keys of at most {DEEPEST} names")
     for name, value in table.items():
         if isinstance(value, dict) and not {*value} & {*names(DistributionTable)}:
             yield from _flat(value, f"{prefix}{name}.")

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import above, choice, real, set_frozen
+from evfem.common.checks import choice, real, set_frozen
 from evfem.common.storage import disk, replacing
 from evfem.common.tables import csv_text, numbers, read_bytes, read_columns
 from evfem.common.views import plus
@@ -80,7 +80,7 @@ class Texture:
             _text("provenance", note)
         _check(self)
         if self.period is not None:
-            period = float(above("period", self.period, 0.0, "a length in mm above zero"))
+            period = real("period", self.period, "a length in mm above zero", lambda p: p > 0.0)
             if self.quantity == "friction_spectrum" or not x[-1] - x[0] < period <= LONGEST:
                 problem = f"{period:g} mm, with rows over {x[-1] - x[0]:g}"
                 allowed = f"more than the rows' length, up to {LONGEST:g} mm, and none for a spectrum"
