@@ -274,6 +274,15 @@ def test_hostile_meshes_get_a_sentence(name, tmp_path):
     assert "\n" not in str(caught)
 
 
+@pytest.mark.parametrize("regions", [None, {"a": 0}, {"a" * 5000: "b" * 5000}])
+def test_names_of_groups_are_cut_in_messages(regions, tmp_path):
+    text = (hostile.WRITTEN / "gmsh_quad9.inp").read_text().replace("tissue", "f" * 5000)
+    (tmp_path / "a.inp").write_text(text)
+    assert (
+        len(str(refuses("same cells|groups that occur", meshfile.read, tmp_path / "a.inp", regions))) < 1000
+    )
+
+
 def test_what_meshio_says_is_not_searched_for_words_to_colour(tmp_path, monkeypatch):
     """Rich's patterns take time of the message's length squared."""
     path = tmp_path / "open.msh"

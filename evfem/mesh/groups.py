@@ -20,6 +20,8 @@ from evfem.mesh.mesh import CELLS
 if TYPE_CHECKING:
     import meshio
 
+#: letters of a name that a message has
+LETTERS = 60
 #: meshio's name of the numbers of physical groups
 PHYSICAL = "gmsh:physical"
 #: Prefix of the field data that carry the names of regions in a `.vtu` file.
@@ -142,15 +144,16 @@ def regions_in(
                 cells, number = start[one.block] + one.cells, found.setdefault(name, one.number)
                 if both := next((other for other in owner[cells] if other not in ("", name)), None):
                     problem, chosen = (
-                        f"{both} and {name} with the same cells",
-                        f"{both} = {describe_value(regions[both])}",
+                        f"{both[:LETTERS]} and {name[:LETTERS]} with the same cells",
+                        f"{both[:LETTERS]} = {describe_value(regions[both])}",
                     )
                     allowed = f"one name per cell: those that count in [finger.regions], as {chosen}"
                     raise InputError("finger.regions", problem, allowed)
                 region[cells], owner[cells] = number, name
         if name not in found:
             listed = dict.fromkeys(str(one.name or one.number) for one in solid)
-            problem, allowed = f"{name} = {key}", f"groups that occur in {path.name}: {', '.join(listed)}"
+            problem = f"{name[:LETTERS]} = {str(key)[:LETTERS]}"
+            allowed = f"groups that occur in {path.name}: {', '.join(listed)}"[: 10 * LETTERS]
             raise InputError("finger.regions", problem, allowed)
     nameless = {one.number for one in solid if (owner[start[one.block] + one.cells] == "").any()}
     if nameless:
