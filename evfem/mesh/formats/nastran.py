@@ -30,4 +30,16 @@ def read(path: Path) -> meshio.Mesh:
         card = "GRID in axes of its own" if found[1] else found[2].upper()
         raise ValueError(f"{card}, which is not read: give nodes in the basic axes, in one file")
     begin = BULK.search(text)
-    return _nastran.read_buffer(io.StringIO("BEGIN BULK\n" + text[begin.end() if begin else 0 :]))
+    cards = text[begin.end() if begin else 0 :]
+    if not has_cards(cards):
+        raise ValueError("no cards")
+    return _nastran.read_buffer(io.StringIO("BEGIN BULK\n" + cards))
+
+
+def has_cards(text: str) -> bool:
+    """Whether there is a line that is a card.
+
+    >>> has_cards("$ a note\\nGRID,1,,0.,0.,0."), has_cards("$ a note")
+    (True, False)
+    """
+    return any(len(line) > 3 and not line.startswith(("$", "//", "#")) for line in io.StringIO(text))
