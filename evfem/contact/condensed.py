@@ -334,7 +334,7 @@ class LinearContactStep:
         if not self.below.tilts:
             return LEVEL
         known = self.candidates[nodes]
-        turned = known.surface.tilted(known.force)
+        turned = known.surface.turned_by_slope(known.force)
         return self.below.tilt(nodes, self.body.rows(nodes), turned, self._present)
 
     def _problem(

@@ -323,9 +323,9 @@ class SurfaceState:
         """
         if not self.curvature.any():
             return np.zeros((*force.shape, self.slope.shape[1]))
-        return np.asarray(self.tilted(force) @ self.curvature)
+        return np.asarray(self.turned_by_slope(force) @ self.curvature)
 
-    def tilted(self, force: Floats) -> Floats:
+    def turned_by_slope(self, force: Floats) -> Floats:
         """The same per change of the slopes along x[, z], (P, 1 + d, d)."""
         (p, q, first, r), d = self._sizes, self.slope.shape[1]
         # rates at which n turns towards t1 and t2, and t1 towards t2, by p and by q
