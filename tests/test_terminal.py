@@ -137,8 +137,8 @@ def test_a_plan_fits_wherever_it_is_printed():
     shown = str(ev.plan(ev.default_scene())).splitlines()
     assert max(map(len, shown)) < 80
     # what goes over stands below the reason, not below the name
-    below = shown[shown.index(next(line for line in shown if "electricity" in line)) + 1]
-    assert below.startswith(" " * 18 + "together")
+    below = shown[shown.index(next(line for line in shown if "electrostatics" in line)) + 1]
+    assert below.startswith(" " * 19 + "together")
     # hypodermis and nail of Table 2: E / (2 (1 + nu))
     assert f"shear moduli {0.034 / 2.96:.3g} to {17 / 2.6:.3g} MPa" in " ".join(shown)
     assert "every accepted step: residual below 1e-08 of the largest reaction" in shown[-1]

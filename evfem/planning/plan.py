@@ -93,7 +93,7 @@ class Plan:
         size = f"{self.steps} steps, {self.nodes} nodes, {self.cells} cells ({self.element})"
         lines = [f"Scene {self.name}: {size}", "", "Terms"]
         for term in self.terms:
-            lines += _wrapped(f"  {'+' if term.needed else '-'} {term.name:<13} ", term.reason)
+            lines += _wrapped(f"  {'+' if term.needed else '-'} {term.name:<14} ", term.reason)
         size = f"{self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch"
         lines += ["", "Unknowns", f"  {size}", "", "Solver"]
         for line in self.solver:
@@ -140,7 +140,7 @@ def plan(scene: Scene | str | PathLike[str]) -> Plan:
     >>> smooth = FingerPad(ridges=False, resolution="coarse")
     >>> needed = plan(Scene(smooth, Flat(friction=0.0), motion=[Press(indentation=0.5)]))
     >>> [term.name for term in needed.terms if not term.needed]
-    ['friction', 'electricity', 'time', 'user forms']
+    ['friction', 'electrostatics', 'time', 'user forms']
     """
     scene = scene_at(scene)
     mesh, element = scene_mesh(scene)
@@ -204,11 +204,11 @@ def _terms(closing: Closing, moduli: Mapping[str, float], element: str) -> Itera
     yield _tissue(scene, mesh, moduli)
     yield _contact(scene)
     yield _friction(scene)
-    yield _electricity(closing)
+    yield _electrostatics(closing)
     there = {one.name for one in rooms_of(scene)}
     if "adhesion" in there:
         yield Term("adhesion", True, closing.adhesion_in_words)
-    if {"full field", "electricity"} <= there:
+    if {"full field", "electrostatics"} <= there:
         from evfem.planning.fieldchoice import chosen_field
 
         choice = chosen_field(scene, mesh)
@@ -305,10 +305,10 @@ def _follows(scene: Scene) -> str:
     return f", which follows {what} over {law.length:g} mm of slip{at_rest}; {fine}"
 
 
-def _electricity(closing: Closing) -> Term:
+def _electrostatics(closing: Closing) -> Term:
     scene = closing.scene
     if not scene.electrics.acts:
-        return Term("electricity", False, "no law or no voltage")
+        return Term("electrostatics", False, "no law or no voltage")
     air = "air gap included" if scene.air_layer else "touching nodes only"
     signal = scene.electrics.voltage
     over_time = (
@@ -318,7 +318,9 @@ def _electricity(closing: Closing) -> Term:
     traction, core = touching_traction(scene), closing.found
     pull = "" if traction is None else f"; at most {traction:.2g} MPa on touching skin{_other_law(scene)}"
     cored = "" if core is None else f"; {core}"
-    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{_breakdown(scene)}{cored}")
+    return Term(
+        "electrostatics", True, f"{how}{over_time}{_roughness(scene)}{pull}{_breakdown(scene)}{cored}"
+    )
 
 
 def _breakdown(scene: Scene) -> str:
@@ -434,7 +436,7 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> Iterator[str]:
     laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
     if stiff := [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]:
         yield f"pressure is an additional unknown: {', '.join(stiff)} nearly incompressible"
-    acting = [t.name for t in terms if t.needed and t.name in ("friction", "electricity", "adhesion")]
+    acting = [t.name for t in terms if t.needed and t.name in ("friction", "electrostatics", "adhesion")]
     if acting:
         yield (
             f"{' and '.join(acting)} {'act' if acting[1:] else 'acts'} on nodes that may touch only, "

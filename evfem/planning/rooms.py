@@ -40,7 +40,7 @@ KINDS = (
     ),
     Kind("surface.elastic", "elastic surface", "terms.foundation", lambda scene: bool(scene.ground.elastic)),
     Kind("solver.contact", "penalties", "terms.foundation", lambda scene: scene.solver.contact != "exact"),
-    Kind("electrostatics", "electricity", "terms.attraction", lambda scene: scene.electrics.acts),
+    Kind("electrostatics", "electrostatics", "terms.attraction", lambda scene: scene.electrics.acts),
     Kind("electrostatics.field", "full field", "terms.fullfield", lambda scene: scene.field != "local"),
     Kind(
         "electrostatics.drive", "charges", "terms.charging", lambda scene: scene.electrics.resolved, Supply()
@@ -68,6 +68,6 @@ def rooms_of(scene: Scene) -> tuple[Kind, ...]:
     >>> from evfem import Display, FingerPad, Kaczmarek, Press
     >>> scene = Scene(FingerPad(), Display(friction=0.3), Kaczmarek(), 100.0, Press(force=0.1))
     >>> [one.name for one in rooms_of(scene)]
-    ['friction', 'electricity', 'breakdown', 'apparent friction']
+    ['friction', 'electrostatics', 'breakdown', 'apparent friction']
     """
     return tuple(kind for kind in KINDS if kind.there(scene))

@@ -134,7 +134,7 @@ def make_model(scene: Scene) -> Model:
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     closing = needed.closing
     there = {one.name for one in rooms_of(scene)}
-    makers = (("electricity", make_attraction), ("adhesion", make_adhesion))
+    makers = (("electrostatics", make_attraction), ("adhesion", make_adhesion))
     parts: list[Any] = [make(closing, pad, surface) for name, make in makers if name in there]
     own = [deepcopy(room) for room in scene.rooms]  # what it keeps of a step is that of one model
     parts += [room for room in own if isinstance(room, PadTraction)]

@@ -194,7 +194,7 @@ def test_a_scene_file_says_it_and_the_plan_too(distribution):
     scene = loads(TABLE.replace("MORE", ROUGH.replace("DISTRIBUTION", distribution)))
     assert scene.roughness_gap == ev.ConstantRoughness(0.002, distribution)
     assert loads(dump(scene)) == scene
-    told = next(term.reason for term in ev.plan(scene).terms if term.name == "electricity")
+    told = next(term.reason for term in ev.plan(scene).terms if term.name == "electrostatics")
     reduced = scene.electrics.attraction[1].reduced
     even = f"{gap_of(0.002, reduced, distribution):.3g} mm does"
     assert f"an air gap of 0.002 mm in contact on average, {distribution}: it attracts as an even one" in told

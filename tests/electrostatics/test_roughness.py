@@ -128,4 +128,6 @@ def test_a_scene_file_says_it_and_a_dumped_one_too(text, law):
     scene = loads(TABLE.replace("ROUGH", text))
     assert scene.roughness_gap == law
     assert loads(dump(scene)) == scene
-    assert "rough faces" in next(term.reason for term in ev.plan(scene).terms if term.name == "electricity")
+    assert "rough faces" in next(
+        term.reason for term in ev.plan(scene).terms if term.name == "electrostatics"
+    )

@@ -254,7 +254,7 @@ def test_a_plan_tells_what_the_other_law_says(insulator, ratio):
         scene = ev.Scene(
             ev.FingerPad(resolution="coarse"), ev.Display(insulator), law, 100.0, [ev.Press(force=0.05)]
         )
-        (reason,) = [term.reason for term in plan(scene).terms if term.name == "electricity"]
+        (reason,) = [term.reason for term in plan(scene).terms if term.name == "electrostatics"]
         own, name, other = re.search(
             r"at most (\S+) MPa on touching skin \((\w+): (\S+) MPa, see", reason
         ).groups()
@@ -275,7 +275,7 @@ def test_an_attraction_beyond_the_load_is_told_by_plan_run_and_sweep(tmp_path, c
     traction = 8.8541878188e-12 * 140.0**2 / (2.0 * (0.38 / 1650.0 + 0.001 / 3.9) ** 2)
     (said,) = plan(asked).warnings
     assert f"attracted with {traction:.3g} MPa" in said
-    assert f"at most {traction:.2g} MPa on touching skin" in str(plan(asked)).replace("\n" + " " * 18, " ")
+    assert f"at most {traction:.2g} MPa on touching skin" in str(plan(asked)).replace("\n" + " " * 19, " ")
     (tmp_path / "pad.toml").write_text(scenefile.dump(asked))
     assert main(["run", str(tmp_path / "pad.toml"), "--out", str(tmp_path / "out"), "--no-fields"]) == 0
     result = ev.load(tmp_path / "out")
