@@ -447,6 +447,18 @@ def test_a_fit_whose_parts_do_not_fit_is_refused(change, tmp_path):
     refuses(r"fit: given .*fit\.json, damaged", ev.load, path)
 
 
+def test_haptics_whose_places_overflow_are_refused(tmp_path):
+    hostile.damaged("scene", tmp_path, Random(0))
+    path = tmp_path / "signal.hjif"
+    assert ev.load(path).voltage.max() == pytest.approx(100.0, rel=1e-6)
+    whole = json.loads(path.read_text())
+    frames = whole["perceptions"][0]["channels"][0]["bands"][0]["effects"][0]["keyframes"]
+    frames[-1]["relative_position"] = 1e308
+    whole["perceptions"][0]["unit_exponent"] = 3
+    path.write_text(json.dumps(whole))
+    refuses("a curve of two or more keyframes", ev.load, path)
+
+
 def test_a_texture_has_one_period(tmp_path):
     hostile.damaged("scene", tmp_path, Random(0))
     path = tmp_path / "wave.json"

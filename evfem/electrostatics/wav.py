@@ -300,7 +300,7 @@ def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:
     ends. Raises InputError for a file without one, or one that is not a curve over a length.
     """
     allowed = "a .hjif with a friction perception: a curve of two or more keyframes over a length"
-    with _parsed(path, "path", allowed) as whole:
+    with _parsed(path, "path", allowed) as whole, np.errstate(all="ignore"):
         (told, *more) = (one for one in whole["perceptions"] if one["perception_modality"] == "Friction")
         channel, band, effect = _curve(told, path, allowed)
         frames = [frame for frame in effect["keyframes"] if "amplitude_modulation" in frame]
@@ -317,7 +317,7 @@ def read_friction(path: Path) -> tuple[Floats, Floats, dict[str, Any]]:
         ticks = ticks + float(effect["position"])
         position = start + ticks * 10.0 ** (int(told.get("unit_exponent", MILLIMETRE)) + 3)
         friction = float(channel["gain"]) * 10.0 ** int(told.get("perception_unit_exponent", 0)) * fraction
-        if not (np.diff(position) > 0.0).all() or not np.isfinite(friction).all():
+        if not (np.diff(position) > 0.0).all() or not np.isfinite([position, friction]).all():
             raise ValueError("keyframes")
     return position, friction, {**told, "others": len(more)}
 

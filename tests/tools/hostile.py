@@ -4,6 +4,7 @@ in a folder and returns the words of the command that reads it.
 
 import json
 import re
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -296,7 +297,7 @@ def _json(path, rng):
     for _ in range(rng.choice((1, 1, 2))):
         holder, key = rng.choice(_places(table) or [({"": 0}, "")])
         value = holder[key]
-        new = [rng.choice(LEAVES)] * 2
+        new = [deepcopy(rng.choice(LEAVES))] * 2  # a list of them may be changed later
         new += [value * rng.choice((-1, 0, 1e3, 1e-9, 1e300))] if type(value) in (int, float) else []
         new += [value * rng.choice((0, 2, 100))] if isinstance(value, list) else []
         holder[key] = rng.choice(new)
