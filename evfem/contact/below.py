@@ -92,17 +92,15 @@ class RigidBelow:
         """Unloaded motion (dim C, 1 + p), without contact forces, relative to the surface."""
         return free
 
-    def tilt(self, nodes: Ints, rows: Ints, turned: Floats, present: Floats) -> Level:
-        """What tilts below active `nodes` (k,), whose forces are `turned` by a slope (k, 1 + d, d), under the
-        `present` forces (dim C,) of all candidates.
-        """
+    def tilt(self, nodes: Ints, rows: Ints, turned: Floats) -> Level:
+        """What tilts below active `nodes` (k,), whose forces are `turned` by a slope (k, 1 + d, d)."""
         return LEVEL
 
-    def moved(self, motion: Floats, present: Floats) -> Floats:
-        """Relative motion (dim C,) as loads, `present` (dim C,), move with their nodes."""
+    def moved(self, motion: Floats) -> Floats:
+        """Relative motion (dim C,) as loads move with their nodes."""
         return motion
 
-    def displacement(self, motion: Floats, whole: Floats, present: Floats) -> tuple[Floats, Any]:
+    def displacement(self, motion: Floats, whole: Floats) -> tuple[Floats, Any]:
         """Motion of the body and increment of the surface displacement (dim C,) of a relative motion without
         loads that move, under contact forces `whole` (dim C,).
         """

@@ -192,7 +192,7 @@ class LinearContactStep:
         horizontal = moved.reshape(-1, self.body.dim)[:, ::2]
         grown = np.einsum("caj,cj->ca", self.candidates.friction_growth(self._own), horizontal)
         force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
-        body, foundation = self.below.displacement(moved, whole, self._present)
+        body, foundation = self.below.displacement(moved, whole)
         return StepSolution(body, force, status, extra, solves, reduced, foundation)
 
     def _settled(self, active: Any, unloaded_motion: Floats, body_motion: Floats) -> ContactOfCandidates:
@@ -207,7 +207,7 @@ class LinearContactStep:
             whole[self.body.rows(nodes)] = pushed
             moved = unloaded_motion[:, 0] + unloaded_motion[:, 1:] @ found.extra
             moved += product(self.relative_compliance, whole)
-            gap = known.surface.normal_gap + self._along_normal(self.below.moved(moved, self._present))
+            gap = known.surface.normal_gap + self._along_normal(self.below.moved(moved))
             gap[nodes] = 0.0  # solved in the dense problem
             penetrated = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(known.surface.gap)))
             if not penetrated.size:
@@ -335,7 +335,7 @@ class LinearContactStep:
             return LEVEL
         known = self.candidates[nodes]
         turned = known.surface.turned_by_slope(known.force)
-        return self.below.tilt(nodes, self.body.rows(nodes), turned, self._present)
+        return self.below.tilt(nodes, self.body.rows(nodes), turned)
 
     def _problem(
         self, known: Candidates, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None

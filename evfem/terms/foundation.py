@@ -95,40 +95,43 @@ class BelowCandidates(RigidBelow):
     def unloaded(self, free: Floats) -> Floats:
         return free + np.pad(self.pulled[:, None], ((0, 0), (0, free.shape[1] - 1)))
 
-    def displacement(self, motion: Floats, whole: Floats, present: Floats) -> tuple[Floats, Any]:
+    def displacement(self, motion: Floats, whole: Floats) -> tuple[Floats, Any]:
         body = motion - self.pulled - self.compliance @ whole
-        return body, self.moved(motion, present) - body
+        return body, self.moved(motion) - body
 
 
 @dataclass(frozen=True, eq=False)
 class TiltingBelow(BelowCandidates):
     """The same in the plane, with the derivatives S of the compliance by x, `slope` (2 c, 2 c), the present
-    `attraction` (2 c,), and what the slopes lack of those under it, `lacking` (c,).
+    `force` of contact and attraction and the `attraction` alone (2 c,), and what the slopes lack of those
+    under it, `lacking` (c,).
     """
 
     slope: Floats
+    force: Floats
     attraction: Floats
     lacking: Floats
     tilts = True
 
-    def tilt(self, nodes: Ints, rows: Ints, turned: Floats, present: Floats) -> Level:
+    def tilt(self, nodes: Ints, rows: Ints, turned: Floats) -> Level:
         S, one = block(self.slope, rows, rows), np.eye(rows.size)
         by_slope = turned[:, :, 0].copy()  # along y and x
         by_slope[:, 1] -= self.attraction[2 * nodes + 1]
         K = -(by_slope[:, :, None] * S[::2][:, None, :]).reshape(S.shape)
-        lacking = (self.slope[1::2] @ present + self.lacking)[nodes, None]
-        L = block(self._by_loads(present), rows, rows)
-        return Tilt(np.linalg.inv(one - K), np.linalg.inv(one - L), -(by_slope * lacking).ravel())
+        misfit = -(by_slope * self.lacking[nodes, None]).ravel()
+        L = block(self._by_loads, rows, rows)
+        return Tilt(np.linalg.inv(one - K), np.linalg.inv(one - L), misfit)
 
-    def moved(self, motion: Floats, present: Floats) -> Floats:
-        L = self._by_loads(present)
+    def moved(self, motion: Floats) -> Floats:
+        L = self._by_loads
         loaded = np.flatnonzero(L.any(axis=0))
         own = np.linalg.solve(np.eye(loaded.size) - block(L, loaded, loaded), motion[loaded])
         return np.asarray(motion + L[:, loaded] @ own)
 
-    def _by_loads(self, present: Floats) -> Floats:
+    @cached_property
+    def _by_loads(self) -> Floats:
         """L (2 c, 2 c) of the head of `evfem.contact.below`."""
-        found, F = np.zeros_like(self.slope), present + self.attraction
+        found, F = np.zeros_like(self.slope), self.force
         found[:, ::2] = -(self.slope[:, ::2] * F[::2] + self.slope[:, 1::2] * F[1::2])
         return found
 
@@ -361,9 +364,9 @@ class ElasticFoundation(Rigid):
         compliance = below.among(c)
         if len(below.slope) > 1:
             return BelowCandidates(compliance, pulled)
-        lacking = (below.change(state.attraction) - state.memory[GRADIENT])[c, 0, 1]
-        slope, attraction = below.picked(below.slope[0], c), state.attraction[c].ravel()
-        return TiltingBelow(compliance, pulled, slope, attraction, lacking)
+        force, slope = self.pushing(state), below.picked(below.slope[0], c)
+        lacking = (below.change(force) - state.memory[GRADIENT])[c, 0, 1]
+        return TiltingBelow(compliance, pulled, slope, force[c].ravel(), state.attraction[c].ravel(), lacking)
 
     def sunk(
         self, position: Floats, state: Any, force: Callable[[], Floats], update: tuple[Ints, Any, float]
