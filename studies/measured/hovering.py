@@ -133,7 +133,7 @@ WORDS = Experiment(
     "held at 30 degrees.",
     assumed="Stratum corneum of 0.38 mm / 1650 in all fingers, an ellipsoid where nothing else is said, gaps "
     "good to 0.03 mm, the angle to 3 degrees; rigid, without ridges, columns without fringe fields, which "
-    "would add 6 to 10 %.",
+    "would add 2 to 4 % (the study `fringe`).",
     fitted="nothing to a force; the outline 3 of some rows was chosen with Adams' areas in sight.",
     reason="The angle decides: laid flat, Kaczmarek's law fits and Strong and Troxel's is too large; at the "
     "30 degrees at which the fingers were held, the one is too small by as much as the other is too large.",

@@ -143,11 +143,13 @@ STRONG = Experiment(
     read="the abstract, and the numbers that the paper quotes",
     conditions="Films of 0.5 and 1.0 mil, permittivity 4.5, 200 Hz, one subject.",
     assumed="A load of 0.5 N (0.2 to 1 N in the error), Adams' gross area at it, and that what is felt is a "
-    "change of friction by the Weber fraction of 0.11 that Gueorguiev et al. measured.",
-    fitted="the gap in series, 2.75 um, to the ratio of the two thresholds: their level is predicted, their "
-    "ratio is not. The rows without a gap have nothing fitted.",
-    reason="2.6 um of air between rough faces beside 0.1 um of skin explain both voltages; 5.5 mm of skin, "
-    "as the paper has it, are not needed. Skin alone attracts so strongly that half the voltage would do.",
+    "change of friction by the Weber fraction of 0.11 that Gueorguiev et al. measured; that the voltages are "
+    "effective ones (were they peaks, 0.71 of each would be).",
+    fitted="what is in series with the films, as much as 2.75 um of air, to the ratio of the two thresholds: "
+    "their level is predicted, their ratio is not. The rows without a gap have nothing fitted.",
+    reason="2.6 um of air between rough faces, and skin that counts as 0.1 um of it, explain both voltages; "
+    "5.5 mm of skin, as the paper has it, are not needed. Skin alone attracts so strongly that half the "
+    "voltage would do.",
     sceptic="Three publications of three laboratories and an assumed load: agreement by chance is easy.",
     answer="The load hardly enters (a factor of five in it changes the voltage by half), the Weber fraction "
     "enters by its root. What would count against it is a gap measured far from 2 to 3 um.",

@@ -8,8 +8,8 @@
    name, until one fails or `PATIENCE` is over.
 3. A line in `FILE` for each: what was changed, and the first test that fails or `survives`. Edits that are
    there already are not made again.
-4. With `--again` the survivors of `FILE` are made once more and the tests of the other rooms are run, in the
-   order of `USERS`.
+4. With `--again` the survivors of `FILE` are made once more: the examples of all docstrings are run, and the
+   tests of the other rooms in the order of `USERS`.
 
 What survives is no mistake (the same result on another way), or a test is missing; the ones worth it go into
 `mistakes.toml`.
@@ -32,7 +32,14 @@ from mistakes import CHECKOUT, Copy, replaced
 
 from evfem.common.storage import write_text
 
-ROOMS = ("tissue", "electrostatics", "contact", "newton", "solver", "simulation")
+ROOMS = ("tissue", "surface", "field", "electrostatics", "circuit", "terms", "contact", "newton", "solver")
+ROOMS += ("simulation",)
+#: where the tests of rooms without a folder of their own are
+HOMES = {
+    "terms": ("contact", "newton"),
+    "surface": ("contact", "scene"),
+    "field": ("electrostatics", "contact"),
+}
 #: rooms whose tests run whole scenes, the quickest first
 USERS = ("solver", "newton", "simulation", "response", "contact", "estimate", "sweeps", "scene")
 #: pytest's status where all tests of a file have other marks
@@ -130,11 +137,13 @@ def seen(copy: Copy, test: str) -> str | None:
 
 
 def tests_of(edit: Edit, tests: Path, *, others: bool) -> list[Path]:
-    """Test files of the edit's room, first the one of the same name, or those of the other rooms."""
-    own, name = Path(edit.file).parts[0], f"test_{Path(edit.file).name}"
-    rooms = [room for room in USERS if room != own] if others else [own]
+    """Test files of the edit's room, first the one of the same name, or examples and others' files."""
+    room, name = Path(edit.file).parts[0], f"test_{Path(edit.file).name}"
+    own = HOMES.get(room, (room,))
+    rooms = [room for room in USERS if room not in own] if others else own
     found = [path for room in rooms for path in sorted((tests / room).rglob("test_*.py"))]
-    return sorted(found, key=lambda path: path.name != name)
+    examples = [tests / "test_docstrings.py"] if others else []
+    return examples + sorted(found, key=lambda path: path.name != name)
 
 
 def judge(edit: Edit, copy: Copy, *, others: bool = False) -> str:
