@@ -8,8 +8,8 @@
    name, until one fails or `PATIENCE` is over.
 3. A line in `FILE` for each: what was changed, and the first test that fails or `survives`. Edits that are
    there already are not made again.
-4. With `--again` the survivors of `FILE` are made once more: the examples of all docstrings are run, and the
-   tests of the other rooms in the order of `USERS`.
+4. With `--again` the survivors of `FILE` are made once more: the examples of all docstrings are run, the test
+   of what holds of every scene, and the tests of the other rooms in the order of `USERS`.
 
 What survives is no mistake (the same result on another way), or a test is missing; the ones worth it go into
 `mistakes.toml`.
@@ -142,8 +142,8 @@ def tests_of(edit: Edit, tests: Path, *, others: bool) -> list[Path]:
     own = HOMES.get(room, (room,))
     rooms = [room for room in USERS if room not in own] if others else own
     found = [path for room in rooms for path in sorted((tests / room).rglob("test_*.py"))]
-    examples = [tests / "test_docstrings.py"] if others else []
-    return examples + sorted(found, key=lambda path: path.name != name)
+    first = [tests / "test_docstrings.py", tests / "simulation/test_invariants.py"] if others else []
+    return first + sorted(found, key=lambda path: path.name != name)
 
 
 def judge(edit: Edit, copy: Copy, *, others: bool = False) -> str:
