@@ -41,7 +41,8 @@ HOMES = {
     "field": ("electrostatics", "contact"),
 }
 #: rooms whose tests run whole scenes, the quickest first
-USERS = ("solver", "newton", "simulation", "response", "contact", "estimate", "sweeps", "scene")
+USERS = ("circuit", "solver", "newton", "simulation", "textures", "calibration", "response", "contact")
+USERS += ("estimate", "sweeps", "scene", "finger")
 #: pytest's status where all tests of a file have other marks
 NO_TESTS = 5
 #: what a line has where no test failed
