@@ -8,6 +8,9 @@ import pytest
 #: compiled loops are built with a C compiler
 collect_ignore = [] if find_spec("evfem.tissue.kernels.loops") else ["tissue/kernels"]
 
+# pytest takes numbers that are 1e-12 apart for equal: charges in C and capacitances in F would be all alike
+type(pytest.approx(1.0)).DEFAULT_ABSOLUTE_TOLERANCE = 0.0
+
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():

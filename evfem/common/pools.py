@@ -120,17 +120,15 @@ def _begin(function: Callable[..., None], line: Connection, *arguments: Any) -> 
 
 
 def _serve(line: Connection) -> None:
-    """Answer what comes along the line until it is closed."""
-    while True:
-        try:
+    """Answer what comes along the line until it is closed, perhaps before the answer."""
+    with suppress(EOFError, ConnectionError):
+        while True:
             function, task = line.recv()
-        except EOFError:
-            return
-        try:
-            found = function(task)
-        except Exception as error:
-            found = error
-        line.send(found)
+            try:
+                found = function(task)
+            except Exception as error:
+                found = error
+            line.send(found)
 
 
 @contextmanager
