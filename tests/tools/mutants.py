@@ -9,7 +9,7 @@
 3. A line in `FILE` for each: what was changed, and the first test that fails or `survives`. Edits that are
    there already are not made again.
 4. With `--again` the survivors of `FILE` are made once more: the examples of all docstrings are run, the test
-   of what holds of every scene, and the tests of the other rooms in the order of `USERS`.
+   of what holds of every scene, those of its room (perhaps new) and of the others in the order of `USERS`.
 
 What survives is no mistake (the same result on another way), or a test is missing; the ones worth it go into
 `mistakes.toml`.
@@ -138,10 +138,10 @@ def seen(copy: Copy, test: str) -> str | None:
 
 
 def tests_of(edit: Edit, tests: Path, *, others: bool) -> list[Path]:
-    """Test files of the edit's room, first the one of the same name, or examples and others' files."""
+    """Test files of the edit's room, first the one of the same name, or examples and all rooms' files."""
     room, name = Path(edit.file).parts[0], f"test_{Path(edit.file).name}"
     own = HOMES.get(room, (room,))
-    rooms = [room for room in USERS if room not in own] if others else own
+    rooms = [*own, *(room for room in USERS if room not in own and others)]
     found = [path for room in rooms for path in sorted((tests / room).rglob("test_*.py"))]
     first = [tests / "test_docstrings.py", tests / "simulation/test_invariants.py"] if others else []
     return first + sorted(found, key=lambda path: path.name != name)
