@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tools.builders import resumed
+from tools.builders import resumed, small_finger
 
 import evfem as ev
 
@@ -172,3 +172,15 @@ def test_strong_and_troxels_attraction_on_a_touchscreen_is_found_in_few_iteratio
     )
     assert result.missed_force[-1] == 0.0
     assert result.newton_iterations.max() < 200
+
+
+def test_an_unloaded_finger_is_pulled_until_its_friction_is_the_wished_one():
+    """From the first step on; nothing but the attraction presses it."""
+    display = ev.Display(ev.Layer(0.05, 3.5, strength=1e8), friction=0.5)
+    wish = ev.FollowForce([0.0, 0.6], [0.002, 0.002], 3000.0)
+    motion = [ev.Press(indentation=0.0, steps=1), ev.Slide(0.6, steps=3, hold="force")]
+    scene = ev.Scene(small_finger(), display, ev.StrongTroxel(), wish, motion, breakdown="off")
+    result = ev.simulate(scene)
+    np.testing.assert_allclose(result.applied_force, 0.0, atol=1e-10)
+    np.testing.assert_allclose(result.tangential_force[1:], 0.002, rtol=1e-7)
+    np.testing.assert_allclose(result.electrostatic_force[2:], 0.004, rtol=1e-7)  # all of it slips

@@ -42,7 +42,7 @@ HOMES = {
 }
 #: rooms whose tests run whole scenes, the quickest first
 USERS = ("circuit", "solver", "newton", "simulation", "textures", "calibration", "response", "contact")
-USERS += ("estimate", "sweeps", "scene", "finger")
+USERS += ("electrostatics", "tissue", "estimate", "sweeps", "scene", "finger")
 #: pytest's status where all tests of a file have other marks
 NO_TESTS = 5
 #: what a line has where no test failed
