@@ -41,9 +41,9 @@ FIRST, LOW = 1e-6, 0.05
 EDGE = 1.5
 #: modulus (MPa) in the place of none
 RIGID = 1e30
-#: steepest slope (MPa/mm) of adhesion above rigid cells; slopes within this factor, from the steepest down,
-#: count as one, and what is above an end of a class by rounding is at it
-STEEPEST, CLASS, ABOVE = 1e12, 1.1, 1e-9
+#: steepest slope (MPa/mm) of adhesion above rigid cells; from the steepest of a mesh down, slopes within this
+#: factor count as one; what a logarithm may miss a whole number by
+STEEPEST, CLASS, ROUNDED = 1e12, 1.1, 1e-9
 #: a core is no longer than this share of a hovering gap, for pull-in is to see the law; nor should it be of
 #: a texture's depth
 SEEN = 0.5
@@ -166,7 +166,7 @@ class Closing:
         if self.scene.solver.core == "off":
             return Softened(law, self.closed, np.full(self.stiffness.shape, np.inf))
         steepest = np.minimum(self.resolved * self.stiffness, STEEPEST)
-        classes = np.floor(np.log(steepest / steepest.max()) / np.log(CLASS) + ABOVE)
+        classes = np.floor(np.log(steepest / steepest.max()) / np.log(CLASS) + ROUNDED)
         return Softened(law, self.closed, steepest.max() * CLASS**classes)
 
     @property
