@@ -14,8 +14,9 @@ equilibria may be reached without a barrier.
 
 A bone with prescribed position is at its end position already: nodes that do not touch at both ends begin
 translated with it. Nodes that touch at both ends follow the surface, not the chord; to first order that
-adds :math:`-\lambda_1 g` on the chord. A spring of the hand adds its stiffness. Charges are those of the
-end, and where that of the electrode is prescribed, the voltage varies on the path (`VoltageControl.along`).
+adds :math:`-\lambda_1 g` on the chord. Slips are those along an elastic surface as it is stretched at the
+end. A spring of the hand adds its stiffness. Charges are those of the end, and where that of the electrode
+is prescribed, the voltage varies on the path (`VoltageControl.along`).
 For an attraction without a potential (the vertical one on changing tributary lengths, that of touching
 nodes alone, the full field beside its columns) the work along the straight path is taken; where another path
 has another work, a barrier of that difference may be missed.
@@ -90,8 +91,9 @@ def _friction_work(substep: SubstepWork) -> float:
     length = substep.slip_length
     if not length.any():
         return 0.0
-    limit = substep.model.equilibrium.interface.limit
-    return float(np.sum(limit(substep.old, substep.new, substep.positions[1], length) * length))
+    interface, (begin, end) = substep.model.equilibrium.interface, substep.positions
+    slips = interface.foundation.stretched((substep.new, substep.new), end - begin, length)
+    return float(np.sum(interface.limit(substep.old, substep.new, end, length) * slips))
 
 
 def _contact_work(substep: SubstepWork) -> Floats:

@@ -221,3 +221,15 @@ def test_a_soft_wave_is_pressed_without_friction_in_few_iterations():
     assert result["substeps"].max() == 1
     assert result["newton_iterations"].sum() <= 40
     assert result["normal_force"][-1] == pytest.approx(0.02, rel=1e-7)
+
+
+def test_a_pad_that_slides_steadily_on_a_soft_surface_climbs_no_barrier():
+    """In steady sliding the work of the bone is that of friction along the stretched surface: counted along
+    the undeformed one, 0.8 % apart here, every step is divided into ten, and held by drag.
+    """
+    soft = ev.Display(friction=0.76, elastic=ev.ElasticLayer(E=0.42, nu=0.27, thickness=4.4))
+    motion = [ev.Press(indentation=0.036, steps=2), ev.Slide(distance=-0.5, steps=5)]
+    attracted = {"law": ev.Kaczmarek(), "voltage": 2400.0, "breakdown": "warn"}
+    result = ev.simulate(ev.Scene(ev.FingerPad(resolution="coarse"), soft, motion=motion, **attracted))
+    assert result["substeps"].max() == 1
+    assert result.provenance["solver"]["barriers"] == 0
