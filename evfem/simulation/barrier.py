@@ -13,10 +13,11 @@ shows a barrier: iterations have crossed it, the body never would. The converse 
 equilibria may be reached without a barrier.
 
 A bone with prescribed position is at its end position already: nodes that do not touch at both ends begin
-translated with it. Nodes that touch at both ends follow the surface, not the chord; to first order that
-adds :math:`-\lambda_1 g` on the chord. Slips are those along an elastic surface as it is stretched at the
-end. A spring of the hand adds its stiffness. Charges are those of the end, and where that of the electrode
-is prescribed, the voltage varies on the path (`VoltageControl.along`).
+translated with it, as far as they moved along: beside the contact the tissue below holds them back. Nodes
+that touch at both ends follow the surface, not the chord; to first order that adds
+:math:`-\lambda_1 g` on the chord. Slips are those along an elastic surface as it is stretched at the end. A
+spring of the hand adds its stiffness. Charges are those of the end, and where that of the electrode is
+prescribed, the voltage varies on the path (`VoltageControl.along`).
 For an attraction without a potential (the vertical one on changing tributary lengths, that of touching
 nodes alone, the full field beside its columns) the work along the straight path is taken; where another path
 has another work, a barrier of that difference may be missed.
@@ -40,6 +41,8 @@ SAMPLES = np.linspace(0.0, 1.0, 9)
 FINE_SAMPLES = np.linspace(0.0, 1.0, 33) ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 33))
 #: smallest stored energy (N mm) to which a barrier is related: below is the rounding of stiff cells
 SMALLEST_ENERGY = 1e-6
+#: a squared travel (mm^2) that counts as none
+TINY = 1e-300
 
 
 def rise(substep: SubstepWork, target: Target) -> float:
@@ -63,11 +66,16 @@ def rise(substep: SubstepWork, target: Target) -> float:
 
 
 def _moved_with_bone(substep: SubstepWork, target: Target) -> Floats:
-    """Displacements (P, dim) of pad nodes with a bone of prescribed position; 0 where they keep touching."""
+    """Displacements (P, dim) with a bone of prescribed position of the pad nodes that moved along; 0 where they
+    keep touching.
+    """
     travel = substep.new.bone - substep.old.bone
     travel[target.free] = 0.0
+    moved = (substep.new.u - substep.old.u)[substep.model.pad.nodes]
+    share = np.clip(moved @ travel / max(float(travel @ travel), TINY), 0.0, 1.0)
     sticks = any(one.always for one in substep.model.attraction.parts)  # what adheres is not carried off
-    return np.where((substep.old.touching & (substep.new.touching | sticks))[:, None], 0.0, travel)
+    stays = substep.old.touching & (substep.new.touching | sticks)
+    return np.where(stays[:, None], 0.0, share[:, None] * travel)
 
 
 def _attraction_work(substep: SubstepWork, carried: Floats, control: VoltageControl) -> Floats:
