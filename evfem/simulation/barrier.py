@@ -66,7 +66,7 @@ def rise(substep: SubstepWork, target: Target) -> float:
 
 
 def _moved_with_bone(substep: SubstepWork, target: Target) -> Floats:
-    """Displacements (P, dim) with a bone of prescribed position of the pad nodes that moved along; 0 where they
+    """Displacements (P, dim), with a bone of prescribed position, of pad nodes that move along; 0 where they
     keep touching.
     """
     travel = substep.new.bone - substep.old.bone
