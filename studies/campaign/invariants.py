@@ -167,7 +167,7 @@ def motions(scene: ev.Scene, result: ev.Result) -> Found:
             drifted[row] = abs(load[row] - load[row - 1]) / force[row]
         elif row and getattr(motion, "hold", None) == "indentation":
             drifted[row] = abs(depth[row] - depth[row - 1])
-    allowed = max(TOLERANCE, 10.0 * scene.solver.tolerance)
+    allowed = max(TOLERANCE, 1e2 * scene.solver.tolerance)
     yield _worst("targets", missed, allowed, result.step)
     yield _worst("held", drifted, allowed, result.step)
 
