@@ -1,12 +1,15 @@
 """Do drawn scenes still end as they did? Changes that take no other iterations are compared to 1e-11.
 
-    python tests/tools/same_ends.py record BEFORE.csv --seed 77 --scenes 270
+    python tests/tools/same_ends.py record BEFORE.csv --seed 77 --scenes 270 [--variant steps] [--limit 60]
     python tests/tools/same_ends.py compare BEFORE.csv AFTER.csv [--tolerance 1e-6]
 
 `record` runs scenes of `evfem study campaign`, each in a process of its own with a limit of CPU
 time, and writes how each ends: forces and indentation of the last row, counts and CPU seconds.
 `compare` lists the scenes that end elsewhere, or not, and the sums. A force differs relative to
 the largest force of its scene. `tests/tools/ends.csv` holds the ends that a change is judged by.
+
+A variant should have the same ends: no tangent is `kept`; nothing is `predicted` from the last step; the
+other sparse `solver`; no `compiled` code; an `input` changed by 1e-9; twice the `steps`.
 """
 
 import argparse
@@ -17,9 +20,17 @@ import signal
 import sys
 import time
 import warnings
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+VARIANTS = ("kept", "predicted", "solver", "compiled", "input", "steps")
+#: compiled modules, without which the readable forms run
+COMPILED = ("loops", "solids", "contact", "cholesky")
+#: change of an input, and the amounts of a motion that may be changed
+CHANGE, AMOUNTS = 1e-9, ("indentation", "force", "gap", "distance", "voltage")
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
 COLUMNS = ("seed", "scene", "end", "requested", "rows", "substeps", "iterations", "factorisations", "cuts",
            "cpu_s", "indentation", *FORCES)  # fmt: skip
@@ -27,22 +38,45 @@ LIMIT_S = 300.0
 Row = dict[str, str]
 
 
-def run(key: tuple[int, int]) -> Row:
-    """The row of one scene, whose process dies beyond `LIMIT_S` CPU seconds."""
+def varied(scene, variant: str):
+    """The scene as the variant has it."""
+    from evfem.sweeps.check import more_steps
+
+    strategy = scene.solver.strategy
+    if variant == "kept":
+        strategy = replace(strategy, patience=0.0)
+    elif variant == "predicted":
+        strategy = replace(strategy, reach=0.0)
+    elif variant == "steps":
+        return more_steps(scene)
+    elif variant == "input":
+        for i, name in ((i, name) for i in range(len(scene.motion)) for name in AMOUNTS):
+            if isinstance(value := getattr(scene.motion[i], name, None), float | int) and value:
+                other = replace(scene.motion[i], **{name: value * (1.0 + CHANGE)})
+                return replace(scene, motion=[*scene.motion[:i], other, *scene.motion[i + 1 :]])
+    return replace(scene, solver=replace(scene.solver, strategy=strategy))
+
+
+def run(key: tuple[int, int], variant: str = "", limit: float = LIMIT_S) -> Row:
+    """The row of one scene, whose process dies beyond `limit` CPU seconds."""
+    for name in COMPILED if variant == "compiled" else ():
+        sys.modules[f"evfem.tissue.kernels.{name}"] = None  # type: ignore[assignment]
     from evfem.errors import InputError, NotConverged
+    from evfem.newton.condensation import other_solver
     from evfem.scene.file import loads
     from evfem.simulation.run import simulate
     from evfem.studies.campaign.drawing import draw
     from evfem.studies.campaign.tables import text_of, with_files
 
     warnings.simplefilter("ignore")
-    resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + LIMIT_S), resource.RLIM_INFINITY))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + limit), resource.RLIM_INFINITY))
     begin, row = time.process_time(), {"end": "equilibrium"}
     with TemporaryDirectory() as folder:
         try:
-            scene = loads(text_of(with_files(draw(*key), Path(folder))), Path(folder))
+            scene = varied(loads(text_of(with_files(draw(*key), Path(folder))), Path(folder)), variant)
             row["requested"] = str(scene.total_steps)
-            result = simulate(scene)
+            with other_solver() if variant == "solver" else nullcontext():
+                result = simulate(scene)
         except NotConverged as error:
             explained = "there is no equilibrium" in error.advice
             row["end"], result = "explained" if explained else "not_converged", error.result
@@ -59,14 +93,15 @@ def run(key: tuple[int, int]) -> Row:
     return row
 
 
-def record(path: Path, keys: list[tuple[int, int]], workers: int) -> int:
+def record(path: Path, keys: list[tuple[int, int]], workers: int, variant: str, limit: float) -> int:
     """Run the scenes and write their rows."""
     from evfem.common.pools import processes
 
+    one = partial(run, variant=variant, limit=limit)
     with processes(workers) as pool, path.open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         table.writeheader()
-        for (seed, number), row in pool(run, {key: key for key in keys}):
+        for (seed, number), row in pool(one, {key: key for key in keys}):
             if isinstance(row, Exception):
                 status = getattr(row, "status", None)
                 row = {"end": "timeout" if status == -signal.SIGXCPU else f"died: {status or row}"}
@@ -83,7 +118,8 @@ def read(path: Path) -> dict[tuple[str, str], Row]:
 
 def difference(one: Row, other: Row) -> float:
     """Largest difference of the last row: of forces relative to the largest one, of the indentation."""
-    if not one["rows"] or one["rows"] != other["rows"]:
+    done = [bool(row["rows"]) and row["rows"] == row["requested"] for row in (one, other)]
+    if not all(done):
         return 0.0 if one["rows"] == other["rows"] else float("inf")
     scale = max(*(abs(float(row[name])) for row in (one, other) for name in FORCES), 1e-9)
     worst = max(abs(float(one[name]) - float(other[name])) for name in FORCES) / scale
@@ -118,6 +154,8 @@ def main() -> int:
     recording.add_argument("--scenes", type=int, default=270)
     recording.add_argument("--only", type=int, nargs="*", help="numbers of the scenes")
     recording.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    recording.add_argument("--variant", choices=VARIANTS, default="")
+    recording.add_argument("--limit", type=float, default=LIMIT_S, help="CPU seconds of a scene")
     comparing = commands.add_parser("compare", help="compare two recordings")
     comparing.add_argument("before", type=Path)
     comparing.add_argument("after", type=Path)
@@ -125,7 +163,8 @@ def main() -> int:
     given = parser.parse_args()
     if given.command == "record":
         numbers = given.only if given.only else range(given.scenes)
-        return record(given.out, [(given.seed, number) for number in numbers], given.workers)
+        keys = [(given.seed, number) for number in numbers]
+        return record(given.out, keys, given.workers, given.variant, given.limit)
     return compare(given.before, given.after, given.tolerance)
 
 
