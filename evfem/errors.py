@@ -223,9 +223,9 @@ class Mistakes:
             self.found += error.mistakes
 
     def report(self) -> None:
-        """Raise what was found, if anything was."""
+        """Raise what was found, if anything was, without the lines that found it."""
         if self.found:
-            raise combine(self.found)
+            raise combine(self.found).with_traceback(None) from None
 
 
 class NotConverged(EvfemError, RuntimeError):

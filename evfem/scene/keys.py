@@ -184,7 +184,7 @@ def at(prefix: str, renamed: Mapping[str, str] = MappingProxyType({})) -> Iterat
     try:
         yield
     except InputError as error:
-        raise combine([_moved(one, prefix, renamed) for one in error.mistakes]) from error
+        raise combine([_moved(one, prefix, renamed) for one in error.mistakes]) from None
 
 
 def _moved(mistake: InputError, prefix: str, renamed: Mapping[str, str]) -> InputError:

@@ -1,6 +1,7 @@
 """Scene files: an example loads, what is written is read back, mistakes get one sentence."""
 
 import pickle
+import traceback
 from dataclasses import replace
 
 import numpy as np
@@ -393,3 +394,13 @@ def test_a_key_of_another_motion_is_not_told_that_it_stands_in_motion():
     caught = refuses("allowed", loads, SHORT + "distance = 1.0\n")
     assert caught.key == "motion[0].distance"
     assert "distance with kind = slide? (" in str(caught)
+
+
+@pytest.mark.parametrize("text", ["finger = { width = -3.0 }", "finger = { mesh = 'none.vtu' }", ""])
+def test_a_mistake_has_one_traceback_of_few_lines(text):
+    """What found the mistake inside, and what was raised on the way, says nothing to who made it."""
+    with pytest.raises(ev.InputError) as caught:
+        loads(f"version = 1\nsurface = {{ kind = 'flat' }}\n{text}")
+    told = "".join(traceback.format_exception(caught.value))
+    assert told.count("Traceback") == 1
+    assert told.count("File ") <= 5
