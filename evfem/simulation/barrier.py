@@ -41,8 +41,6 @@ SAMPLES = np.linspace(0.0, 1.0, 9)
 FINE_SAMPLES = np.linspace(0.0, 1.0, 33) ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 33))
 #: smallest stored energy (N mm) to which a barrier is related: below is the rounding of stiff cells
 SMALLEST_ENERGY = 1e-6
-#: a squared travel (mm^2) that counts as none
-TINY = 1e-300
 
 
 def rise(substep: SubstepWork, target: Target) -> float:
@@ -72,10 +70,10 @@ def _moved_with_bone(substep: SubstepWork, target: Target) -> Floats:
     travel = substep.new.bone - substep.old.bone
     travel[target.free] = 0.0
     moved = (substep.new.u - substep.old.u)[substep.model.pad.nodes]
-    share = np.clip(moved @ travel / max(float(travel @ travel), TINY), 0.0, 1.0)
+    along = np.clip(moved @ travel, 0.0, square := float(travel @ travel)) / (square or 1.0)
     sticks = any(one.always for one in substep.model.attraction.parts)  # what adheres is not carried off
     stays = substep.old.touching & (substep.new.touching | sticks)
-    return np.where(stays[:, None], 0.0, share[:, None] * travel)
+    return np.where(stays[:, None], 0.0, along[:, None] * travel)
 
 
 def _attraction_work(substep: SubstepWork, carried: Floats, control: VoltageControl) -> Floats:

@@ -255,14 +255,18 @@ def _others(scene: Scene, own: Result) -> Iterator[Variant]:
             again = replace(first, steps=max(first.steps, APPROACH))
             way, motion = "from first touch", [Press(indentation=0.0, steps=1), again, *rest]
         yield Variant(PATH, way, partial(replace, scene, motion=motion))
+    if (other := perturbed(scene)) is not None:
+        yield Variant(PATH, f"an input changed by {PERTURBATION:g}", lambda: other)
+
+
+def perturbed(scene: Scene) -> Scene | None:
+    """The scene with the first amount of a motion changed by `PERTURBATION`; None without one."""
+    motions: tuple[Any, ...] = scene.motion
     for i, name in product(range(len(motions)), ("indentation", "force", "gap", "distance", "voltage")):
         if isinstance(value := getattr(motions[i], name, None), float | int) and value:
             other = replace(motions[i], **{name: value * (1.0 + PERTURBATION)})
-            motion = [*motions[:i], other, *motions[i + 1 :]]
-            yield Variant(
-                PATH, f"an input changed by {PERTURBATION:g}", partial(replace, scene, motion=motion)
-            )
-            return
+            return replace(scene, motion=[*motions[:i], other, *motions[i + 1 :]])
+    return None
 
 
 def acts_at_once(scene: Scene) -> bool:

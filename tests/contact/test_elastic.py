@@ -225,7 +225,7 @@ def test_a_soft_wave_is_pressed_without_friction_in_few_iterations():
 
 def test_a_pad_that_slides_steadily_on_a_soft_surface_climbs_no_barrier():
     """In steady sliding the work of the bone is that of friction along the stretched surface: counted along
-    the undeformed one, 0.8 % apart here, every step is divided into ten, and held by drag.
+    the undeformed one, 0.8 % apart here, every step is divided into ten.
     """
     soft = ev.Display(friction=0.76, elastic=ev.ElasticLayer(E=0.42, nu=0.27, thickness=4.4))
     motion = [ev.Press(indentation=0.036, steps=2), ev.Slide(distance=-0.5, steps=5)]

@@ -17,7 +17,7 @@ def attracted(surface, motion, voltage=150.0, **parts):
 @pytest.mark.parametrize("friction", [0.0, 1.0])
 def test_a_press_under_a_strong_attraction_climbs_no_barrier(friction):
     """Tissue holds nodes beside the contact back: with all of them carried along by the bone, their way back
-    against the attraction was taken for a barrier in every step, held by drag in 25 iterations.
+    against the attraction was taken for a barrier in every step, held by drag in about 30 iterations.
     """
     display = ev.Display(friction=friction, insulator=THIN)
     result = attracted(display, [ev.Press(indentation=0.03, steps=6)])

@@ -29,8 +29,6 @@ from tempfile import TemporaryDirectory
 VARIANTS = ("kept", "predicted", "solver", "compiled", "input", "steps")
 #: compiled modules, without which the readable forms run
 COMPILED = ("loops", "solids", "contact", "cholesky")
-#: change of an input, and the amounts of a motion that may be changed
-CHANGE, AMOUNTS = 1e-9, ("indentation", "force", "gap", "distance", "voltage")
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
 COLUMNS = ("seed", "scene", "end", "requested", "rows", "substeps", "iterations", "factorisations", "cuts",
            "cpu_s", "indentation", *FORCES)  # fmt: skip
@@ -40,21 +38,15 @@ Row = dict[str, str]
 
 def varied(scene, variant: str):
     """The scene as the variant has it."""
-    from evfem.sweeps.check import more_steps
+    from evfem.sweeps.check import more_steps, perturbed
 
-    strategy = scene.solver.strategy
-    if variant == "kept":
-        strategy = replace(strategy, patience=0.0)
-    elif variant == "predicted":
-        strategy = replace(strategy, reach=0.0)
-    elif variant == "steps":
-        return more_steps(scene)
-    elif variant == "input":
-        for i, name in ((i, name) for i in range(len(scene.motion)) for name in AMOUNTS):
-            if isinstance(value := getattr(scene.motion[i], name, None), float | int) and value:
-                other = replace(scene.motion[i], **{name: value * (1.0 + CHANGE)})
-                return replace(scene, motion=[*scene.motion[:i], other, *scene.motion[i + 1 :]])
-    return replace(scene, solver=replace(scene.solver, strategy=strategy))
+    strategies = {"kept": {"patience": 0.0}, "predicted": {"reach": 0.0}}
+    if variant in strategies:
+        strategy = replace(scene.solver.strategy, **strategies[variant])
+        return replace(scene, solver=replace(scene.solver, strategy=strategy))
+    if variant == "input":
+        return perturbed(scene) or scene
+    return more_steps(scene) if variant == "steps" else scene
 
 
 def run(key: tuple[int, int], variant: str = "", limit: float = LIMIT_S) -> Row:
@@ -119,7 +111,7 @@ def read(path: Path) -> dict[tuple[str, str], Row]:
 def difference(one: Row, other: Row) -> float:
     """Largest difference of the last row: of forces relative to the largest one, of the indentation."""
     done = [bool(row["rows"]) and row["rows"] == row["requested"] for row in (one, other)]
-    if not all(done):
+    if not one["rows"] or (one["rows"] != other["rows"] and not all(done)):
         return 0.0 if one["rows"] == other["rows"] else float("inf")
     scale = max(*(abs(float(row[name])) for row in (one, other) for name in FORCES), 1e-9)
     worst = max(abs(float(one[name]) - float(other[name])) for name in FORCES) / scale
