@@ -65,9 +65,12 @@ def load(path: str | Path) -> Found:
         return _run(path)
     if not path.is_file():
         raise InputError("path", f"{path}, which does not exist", ALLOWED)
-    reader = READERS.get(path.suffix.lower(), _archive)
+    reader = READERS.get(path.suffix.lower(), _other)
     if path.suffix.lower() != ".npz" and _is_of_a_run(path):
         raise InputError("path", f"{path}, one file of a run", f"the run's folder, {path.parent}")
+    if path.suffix.lower() == ".parquet":
+        allowed = f"the sweep's folder, {path.parent}; `pandas.read_parquet` reads the file itself"
+        raise InputError("path", f"{path}, the table of a sweep for other programs", allowed)
     return reader(path)
 
 
@@ -93,10 +96,13 @@ def _run(path: Path) -> Found:
     return result_in(path)
 
 
-def _archive(path: Path) -> Found:
+def _other(path: Path) -> Found:
+    from evfem.mesh.file import FORMATS
     from evfem.simulation.result import RESULT_FORMAT
     from evfem.simulation.result import load as load_result
 
+    if path.suffix.lower() in FORMATS:
+        return _mesh(path)
     form = format_of(path)
     if form == FAST_MODEL:
         allowed = "other files: the fast model is gone since 0.3, `ev.simulate` runs the scene itself"
@@ -157,6 +163,4 @@ READERS: Mapping[str, Callable[[Path], Found]] = {
     ".wav": _signal,
     ".hjif": _signal,
     ".toml": _tables,
-    **dict.fromkeys((".vtu", ".msh", ".inp", ".med", ".xdmf", ".vtk", ".mesh", ".bdf", ".su2"), _mesh),
-    **dict.fromkeys((".e", ".exo", ".ex2", ".g", ".gen"), _mesh),
 }

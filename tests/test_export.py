@@ -378,6 +378,26 @@ def test_a_data_set_has_every_column_and_field_with_its_unit():
     np.testing.assert_array_equal(found.y, result.mesh.points[:, 1])
 
 
+@pytest.fixture(scope="module")
+def probed():
+    probes = {"a 1": [[0.0, -5.2], [0.3, -5.2], [0.5, -5.0]], "contact": [[0.1, -5.1]]}
+    output = ev.Output(frames="last", probes=probes)
+    return ev.simulate(ev.Scene(SMOOTH, ev.Display(), motion=[ev.Press(0.05, steps=2)], output=output))
+
+
+@pytest.mark.xarray
+def test_a_data_set_has_the_histories_of_probes(probed):
+    found = probed.to_xarray()
+    for name, probe in probed.probes.items():
+        assert found[f"probe_{name}_displacement"].dims == ("step", f"probe_{name}_point", "axis")
+        for quantity in ("position", "cauchy_stress", "principal_stretches", "von_mises"):
+            np.testing.assert_array_equal(found[f"probe_{name}_{quantity}"], getattr(probe, quantity))
+    stress = found["probe_a 1_cauchy_stress"].sel(row="y", column="y")
+    np.testing.assert_array_equal(stress, probed.probes["a 1"].component("cauchy_stress_yy"))
+    assert {stress.units, found["probe_a 1_displacement"].units} == {"MPa", "mm"}
+    np.testing.assert_array_equal(found.contact_pressure.sel(frame=2), probed.frames[-1].contact_pressure)
+
+
 def written_and_read(data, path, engine):
     """A data set from the file or folder that this engine of xarray makes of it."""
     import xarray
@@ -391,7 +411,7 @@ def written_and_read(data, path, engine):
 
 @pytest.mark.xarray
 @pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf", "scipy", "zarr"])
-def test_files_of_data_sets_hold_all_of_them(tmp_path, engine):
+def test_files_of_data_sets_hold_all_of_them(tmp_path, engine, probed):
     """Without frames too, and the table of a sweep of words, truth values and a point without a number."""
     from xarray.testing import assert_identical
 
@@ -400,7 +420,7 @@ def test_files_of_data_sets_hold_all_of_them(tmp_path, engine):
     rows = [{"point": i, **dict(zip(names, row, strict=True))} for i, row in enumerate(values)]
     grid = {"electrostatics.law": ["kaczmarek"], "finger.ridges": [True, False]}
     swept = SweepResult(("point", *names), rows, {"grid": grid, "points": {"requested": 2}})
-    for i, one in enumerate((fake_result(), replace(fake_result(), frames=[]), swept)):
+    for i, one in enumerate((fake_result(), replace(fake_result(), frames=[]), probed, swept)):
         data = one.to_xarray()
         found = written_and_read(data, tmp_path / str(i), engine)
         assert_identical(found, data)

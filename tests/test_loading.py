@@ -1,6 +1,8 @@
 """`ev.load` and the paths that `simulate` and `plan` take: one way in for every file."""
 
+import shutil
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ import evfem as ev
 from evfem.common.storage import save_arrays
 from evfem.mesh import file as meshfile
 from evfem.simulation.checkpoint import Checkpoint
+
+WRITTEN = Path(__file__).parent / "mesh/written"
 
 PRESS = f"{SQUARE_SCENE}\n[[motion]]\nkind = 'press'\nindentation = 0.1\nsteps = 2\n"
 SWEEP = "version = 1\nscene = 'square.toml'\n[grid]\nsurface.friction = [0.1, 0.2]\n"
@@ -77,9 +81,21 @@ def test_each_file_is_known_by_what_is_in_it(place):
     assert sorted(ev.load("sets.inp").node_sets) == ["bone", "pad"]
 
 
+@pytest.mark.parametrize("ending", ["bdf", "fem", "nas", "meshb", "su2", "MED"])
+def test_a_mesh_is_known_by_the_ending_of_its_format(tmp_path, ending):
+    """Formats without names ask for them."""
+    as_written = {"fem": "bdf", "nas": "bdf", "meshb": "mesh"}.get(ending, ending.lower())
+    path = shutil.copy(WRITTEN / f"gmsh_quad.{as_written}", tmp_path / f"finger.{ending}")
+    if ending == "MED":
+        np.testing.assert_array_equal(ev.load(path).cells, meshfile.read(path).cells)
+    else:
+        refuses("finger.meshb" if ending == "meshb" else f"no name for .* of finger.{ending}", ev.load, path)
+
+
 def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "notes.txt").write_text("mine")
     (place / "empty.npz").write_text("")
+    (place / "sweep.parquet").write_bytes(b"PAR1")
     (place / "buzz.ahap").write_text("{}")
     Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
     save_arrays("pad.npz", {"format": np.array("evfem-reduced-1")})  # as FastModel.save of 0.2 did
@@ -91,6 +107,7 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
         "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",
         "pad.npz": "a fast model; allowed: other files: the fast model is gone since 0.3, `ev.simulate`",
         "square.toml": "frictoin",
+        "sweep.parquet": "for other programs; allowed: the sweep's folder,",
         "scan.csv": "path: given scan.csv, which starts with 'x,height'; allowed: a voltage (position,",
     }
     (place / "scan.csv").write_text("x,height\n0,1\n1,2\n")

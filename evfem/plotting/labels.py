@@ -13,6 +13,7 @@ import numpy as np
 
 from evfem.common.checks import choice
 from evfem.errors import InputError
+from evfem.scene import probes
 from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL, UNITS
 from evfem.simulation.result import FIELD_UNITS, Result
 from evfem.sweeps.table import unit_of
@@ -40,8 +41,7 @@ TEXTS = {
 #: letters beside a panel of two inches
 LINE = 20
 #: unit of a field of a frame, or a quantity of a probe, if it is not MPa
-OTHER_UNITS = FIELD_UNITS | {"strain_energy_density": "N/mm2", "branch_energy_density": "N/mm2"}
-OTHER_UNITS |= dict.fromkeys(("deformation_gradient", "green_strain", "principal_stretches", "J"), "")
+OTHER_UNITS = {**FIELD_UNITS, **probes.UNITS}
 
 
 def with_unit(text: str, unit: str) -> str:

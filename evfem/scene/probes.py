@@ -138,6 +138,18 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "principal_stretches": tuple("123"),
     **dict.fromkeys(("J", "pressure", "von_mises", "strain_energy_density", "branch_energy_density"), ("",)),
 }
+#: dimensions of a quantity in a data set, beside those of steps and points
+_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("position", "displacement"), ("axis",)),
+    **dict.fromkeys(("deformation_gradient", "cauchy_stress", "green_strain"), ("row", "column")),
+    "principal_stretches": ("principal",),
+}
+#: unit of a quantity that is not in MPa
+UNITS: Mapping[str, str] = {
+    **dict.fromkeys(("position", "displacement"), "mm"),
+    **dict.fromkeys(("deformation_gradient", "green_strain", "principal_stretches", "J"), ""),
+    **dict.fromkeys(("strain_energy_density", "branch_energy_density"), "N/mm2"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +186,17 @@ class ProbeHistory:
         quantity = next(one for one in QUANTITIES if name == one or name.startswith(f"{one}_"))
         at = tuple("xyz123".index(letter) % 3 for letter in name.removeprefix(quantity).strip("_"))
         return np.asarray(getattr(self, quantity)[(..., *at)])
+
+    def variables(self, name: str) -> dict[str, tuple[tuple[str, ...], Floats, dict[str, str]]]:
+        """Dimensions, values and attributes of each quantity in a data set where the probe has this name."""
+        found = {}
+        for quantity in QUANTITIES:
+            values = getattr(self, quantity)
+            steps = () if quantity == "position" else ("step",)
+            dims = (*steps, f"{name}_point", *_DIMENSIONS.get(quantity, ()))
+            words = {"units": UNITS.get(quantity, "MPa"), "long_name": quantity.replace("_", " ")}
+            found[f"{name}_{quantity}"] = (dims, values, words)
+        return found
 
 
 def _components(dim: int) -> dict[str, tuple[str, ...]]:

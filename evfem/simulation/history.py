@@ -35,7 +35,7 @@ WHOLE_OF = {"N/mm": "N", "N": "mJ", "C/mm": "C", "A/mm": "A", "W/mm": "W"}
 def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> dict[str, Any]:
     """Metadata of a field of `History`: its unit, what it is, its unit over a whole depth, and `traits`. A
     saved result without what is `needed` is none (what an older version did not write yet is else NaN, or 0
-    if it counts something); of the last step what is `shown` is printed.
+    if it counts something); of the last step what is `shown` is printed, and where the finger is.
     """
     return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE_OF.get(unit, unit), "traits": traits}
 
@@ -99,12 +99,10 @@ class History:
     motion_index: Ints = field(metadata=column("", "number of the motion, from 0", "needed"))
     motion: Words = field(metadata=column("", "kind of the motion", "needed"))
     time: Floats = field(metadata=column("s", "at the end of the step", "needed"))
-    position: Floats = field(metadata=column("mm", "x of the bone", "needed", "shown"))
-    indentation: Floats = field(
-        metadata=column("mm", "travel of the bone beyond first touch", "needed", "shown")
-    )
+    position: Floats = field(metadata=column("mm", "x of the bone", "needed"))
+    indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch", "needed"))
     voltage: Floats = field(
-        metadata=column("V", "effective; of the moment where it is resolved in time", "needed", "shown")
+        metadata=column("V", "effective; of the moment where it is resolved in time", "needed")
     )
     applied_force: Floats = field(metadata=column("N/mm", "down, on the bone", "needed"))
     applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))

@@ -94,6 +94,8 @@ class Frame(MadeLater):
 _SHAPES: dict[str, tuple[str, ...]] = {
     spec.name: spec.metadata["shape"] for spec in fields(Frame) if spec.metadata
 }
+#: columns that are printed first
+PLACES = ("position", "position_z", "indentation", "voltage")
 #: of a warning in a printed result
 WIDTH = 80
 #: unit of a field that is not in MPa
@@ -228,7 +230,7 @@ class Result(History, FurtherColumns, Told):
         if steps:
             last = self.rows[-1]
             last |= {name: None for name, v in last.items() if isinstance(v, float) and not math.isfinite(v)}
-            peaks = (*self._shown[3:], "peak_contact_pressure")
+            peaks = (*self._shown_forces, "peak_contact_pressure")
             extremes = {name: float(np.max(np.abs(self[name]))) for name in peaks}
         found = {
             "scene": scene.get("name", "scene"),
@@ -263,8 +265,8 @@ class Result(History, FurtherColumns, Told):
 
     def __repr__(self) -> str:
         """Number of steps, end position and end forces of the run."""
-        last = self._last
-        parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
+        last, at = self._last, len(PLACES) - (not self.in_space)
+        parts = last[:at], last[at : at + 2], last[at + 2 : at + 4], last[at + 4 : at + 6], last[at + 6 :]
         lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
         lines[3] = f"over {self.depth:g} mm: {lines[3]}" if self._shows_total else lines[3]
         if (drift := self.load_drift) > DRIFT:
@@ -291,10 +293,12 @@ class Result(History, FurtherColumns, Told):
     def _last(self) -> list[tuple[str, str]]:
         if not len(self.step):
             return []
-        return [*self._ends(self._shown), *(self.total._ends(self._shown[3:]) if self._shows_total else [])]
+        places = [name for name in PLACES if self.in_space or name not in SPATIAL]
+        whole = self.total._ends(self._shown_forces) if self._shows_total else []
+        return [*self._ends([*places, *self._shown_forces]), *whole]
 
     @property
-    def _shown(self) -> tuple[str, ...]:
+    def _shown_forces(self) -> tuple[str, ...]:
         left_out = WIDTHS if self.in_space else SPATIAL
         return tuple(name for name in SHOWN if name not in left_out)
 
@@ -320,6 +324,7 @@ class Result(History, FurtherColumns, Told):
         """The result as an `xarray.Dataset`: every column over `step`, the fields kept over `frame` (the
         number of its step) and `node` or `cell`, with `units` and `long_name`; positions of the undeformed
         nodes (mm) are the coordinates x, y and z. A field with the name of a column ends in `_of_nodes`.
+        The histories of a probe are `probe_NAME_` and their name, over `step` and `probe_NAME_point`.
 
         Raises InputError where xarray is not installed (the extra `xarray`).
         """
@@ -332,6 +337,8 @@ class Result(History, FurtherColumns, Told):
             dims = ("frame", *(DIMENSIONS[size] for size in shape))
             words = {"units": FIELD_UNITS.get(name, "MPa"), "long_name": name.replace("_", " ")}
             variables[f"{name}_of_nodes" if name in variables else name] = (dims, values, words)
+        for name, probe in self.probes.items():
+            variables |= probe.variables(f"probe_{name}")
         axes = "xyz"[: self.mesh.dim]
         places = zip(axes, self.mesh.points.T, strict=True)
         coordinates = {
@@ -341,6 +348,7 @@ class Result(History, FurtherColumns, Told):
             "stress": list(STRESSES[: stresses(self.mesh.dim)]),
             "region": ("cell", self.mesh.region, {"names": json.dumps(dict(self.mesh.region_names))}),
             **{axis: ("node", place, {"units": "mm"}) for axis, place in places},
+            **{axis: list("xyz") for axis in (("row", "column") if self.probes else ())},
         }
         return dataset(variables, coordinates, {"provenance": json.dumps(self.provenance)})
 

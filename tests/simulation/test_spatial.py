@@ -51,6 +51,7 @@ def test_columns_of_the_plane_stay_and_widths_are_empty(slid):
     text = repr(slid)
     assert "contact area" in text
     assert "tangential force z" in text
+    assert f"position z {slid.position_z[-1]:.4g} mm" in text
     assert "N/mm" not in text
 
 
