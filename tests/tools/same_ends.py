@@ -7,9 +7,11 @@
 time, and writes how each ends: forces and indentation of the last row, counts and CPU seconds.
 `compare` lists the scenes that end elsewhere, or not, and the sums. A force differs relative to
 the largest force of its scene. `tests/tools/ends.csv` holds the ends that a change is judged by.
+Scenes that run out of time in either are left out of all but their count.
 
 A variant should have the same ends: no tangent is `kept`; nothing is `predicted` from the last step; the
-other sparse `solver`; no `compiled` code; an `input` changed by 1e-9; twice the `steps`.
+other sparse `solver`; no `compiled` code; an `input` changed by 1e-9; twice the `steps`. `--without`
+switches off one of the solver's safeguards (`tools.safeguards`).
 """
 
 import argparse
@@ -21,12 +23,12 @@ import sys
 import time
 import warnings
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 VARIANTS = ("kept", "predicted", "solver", "compiled", "input", "steps")
+TIMEOUT = "timeout"
 #: compiled modules, without which the readable forms run
 COMPILED = ("loops", "solids", "contact", "cholesky")
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
@@ -38,12 +40,13 @@ Row = dict[str, str]
 
 def varied(scene, variant: str):
     """The scene as the variant has it."""
+    import safeguards  # beside this file; imports the package
+
     from evfem.sweeps.check import more_steps, perturbed
 
-    strategies = {"kept": {"patience": 0.0}, "predicted": {"reach": 0.0}}
-    if variant in strategies:
-        strategy = replace(scene.solver.strategy, **strategies[variant])
-        return replace(scene, solver=replace(scene.solver, strategy=strategy))
+    safeguards.SAFEGUARDS.get(variant, lambda: None)()
+    if variant in safeguards.STRATEGIES:
+        return safeguards.of_scene(scene, **safeguards.STRATEGIES[variant])
     if variant == "input":
         return perturbed(scene) or scene
     return more_steps(scene) if variant == "steps" else scene
@@ -96,7 +99,7 @@ def record(path: Path, keys: list[tuple[int, int]], workers: int, variant: str, 
         for (seed, number), row in pool(one, {key: key for key in keys}):
             if isinstance(row, Exception):
                 status = getattr(row, "status", None)
-                row = {"end": "timeout" if status == -signal.SIGXCPU else f"died: {status or row}"}
+                row = {"end": TIMEOUT if status == -signal.SIGXCPU else f"died: {status or row}"}
             table.writerow({"seed": seed, "scene": number, **row})
             file.flush()
             print(seed, number, *row.values(), flush=True)
@@ -122,7 +125,8 @@ def difference(one: Row, other: Row) -> float:
 def compare(before: Path, after: Path, tolerance: float) -> int:
     """Print the scenes that end elsewhere and the sums; 1 if any ends worse than before."""
     first, second = read(before), read(after)
-    keys = [key for key in first if key in second]
+    both = [key for key in first if key in second]
+    keys = [key for key in both if TIMEOUT not in (first[key]["end"], second[key]["end"])]
     worse = [key for key in keys if first[key]["end"] == "equilibrium" != second[key]["end"]]
     other = [key for key in keys if difference(first[key], second[key]) > tolerance]
     for key in sorted({*worse, *other}, key=keys.index):
@@ -131,6 +135,9 @@ def compare(before: Path, after: Path, tolerance: float) -> int:
         parts = f"{one['substeps']:>5} -> {two['substeps']:>5} parts"
         print(f"{'/'.join(key):>12} {ends}  {one['cpu_s']:>7} -> {two['cpu_s']:>7} s  {parts}")
     print(f"{len(keys)} scenes: {len(keys) - len(other)} the same to {tolerance:g}, {len(worse)} end worse")
+    for name, table in {"before": first, "after": second}.items():
+        late = [key for key in both if key not in keys and table[key]["end"] == TIMEOUT]
+        print(f"out of time {name}: {len(late)}", *("/".join(key) for key in late))
     for name in ("cpu_s", "iterations", "factorisations", "cuts", "substeps"):
         sums = [sum(float(table[key][name] or 0.0) for key in keys) for table in (first, second)]
         print(f"{name:<15} {sums[0]:10.0f} -> {sums[1]:10.0f}")
@@ -146,7 +153,9 @@ def main() -> int:
     recording.add_argument("--scenes", type=int, default=270)
     recording.add_argument("--only", type=int, nargs="*", help="numbers of the scenes")
     recording.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    recording.add_argument("--variant", choices=VARIANTS, default="")
+    recording.add_argument(
+        "--variant", "--without", default="", help=f"{', '.join(VARIANTS)}, or a safeguard"
+    )
     recording.add_argument("--limit", type=float, default=LIMIT_S, help="CPU seconds of a scene")
     comparing = commands.add_parser("compare", help="compare two recordings")
     comparing.add_argument("before", type=Path)
