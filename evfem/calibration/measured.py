@@ -39,7 +39,8 @@ from evfem.simulation.history import (
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
-from evfem.sweeps.table import unit_of, units_of
+from evfem.sweeps.table import units_of
+from evfem.sweeps.units import unit_of
 
 NUMBERS = tuple(name for name in (*COLUMNS, *ROOM_COLUMNS, *SPATIAL) if name != "motion")
 #: most measured numbers of one kind

@@ -33,6 +33,7 @@ from evfem.scene.serialiser import dump
 from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, no_column
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import Distribution, Normal, Samples, Uniform
+from evfem.sweeps.units import in_its_unit
 
 
 def sections() -> list[Section]:
@@ -197,7 +198,7 @@ def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
         raise InputError(f"grid.{name}", problem, "a list of values, or a table of named rows {key = value}")
     if not isinstance(entry, Mapping):
         check_key(f"grid.{name}", name)
-        return [({}, {name: plain_value(f"grid.{name}", value)}) for value in entry]
+        return [({}, {name: _value(f"grid.{name}", name, value)}) for value in entry]
     rows: list[tuple[dict[str, str], Row]] = []
     for label, row in entry.items():
         key = f"grid.{name}.{label}"
@@ -207,8 +208,12 @@ def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
             raise InputError(key, ", ".join(row), f"the keys of the first row: {', '.join(rows[0][1])}")
         for one in row:
             check_key(key, one)
-        rows.append(({name: str(label)}, {one: plain_value(key, value) for one, value in row.items()}))
+        rows.append(({name: str(label)}, {one: _value(key, one, value) for one, value in row.items()}))
     return rows
+
+
+def _value(where: str, key: str, value: Any) -> Any:
+    return in_its_unit(where, key, plain_value(where, value))
 
 
 def check_key(where: str, key: str) -> None:

@@ -21,6 +21,7 @@ from evfem.scene.scene import Scene
 from evfem.simulation.history import ABOUT, SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS, no_column
 from evfem.sweeps.file import FIRST, LAST, STATISTICS
 from evfem.sweeps.folder import PROVENANCE, STATUS, TABLE, cell_of, sweep_csv
+from evfem.sweeps.units import unit_of
 
 Units = Mapping[str, str]
 #: what a plane finger with a depth has of the columns in three dimensions
@@ -28,22 +29,6 @@ AREAS = ("contact_area", "real_contact_area")
 OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name]["unit"] for name in AREAS}}
 #: in a data set, the dimension of samples at each point of a grid, and what it says of a point not computed
 SAMPLE, NOT_COMPUTED = "sample", {"status": "missing", "message": "not computed"}
-
-
-#: last word of a key of a scene file, before a number in a list -> its unit
-KEY_UNITS = dict.fromkeys(("gap", "indentation", "thickness", "height", "width", "distance", "y"), "mm")
-KEY_UNITS |= {"voltage": "V", "amplitude": "V", "bias": "V", "E": "MPa", "mu": "MPa"}
-KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "Hz"}
-
-
-def unit_of(key: str, force: str = "N/mm") -> str:
-    """Unit of a dotted key of a scene file, or of a number in its list, "" for none; `force` that of forces.
-
-    >>> [unit_of(key) for key in ("motion.0.gap", "electrostatics.insulator_thickness.0", "solver.steps")]
-    ['mm', 'mm', '']
-    """
-    word = next((part for part in reversed(key.split(".")) if not part.isdigit()), "")
-    return (KEY_UNITS | {"force": force}).get(word.rsplit("_", 1)[-1], "")
 
 
 def units_of(scene: Scene) -> Units:

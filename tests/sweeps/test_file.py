@@ -11,6 +11,7 @@ from tools.refusals import refuses
 import evfem as ev
 from evfem.errors import InputError
 from evfem.sweeps import file as sweepfile
+from evfem.sweeps.units import unit_of
 
 SCENE = """
 version = 1
@@ -56,6 +57,33 @@ def test_a_grid_has_every_combination_and_rows_change_together():
     scene = tomllib.loads(points[3].text)
     assert (scene["surface"]["friction"], scene["motion"][0]["force"]) == (0.2, 0.5)
     assert scene["motion"][1] == {"kind": "slide", "distance": 2.0}
+
+
+def test_values_with_a_unit_are_numbers_of_the_key_s():
+    """In the table too, not in the scene alone; in rows and lists."""
+    sweep = read("""
+    [grid]
+    "motion.1.distance" = ["500 um", 1.5]
+    [grid.skin.wet]
+    "finger.materials.dermis.E" = "20 kPa"
+    "electrostatics.insulator" = "film"
+    "surface.x" = ["1 um", 2.0]
+    """)
+    given = sweep.points()[0].parameters
+    assert given == {
+        "motion.1.distance": 0.5,
+        "finger.materials.dermis.E": pytest.approx(0.02),
+        "electrostatics.insulator": "film",
+        "surface.x": [0.001, 2.0],
+    }
+    assert [unit_of(f"{table}.phase") for table in ("surface", "electrostatics.signal")] == ["periods", "rad"]
+    wrong = {"electrostatics.voltage": ["3 mm"]}
+    refuses(
+        r'electrostatics.voltage: given "3 mm"; .* with V \| mV \| kV',
+        ev.Sweep,
+        ev.scenefile.loads(SCENE),
+        grid=wrong,
+    )
 
 
 def test_a_scene_object_is_swept_like_its_file():
