@@ -421,7 +421,11 @@ def _mesh(options: argparse.Namespace) -> None:
 def _signal(options: argparse.Namespace) -> None:
     from evfem.circuit.signalfile import Playback, read_signal, write_signal
     from evfem.common.views import plus
+    from evfem.errors import InputError
+    from evfem.textures.texture import is_data
 
+    if is_data(options.out):
+        raise InputError("--out", f"{options.out}, which has the rows of a texture", "another file")
     playback = None
     if options.full_scale is not None:
         names = ("full_scale", "speed", "friction", "rate", "carrier", "pixel", "bits", "second")

@@ -142,10 +142,10 @@ def _rendered(found: Rendering, touch: Touch, device: Device, path: Path | None)
     """Print how good a voltage is, and write it, if it has a path; the exit status."""
     lost = f"{found.share_lost:.0%} of the slide cannot be rendered"
     reached = lost if found.lost.any() else "all of the slide can be rendered"
-    print(
-        f"up to {found.signal.largest:.4g} V, rms {found.signal.rms:.4g} V; {reached}; error of the force "
-        f"{found.force_error:.2%}, of its spectrum {found.spectrum_error:.2%}"
-    )
+    apart = f", rough faces {1e3 * device.roughness_gap:g} um apart" if device.roughness_gap else ""
+    volts = f"up to {found.signal.largest:.4g} V, rms {found.signal.rms:.4g} V"
+    errors = f"error of the force {found.force_error:.2%}, of its spectrum {found.spectrum_error:.2%}"
+    print(f"{device.law} over {device.insulator}{apart}: {volts}; {reached}; {errors}")
     for low, high, error, fraction in found.bands:
         if fraction > 1e-3:
             print(f"  {low:g} to {high:g} Hz: error {error:.2%}; holds {fraction:.1%} of the target's power")

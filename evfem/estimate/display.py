@@ -31,7 +31,7 @@ from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
 from evfem.electrostatics.roughness import WIDEST
 from evfem.estimate import rendering
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of
-from evfem.planning.attracted import broken_down, touching
+from evfem.planning.attracted import broken_air, broken_down, touching
 from evfem.simulation.spectrum import amplitudes
 from evfem.surface.surfaces import Display
 
@@ -73,7 +73,7 @@ class Device(Checked):
         return MOST_VOLTAGE if self.voltage_max is None else self.voltage_max
 
     def doubts(self, voltage: float) -> tuple[str, ...]:
-        """What the plan of a scene says of so high a voltage (V) on touching skin, one sentence each.
+        """What the plan of a scene says of so high a voltage (V), one sentence each.
 
         >>> [said[:43] for said in Device(law="strong_troxel", insulator="touchscreen").doubts(15.9)]
         ['5 um of air between rough faces leave 0.79%']
@@ -82,7 +82,9 @@ class Device(Checked):
         law, layers = self.encoding.law, self.encoding.layers
         near = self.roughness_gap + layers.reduced
         fields = {name: (one, 1.0 / (one.eps_r * near)) for name, one in solids.items()}
-        return (*broken_down(voltage, fields), *touching(law, layers, voltage, self.roughness_gap))
+        air = broken_air(voltage, layers)
+        felt = touching(law, layers, voltage, self.roughness_gap)
+        return (*broken_down(voltage, fields), *([air] if air else []), *felt)
 
     @property
     def amplifier(self) -> Amplifier | None:

@@ -1,5 +1,5 @@
 """Doubts about an attraction by its closed form, of a scene or of a display alone: fields beyond the
-breakdown of insulators, attractions that no load presses with, smooth faces that decide the force.
+breakdown of insulators and air, attractions that no load presses with, smooth faces that decide the force.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.electrostatics.breakdown import inception_voltage
 from evfem.electrostatics.laws import Layer, Layers
 
 #: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
@@ -28,6 +29,16 @@ def broken_down(voltage: float, solids: Mapping[str, tuple[Layer, float]]) -> It
                 f"where skin touches {voltage:g} V make a field of {1e-3 * field:.3g} V/um in the {name}, "
                 f"which breaks down above {held}: voltages are in V, thicknesses in mm"
             )
+
+
+def broken_air(voltage: float, layers: Layers) -> str:
+    """From which voltage on air breaks down over these layers, and in which gap; empty below it.
+
+    >>> broken_air(1000.0, Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35)))
+    'air breaks down from 790 V on (28.5 um)'
+    """
+    least, gap = (float(np.min(one)) for one in inception_voltage(layers))
+    return f"air breaks down from {least:.3g} V on ({1e3 * gap:.3g} um)" if voltage > least else ""
 
 
 def touching(law: Any, layers: Layers, voltage: float, gap: float) -> Iterator[str]:

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics.breakdown import inception_voltage
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
 from evfem.electrostatics.localgaps import SpreadGaps, roughness_below
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import ABSENT, InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
+from evfem.planning.attracted import broken_air
 from evfem.planning.core import Closing, unseen
 from evfem.planning.cost import needs
 from evfem.planning.loaddrift import drifting
@@ -328,10 +328,9 @@ def _breakdown(scene: Scene) -> str:
     electrics = scene.electrics
     if not scene.may_spark or electrics.resolved:
         return ""
-    least, gap = (float(np.min(one)) for one in inception_voltage(electrics.attraction[1]))
-    peak = electrics.crest * electrics.largest_voltage
+    said = broken_air(electrics.crest * electrics.largest_voltage, electrics.attraction[1])
     held = ", where the law holds its field" if scene.breakdown == "limit" else ""
-    return f"; air breaks down from {least:.3g} V on ({1e3 * gap:.3g} um){held}" if peak > least else ""
+    return f"; {said}{held}" if said else ""
 
 
 def _other_law(scene: Scene) -> str:

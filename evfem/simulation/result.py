@@ -285,9 +285,8 @@ class Result(History, FurtherColumns, Told):
     @property
     def _title(self) -> str:
         scene, steps = self.provenance.get("scene", {}), len(self.step)
-        wanted = scene.get("total_steps", steps)
-        text = f"{scene.get('name', 'scene')!r}: {steps} of {wanted} steps, {len(self.frames)} with fields"
-        return f"{text}, {len(self.mesh.points)} nodes"
+        text = f"{scene.get('name', 'scene')!r}: {steps} of {scene.get('total_steps', steps)} steps"
+        return f"{text}, {len(self.frames)} with fields, {len(self.mesh.points)} nodes"
 
     @property
     def _last(self) -> list[tuple[str, str]]:
@@ -308,11 +307,11 @@ class Result(History, FurtherColumns, Told):
 
     def _ends(self, names: Sequence[str]) -> list[tuple[str, str]]:
         """Columns of the last row, in words."""
-        found = []
-        for name in names:
-            words = name.replace("_width", "_area") if self.units[name] == "mm2" else name
-            found.append((words.replace("_", " "), f"{plus(self[name][-1]):.4g} {self.units[name]}"))
-        return found
+        words = {
+            name: name.replace("_width", "_area") if self.units[name] == "mm2" else name for name in names
+        }
+        values = {name: f"{plus(self[name][-1]):.4g} {self.units[name]}" for name in names}
+        return [(words[name].replace("_", " "), values[name]) for name in names]
 
     @property
     def meanings(self) -> dict[str, str]:

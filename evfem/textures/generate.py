@@ -32,7 +32,7 @@ FREE = "CC0-1.0"
 #: periods of `frequency` in the period of a texture, samples of the shortest wave, highest over lowest
 #: frequency of `spectral`
 PERIODS, SAMPLES, BAND = 8, 32, 8
-AMPLITUDE = "of the sine with the same root mean square"
+AMPLITUDE = "of the sine with the same root mean square; of a grating half of its depth"
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from PIL import Image
 
 from evfem import cli
 from evfem.circuit.signalfile import read_signal
+from evfem.circuit.signals import VoltageProfile
 from evfem.textures.library import names
 from evfem.textures.texture import read
 
@@ -145,6 +146,16 @@ def test_a_voltage_beyond_the_limit_is_told_and_ends_with_a_status(capsys):
     assert "Comparison(" not in told.out
     assert run("estimate", "wave-2mm", "--voltage-max", "100", "--signal", "a.wav") == 1
     assert "beyond the limits of the voltage" in capsys.readouterr().err
+
+
+def test_a_signal_does_not_replace_the_rows_of_a_texture(tmp_path, capsys):
+    """Beside `bumps.json` a `bumps.csv` has its heights."""
+    assert run("make", "grating", "--out", "bumps.json") == 0
+    VoltageProfile([0.0, 1.0], [0.0, 100.0]).to_csv("ramp.csv")
+    rows = (tmp_path / "bumps.csv").read_bytes()
+    assert cli.main(["signal", "ramp.csv", "--out", "bumps.csv"]) == 2
+    assert "has the rows of a texture" in capsys.readouterr().err
+    assert (tmp_path / "bumps.csv").read_bytes() == rows
 
 
 def test_roughness_is_an_option_and_smooth_faces_are_doubted(capsys):

@@ -111,10 +111,13 @@ def test_a_display_is_doubted_as_a_plan_doubts_a_scene():
     assert Device(**SCREEN, roughness_gap=0.005).doubts(100.0) == ()
     assert Device(**{**SCREEN, "law": "kaczmarek"}).doubts(15.9) == ()  # its fit has the air already
     field = 1e-3 * 1000.0 / (3.9 * REDUCED)
-    broken, pulled = Device(**SCREEN).doubts(1000.0)
+    broken, air, pulled = Device(**SCREEN).doubts(1000.0)
+    least, _ = ev.electrostatics.inception_voltage(ev.Layers.of(ev.Layer(0.38, 1650.0), ev.TOUCHSCREEN))
+    assert f"air breaks down from {least:.3g} V on" in air
+    assert [len(Device().doubts(volts)) for volts in (790.0, 791.0)] == [0, 1]  # over a film of 90 um
     assert f"a field of {field:.3g} V/um in the insulator" in broken
     rough = Device(**SCREEN, roughness_gap=0.005).doubts(1000.0)
-    assert not [one for one in rough if "breaks down" in one]  # 47 V/um
+    assert not [one for one in rough if "V/um in the" in one]  # 47 V/um
     press = [ev.Press(force=0.05)]
     pad = ev.FingerPad(ridges=False, resolution="coarse")
     scene = ev.Scene(pad, ev.Display(ev.TOUCHSCREEN), ev.StrongTroxel(), 1000.0, press)
