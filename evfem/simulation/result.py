@@ -276,10 +276,8 @@ class Result(History, FurtherColumns, Told):
 
     def _repr_html_(self) -> str:
         """For notebooks: the end, and normal (blue) and tangential force (orange) over the steps."""
-        forces = {
-            "normal force": ("#0072B2", self.normal_force.tolist()),
-            "tangential force": ("#E69F00", self.tangential_force.tolist()),
-        }
+        colours = {"normal_force": "#0072B2", "tangential_force": "#E69F00"}
+        forces = {name.replace("_", " "): (one, self[name].tolist()) for name, one in colours.items()}
         return table(f"Result of {self._title}", self._last, curves(forces) if len(self.step) > 1 else "")
 
     @property
@@ -298,8 +296,7 @@ class Result(History, FurtherColumns, Told):
 
     @property
     def _shown_forces(self) -> tuple[str, ...]:
-        left_out = WIDTHS if self.in_space else SPATIAL
-        return tuple(name for name in SHOWN if name not in left_out)
+        return tuple(name for name in SHOWN if name not in (WIDTHS if self.in_space else SPATIAL))
 
     @property
     def _shows_total(self) -> bool:
@@ -307,11 +304,10 @@ class Result(History, FurtherColumns, Told):
 
     def _ends(self, names: Sequence[str]) -> list[tuple[str, str]]:
         """Columns of the last row, in words."""
-        words = {
-            name: name.replace("_width", "_area") if self.units[name] == "mm2" else name for name in names
-        }
-        values = {name: f"{plus(self[name][-1]):.4g} {self.units[name]}" for name in names}
-        return [(words[name].replace("_", " "), values[name]) for name in names]
+        units = {name: self.units[name] for name in names}
+        words = [name.replace("_width", "_area") if units[name] == "mm2" else name for name in names]
+        values = [f"{plus(self[name][-1]):.4g} {units[name]}" for name in names]
+        return [(one.replace("_", " "), value) for one, value in zip(words, values, strict=True)]
 
     @property
     def meanings(self) -> dict[str, str]:
