@@ -421,19 +421,16 @@ def _mesh(options: argparse.Namespace) -> None:
 def _signal(options: argparse.Namespace) -> None:
     from evfem.circuit.signalfile import Playback, read_signal, write_signal
     from evfem.common.views import plus
-    from evfem.errors import InputError
-    from evfem.textures.texture import is_data
+    from evfem.textures.texture import spared
 
-    if is_data(options.out):
-        raise InputError("--out", f"{options.out}, which has the rows of a texture", "another file")
+    spared("--out", options.out)
     playback = None
     if options.full_scale is not None:
         names = ("full_scale", "speed", "friction", "rate", "carrier", "pixel", "bits", "second")
         playback = Playback(*(getattr(options, name) for name in names))
     profile = read_signal(options.file)
     write_signal(options.out, profile, playback)
-    start, stop = profile.position[0], profile.position[-1]
-    largest = max(abs(profile.voltage))
+    start, stop, largest = profile.position[0], profile.position[-1], max(abs(profile.voltage))
     print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {options.out}", flush=True)
 
 

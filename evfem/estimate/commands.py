@@ -21,7 +21,7 @@ from evfem.scene.keys import at, read
 from evfem.textures.generate import Knobs, make
 from evfem.textures.importers import IMPORTERS, Recording, importer_of
 from evfem.textures.library import REFERENCES, about, find, names, reference
-from evfem.textures.texture import Texture, is_data, write
+from evfem.textures.texture import Texture, spared, write
 
 #: exit status where the limit of the voltage loses part of the slide
 CUT = 1
@@ -129,8 +129,8 @@ def _check_outputs(args: argparse.Namespace) -> None:
             raise InputError(
                 f"--{key}", describe_value(str(path)), f"a file called {', '.join(endings[key])}"
             )
-        if path is not None and is_data(path):
-            raise InputError(f"--{key}", f"{path}, which has the rows of a texture", "another file")
+        if path is not None:
+            spared(f"--{key}", path)
 
 
 def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path | None) -> int:

@@ -127,7 +127,7 @@ def stiffening_skin(exponent: float = 14.0, factor: float = 0.5) -> dict[str, Og
     tissue). That one such term describes skin, with an exponent that does not depend on the rate, was
     measured on pigs (Shergold, Fleck and Radford 2006, doi:10.1016/j.ijimpeng.2004.11.010). The two numbers
     are illustrative, chosen so that a finger's contact area falls in slip, as Delhaye et al. 2014 measured,
-    where that of neo-Hookean skin grows.
+    where that of neo-Hookean skin changes by less than meshes differ.
 
     >>> skin = stiffening_skin()
     >>> skin["dermis"].alpha, round(skin["dermis"].shear_modulus, 5), round(0.5 * 0.080 / 2 / 1.48, 5)

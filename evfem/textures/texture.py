@@ -203,6 +203,12 @@ def is_data(path: Path) -> bool:
     return False
 
 
+def spared(key: str, path: Path) -> None:
+    """InputError for a `.csv` that has the rows of the texture beside it."""
+    if is_data(path):
+        raise InputError(key, f"{path}, which has the rows of a texture", "another file")
+
+
 def _table(path: Path) -> Mapping[str, Any]:
     allowed = "a readable texture: a .json beside its .csv, or a folder with both"
     data = read_bytes(path, "texture", allowed, MOST_BYTES, f"at most {MOST_BYTES} bytes")
