@@ -34,6 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from evfem.common.checks import Checked, Values, Within, above, at_least, finite, number, real, to_python
+from evfem.common.units import in_unit
 from evfem.errors import ABSENT, InputError, describe_value
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
@@ -49,12 +50,14 @@ STRENGTH = "a field in V/mm, larger than 0, up to 1e8"
 
 @dataclass(frozen=True)
 class Layer:
-    """A solid dielectric: `thickness` in mm and relative permittivity `eps_r` >= 1, numbers or
-    arrays; or an `evfem.Dielectric` as `eps_r`, whose permittivity depends on the frequency. `strength` is
+    """A solid dielectric: `thickness` in mm, or a text as "1 um", and relative permittivity `eps_r` >= 1,
+    numbers or arrays; or an `evfem.Dielectric` as `eps_r`, whose permittivity depends on the frequency. `strength` is
     the field in V/mm above which it breaks down, without one that of any solid.
 
     >>> Layer(thickness=0.09, eps_r=3.35)
     Layer(thickness=0.09, eps_r=3.35)
+    >>> Layer("1 um", 3.9).thickness
+    0.001
     """
 
     thickness: Values
@@ -64,7 +67,9 @@ class Layer:
     def __post_init__(self) -> None:
         strength = real("layer strength", self.strength, STRENGTH, STRONG)
         object.__setattr__(self, "strength", strength)
-        thickness = at_least("layer thickness", self.thickness, 0.0, "a finite length in mm, not negative")
+        length = "a finite length in mm, not negative"
+        thickness = in_unit("layer thickness", self.thickness, "mm", length)
+        thickness = at_least("layer thickness", thickness, 0.0, length)
         object.__setattr__(self, "thickness", thickness)
         if not callable(getattr(self.eps_r, "permittivity", None)):
             eps_r = at_least("layer eps_r", self.eps_r, 1.0, "a relative permittivity of at least 1")

@@ -22,7 +22,8 @@ from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.planning.attracted import PRESSED, broken_down, touching
 from evfem.planning.resolution import path_depth
-from evfem.protocols import ForceLaw, RoughnessLaw
+from evfem.protocols import ForceLaw, RoughnessLaw, TimeSignal
+from evfem.scene.motion import Wait
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
 from evfem.tissue.laws import NeoHookean
@@ -68,6 +69,7 @@ def implausible(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[
         *_profile(scene, mesh),
         *_slow(scene),
         *_at_rest(scene),
+        *_relaxed_before(scene),
         *_weakening(scene),
         *_out_of_reach(scene),
         *_breakdown(scene),
@@ -145,8 +147,8 @@ def _profile(scene: Scene, mesh: Mesh) -> Iterator[str]:
         over = (end - reach) * np.sign(end - np.mean(x)) < BESIDE
         if mesh.dim == 2 and over and np.ptp(beside) > ROUGH_END * np.ptp(height):
             yield (
-                f"the profile ends at x = {end:.4g} mm below the finger, whose middle begins at x = 0 and "
-                f"goes to {reach:.4g} mm: beyond its ends it is level"
+                f"the profile ends at x = {end:.4g} mm below the finger, whose middle is over x = "
+                f"{middle.min():.4g} to {middle.max():.4g} mm: beyond its ends it is level, so shift its rows"
             )
 
 
@@ -158,6 +160,19 @@ def _at_rest(scene: Scene) -> Iterator[str]:
     for name, does in {"relaxation": "its branches do", "viscosity": "its viscosity does"}.items():
         if any(getattr(one, name, None) for one in givers):
             yield f'tissue relaxes with dynamics = "viscous" or "inertial" alone: here {does} nothing'
+
+
+def _relaxed_before(scene: Scene) -> Iterator[str]:
+    """A first motion with time that waits, for Maxwell branches that are relaxed already."""
+    timed = next((i for i, motion in enumerate(scene.motion) if motion.takes_time), 0)
+    givers = (scene.finger, *scene.finger.materials.values())
+    relaxes = scene.solver.timed and any(getattr(one, "relaxation", None) for one in givers)
+    still = isinstance(scene.motion[timed], Wait) and not isinstance(scene.voltage, TimeSignal)
+    if timed and relaxes and still:
+        yield (
+            f"motion {timed} waits after motions without a speed, which end relaxed: the branches of the "
+            "tissue relax after a press with a speed"
+        )
 
 
 def _slow(scene: Scene) -> Iterator[str]:

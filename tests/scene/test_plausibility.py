@@ -95,7 +95,7 @@ def test_a_profile_with_heights_in_micrometres_is_doubted():
     ("begin", "end", "way", "ends"),
     [
         (-6.0, 6.0, 3.0, ""),
-        (0.0, 6.0, 3.0, "x = 0 "),
+        (0.0, 6.0, 3.0, "x = 0 mm below the finger, whose middle is over x = 0 to 3 mm"),
         (-6.0, 3.5, 3.0, "x = 3.5"),
         (-2.0, 6.0, -3.0, "x = -2"),
     ],
@@ -189,8 +189,11 @@ def test_branches_that_no_time_loads_are_doubted():
     finger = ev.FingerPad(resolution="coarse", ridges=False, relaxation=[(0.8, 0.04)])
     rest = ev.Scene(finger, ev.Flat(), motion=[PRESS, ev.Wait(1.0, steps=2)])
     assert plan(rest).warning.endswith("alone: here its branches do nothing")
-    assert plan(replace(rest, solver=ev.Solver(dynamics="viscous"))).warnings == ()
     assert plan(replace(rest, motion=PRESS)).warnings == ()  # as for an impedance
+    held = replace(rest, solver=ev.Solver(dynamics="viscous"))
+    (relaxed,) = said_of(held)
+    assert relaxed.startswith("motion 1 waits after motions without a speed, which end relaxed")
+    assert not said_of(replace(held, motion=[ev.Press(indentation=0.1, speed=10.0), *rest.motion[1:]]))
     thick = replace(rest, finger=replace(finger, relaxation=(), viscosity=0.01))
     assert plan(thick).warning.endswith("alone: here its viscosity does nothing")
 
