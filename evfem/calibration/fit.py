@@ -355,7 +355,9 @@ def _at_bounds(parameters: Parameters, z: Floats) -> list[str]:
         near = AT_BOUND * (high - low)
         if min(u - low, high - u) < near:
             bound = one.low if u - low < near else one.high
-            told.append(f"{key} is at its bound {bound:g}: its interval says nothing beyond it")
+            sticks = "; a finger that sticks feels no friction coefficient: see the column slip_share"
+            more = sticks if key.startswith("surface.friction") else ""
+            told.append(f"{key} is at its bound {bound:g}: its interval says nothing beyond it{more}")
     return told
 
 

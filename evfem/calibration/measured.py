@@ -37,7 +37,7 @@ from evfem.simulation.history import (
     over_depth,
 )
 from evfem.simulation.result import COLUMNS, Result
-from evfem.sweeps.file import check_key, check_output, plain_value
+from evfem.sweeps.file import check_key, check_output, is_key, plain_value
 from evfem.sweeps.run import output
 from evfem.sweeps.table import units_of
 from evfem.sweeps.units import unit_of
@@ -263,7 +263,12 @@ class MeasuredValues:
         units: `motion.0.gap [um]`. With a `depth` (mm) its forces, areas and energies are over it, as those
         of `Result.total`, and are divided by it, `sd` too.
         """
-        table, said = _without_units(read_table(Path(path), "data"))
+        cells = read_table(Path(path), "data")
+        *keys, last = [name for cell in cells if (name := named_unit(cell)[0]) != "sd"] or [""]
+        for name in (*(one for one in keys if not is_key(one)), *([] if "." in last else [last])):
+            allowed = "keys of the scene, then an output: motion.0.force [N],tangential_force.last [N]"
+            raise InputError("data", f"{Path(path).name} with the column {describe_value(name)}", allowed)
+        table, said = _without_units(cells)
         if sd is not None and "sd" not in table:
             table["sd"] = np.asarray(sd)
         if depth is not None:

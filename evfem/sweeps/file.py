@@ -216,9 +216,14 @@ def _value(where: str, key: str, value: Any) -> Any:
     return in_its_unit(where, key, plain_value(where, value))
 
 
+def is_key(key: str) -> bool:
+    """Whether it may be a dotted key of a scene file."""
+    return key.split(".")[0] in TABLES and "." in key
+
+
 def check_key(where: str, key: str) -> None:
     """InputError unless `key` may be a dotted key of a scene file."""
-    if key.split(".")[0] not in TABLES or "." not in key:
+    if not is_key(key):
         meant = f"{dotted(key)}? " if dotted(key) else ""
         allowed = f"{meant}TABLE.KEY of a scene file, TABLE one of {', '.join(TABLES)}"
         raise InputError(where, shown(key), allowed)

@@ -360,6 +360,15 @@ def test_keys_and_outputs_of_a_file_have_units(tmp_path):
         MeasuredValues.from_csv,
         tmp_path / "hover.csv",
     )
+    for head, wrong in (
+        ("normal force [N],friction force [N]", "normal force"),
+        ("motion.0.gap,force", "force"),
+    ):
+        (tmp_path / "hover.csv").write_text(f"{head}\n1,2\n")
+        sentence = (
+            f'data: given hover.csv with the column "{wrong}"; allowed: keys of the scene, then an output'
+        )
+        refuses(sentence, MeasuredValues.from_csv, tmp_path / "hover.csv")
     (tmp_path / "hover.csv").write_text("motion.0.gap [um],electrostatic_force.last\n250,2\n,3\n")
     gap = "data.motion.0.gap: given .* in um; allowed: a number in each row"
     refuses(gap, MeasuredValues.from_csv, tmp_path / "hover.csv")
