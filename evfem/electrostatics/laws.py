@@ -51,8 +51,8 @@ STRENGTH = "a field in V/mm, larger than 0, up to 1e8"
 @dataclass(frozen=True)
 class Layer:
     """A solid dielectric: `thickness` in mm, or a text as "1 um", and relative permittivity `eps_r` >= 1,
-    numbers or arrays; or an `evfem.Dielectric` as `eps_r`, whose permittivity depends on the frequency. `strength` is
-    the field in V/mm above which it breaks down, without one that of any solid.
+    numbers or arrays; or an `evfem.Dielectric` as `eps_r`, whose permittivity depends on the frequency.
+    `strength` is the field in V/mm above which it breaks down, without one that of any solid.
 
     >>> Layer(thickness=0.09, eps_r=3.35)
     Layer(thickness=0.09, eps_r=3.35)

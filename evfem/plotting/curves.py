@@ -284,13 +284,18 @@ def contact_area(results: labels.Results, ax: Axes | None = None) -> Axes:
     )
 
 
-def friction(results: labels.Results, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Tangential over normal force on the bone, of steps with a load, over `over` (see `forces`)."""
+def friction(
+    results: labels.Results, over: str | None = None, ax: Axes | None = None, *, start: float | None = None
+) -> Axes:
+    """Tangential over normal force on the bone, of steps with a load, over `over` (see `forces`), from its
+    value `start` on: the begin of a slide is most of the picture else.
+    """
     found, over = _over(results, over)
     lines = []
     for result, look in figures.styled(found):
         load = along(result, "applied_force", over)
         rows = load > ZERO * float(np.abs(load).max(initial=0.0))
+        rows &= along(result, over, over) >= (-np.inf if start is None else start)
         ratio = along(result, "applied_tangential_force", over)[rows] / load[rows]
         lines.append((along(result, over, over)[rows], ratio, look))
     ax = figures.curves(ax, lines, "", "apparent friction coefficient")

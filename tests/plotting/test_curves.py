@@ -180,6 +180,10 @@ def test_friction_is_the_ratio_on_the_bone_where_there_is_a_load():
     ratio = result.applied_tangential_force[1:] / result.applied_force[1:]
     assert_line(ax.get_lines()[0], result.position[1:], ratio)
     assert ax.get_ylabel() == "apparent friction coefficient"
+    rows = result.position[1:] >= (start := result.position[2])
+    assert_line(
+        friction(result, "position", start=start).get_lines()[0], result.position[1:][rows], ratio[rows]
+    )
 
 
 def test_a_signal_stands_above_the_friction_that_it_makes():
