@@ -381,8 +381,21 @@ def test_a_data_set_has_every_column_and_field_with_its_unit():
 @pytest.fixture(scope="module")
 def probed():
     probes = {"a 1": [[0.0, -5.2], [0.3, -5.2], [0.5, -5.0]], "contact": [[0.1, -5.1]]}
-    output = ev.Output(frames="last", probes=probes)
+    output = ev.Output(probes=probes)
     return ev.simulate(ev.Scene(SMOOTH, ev.Display(), motion=[ev.Press(0.05, steps=2)], output=output))
+
+
+def test_a_probe_has_a_table(probed):
+    """As `probes.csv` has it, without time and name."""
+    probe = probed.probes["a 1"]
+    table = probe.table()
+    of_second = np.asarray(table["step"]) == 2
+    assert np.asarray(table["point"])[of_second].tolist() == [0, 1, 2]
+    np.testing.assert_array_equal(np.asarray(table["y"])[of_second], probe.position[:, 1])
+    np.testing.assert_array_equal(
+        np.asarray(table["cauchy_stress_xy"])[of_second], probe.cauchy_stress[1, :, 0, 1]
+    )
+    np.testing.assert_array_equal(table["von_mises"], probe.von_mises.ravel())
 
 
 @pytest.mark.xarray

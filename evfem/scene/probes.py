@@ -21,7 +21,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Checked, Within, finite, number
-from evfem.common.tables import csv_text
+from evfem.common.tables import csv_text, frame
 from evfem.common.units import in_unit
 from evfem.errors import ABSENT, InputError, Mistakes, describe_value
 from evfem.mesh.faces import ON, crossings, inverted
@@ -186,6 +186,16 @@ class ProbeHistory:
         quantity = next(one for one in QUANTITIES if name == one or name.startswith(f"{one}_"))
         at = tuple("xyz123".index(letter) % 3 for letter in name.removeprefix(quantity).strip("_"))
         return np.asarray(getattr(self, quantity)[(..., *at)])
+
+    def table(self) -> Any:
+        """A `pandas.DataFrame` (without pandas a numpy record array) with a row for each step, from 1, and
+        point, from 0, in columns as those of `probes.csv`: `x`, `y`, `cauchy_stress_yy` and so on.
+        """
+        (steps, points), dim = self.J.shape, self.position.shape[1]
+        found = {"step": np.repeat(np.arange(1, steps + 1), points), "point": np.tile(range(points), steps)}
+        places = zip("xyz"[:dim], self.position.T, strict=True)
+        found |= {axis: np.tile(place, steps) for axis, place in places}
+        return frame(found | {name: self.component(name).ravel() for name in columns(dim)[dim:]})
 
     def variables(self, name: str) -> dict[str, tuple[tuple[str, ...], Floats, dict[str, str]]]:
         """Dimensions, values and attributes of each quantity in a data set where the probe has this name."""
