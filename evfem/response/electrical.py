@@ -55,11 +55,12 @@ class ElectricalImpedance:
         write_text(Path(path), csv_text([names, *np.transpose(columns).tolist()]))
 
     def __repr__(self) -> str:
-        """Impedance at the first and the last frequency."""
+        """Impedance at each frequency, of more than five at the first and the last."""
+        count = len(self.frequency)
         told = [
             f"{abs(self.impedance[i]):.4g} {self.unit} at {np.degrees(np.angle(self.impedance[i])):.3g} "
             f"degrees at {self.frequency[i]:g} Hz"
-            for i in dict.fromkeys((0, len(self.frequency) - 1))
+            for i in (range(count) if count <= 5 else (0, count - 1))
         ]
         return "Electrical impedance: " + ", ".join(told)
 

@@ -18,7 +18,9 @@ DECADES = 3.0
 UNKNOWN_VOLTAGE = 10_000.0
 
 # Admissible values of fields, in words and as a check; they are also the keys of scene files.
-FORCE = number("a force in N/mm (of a fingertip in N) from 0 to 1e4", Within(0.0, 1e4), "N/mm")
+FORCE = number(
+    "a force in N/mm, N over the mm of depth (of a fingertip in N), from 0 to 1e4", Within(0.0, 1e4), "N/mm"
+)
 INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0), "mm")
 _DISTANCE = number(
     "a distance in mm, not 0, at most 1000 either way", Within(-1000.0, 1000.0, not_zero=True), "mm"
