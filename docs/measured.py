@@ -163,7 +163,7 @@ def readme(peers: Found, runs: Found) -> str:
     rows = [
         ["benchmark's slide, 23,000 nodes", f"evfem {own} CPU s; {slide}"],
         ["its largest force error", f"{worst(n, key):.2f} %; the reference is uncertain by 0.2 %"],
-        ["its friction force to 0.1 %", f"evfem {to_goal} CPU s; {best}"],
+        ["friction to 0.1 % of the reference", f"evfem {to_goal} CPU s; {best}"],
         ["Hertz line contact, closed form", "peak pressure 0.05 %, half width 0.6 %"],
         [
             f"default run, {run['default.steps']:.0f} steps, one thread",

@@ -45,8 +45,9 @@ def lead(found: Found) -> str:
     area, wide = (between(ratios, rf"gross_area{end}\.") for end in ("", "_flatter"))
     level = ratios["threshold.half_mil"]
     return filled(
-        f"Of {len(ratios)} rows {near} are met within a factor of 1.5; farther off than a factor of three "
-        f"are {', '.join(far)}.",
+        f"Of {len(ratios)} rows (two laws and three fingers of the hovering forces, three rows of a clutch "
+        f"and one of another model among them) {near} are met within a factor of 1.5, which is no rate of "
+        f"hits; farther off than a factor of three are {', '.join(far)}.",
         f"Hovering fingers do not choose a law: held at 30 degrees, as they were, they would have "
         f"{tilted[0]} of the measured medians by Strong and Troxel's law and {tilted[1]} by Kaczmarek's; "
         f"laid flat, {flat[0]} and {flat[1]}.",
@@ -56,8 +57,10 @@ def lead(found: Found) -> str:
         f"A gap of 2.6 um, from the ratio of two thresholds alone, gives {level:.2f} of their level with a "
         f"Weber fraction that others measured; without a gap Strong and Troxel's attraction on a touchscreen "
         f"is {short(ratios['meyer.strong_troxel'])} times the measured one.",
-        "The area in slip has the wrong sign unless the tissue stiffens, and no law that is quadratic in the "
-        "voltage has the powers above two of hovering fingers and below two of clutches.",
+        "The area in slip changes by less than meshes differ, so its sign is not resolved; under a voltage "
+        "its sign is wrong.",
+        "No law that is quadratic in the voltage has the powers above two of hovering fingers and below two "
+        "of clutches.",
     )
 
 

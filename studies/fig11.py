@@ -38,6 +38,10 @@ LAW = (
     "(second table). What the authors computed cannot be told; air adds more by (9b) at every load, on "
     "every mesh, with or without friction"
 )
+SHARE = (
+    f"{LAW}. The air's share counts also what the attraction widens the contact by; that of the nodes "
+    "beside the contact alone is smaller (the study `fringe`)"
+)
 FRICTION = (
     "friction grows by the air's part of the attraction over the load; by (9b) all of the attraction at 1000 "
     "V is 3 to 4 % of the load, by (9a) half of it. The numbers are relative to the friction with the "
@@ -65,7 +69,7 @@ for _pad, _fit in PAPER_FIT.items():
         PAPER |= _printed(f"{_pad}.{_name}", f"{_value:g}", _name, "caption, swapped", why)
 for _pad, _digits in (("with_ridges", "0.40"), ("without_ridges", "0.15")):
     what = "share of air at 0.05 N/mm"
-    PAPER |= _printed(f"{_pad}.air_share_at_0.05", _digits, what, "section 3.2.5", LAW)
+    PAPER |= _printed(f"{_pad}.air_share_at_0.05", _digits, what, "section 3.2.5", SHARE)
 for _pad in PADS:
     what, key = "friction by air at 0.05 N/mm", f"{_pad}.friction_added_by_air_at_0.05_percent"
     PAPER |= _printed(key, "10 to 20", what, "section 3.2.5", FRICTION, "%")

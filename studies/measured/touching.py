@@ -148,11 +148,12 @@ STRONG = Experiment(
     fitted="what is in series with the films, as much as 2.75 um of air, to the ratio of the two thresholds: "
     "their level is predicted, their ratio is not. The rows without a gap have nothing fitted.",
     reason="2.6 um of air between rough faces, and skin that counts as 0.1 um of it, explain both voltages; "
-    "5.5 mm of skin, as the paper has it, are not needed. Skin alone attracts so strongly that half the "
-    "voltage would do.",
+    "5.5 mm of skin, as the paper has it, are not needed. Skin alone attracts so strongly that half to two "
+    "thirds of the voltage would do.",
     sceptic="Three publications of three laboratories and an assumed load: agreement by chance is easy.",
-    answer="The load hardly enters (a factor of five in it changes the voltage by half), the Weber fraction "
-    "enters by its root. What would count against it is a gap measured far from 2 to 3 um.",
+    answer="The load enters weakly: five times the load raises the threshold by a half, which is the error "
+    "given, a fifth to either side. The Weber fraction enters by its root. What would count against it is a "
+    "gap measured far from 2 to 3 um.",
 )
 MEYERS = Experiment(
     title="Attraction on a touchscreen",
