@@ -62,6 +62,8 @@ MIDDLES = {**dict.fromkeys(STRESSES, 0.0), "J": 1.0, "shear_traction": 0.0, "sur
 Window = tuple[float, float, float, float]
 #: most arrows across a picture, and the longest one as a fraction of the surface's least depth in it
 MOST_ARROWS, LONGEST = 36, 0.8
+#: width of an arrow's shaft, inches: heads are seen in panels of any size
+SHAFT = 0.011
 TRACTIONS = ("contact_pressure", "shear_traction", "electrostatic_traction")
 
 
@@ -247,7 +249,8 @@ def draw_arrows(
         at = at - 0.4 * longest * normal
     else:
         arrows, pivot, at = size[:, None] * np.array([0.0, -longest]), "tail", position[nodes]
-    quiver = ax.quiver(*at.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, width=0.0028, pivot=pivot)
+    look: dict[str, Any] = {"units": "inches", "width": SHAFT, "headwidth": 4.5, "headlength": 5.0}
+    quiver = ax.quiver(*at.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, pivot=pivot, **look)
     quiver.set(color=EDGE, zorder=4)
     return quiver
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -104,18 +104,20 @@ def side_by_side(
 ) -> figures.Panels:
     """The deformed fingers of several results by their names: whole above, close-ups below.
 
-    All are coloured by one field on one scale, as `deformed` does it, and arrows are as long for as large a
-    traction within a row; `near=None` leaves out the close-ups. The panels come row by row.
+    All are coloured by one field on one scale, as `deformed` does it; within a row all show the same window,
+    with arrows as long for as large a traction. `near=None` leaves out the close-ups. The panels come row by
+    row.
     """
     choice("field", field, fields.FIELDS)
     views = {name: View(one, fields.frame_of(one, frame), field) for name, one in named(results).items()}
     levels = [None] if near is None else [None, near]
-    rows = [[view.window(level) for view in views.values()] for level in levels]
+    rows = [[_joined([view.window(level) for view in views.values()])] * len(views) for level in levels]
     pairs = (pair for row in rows for pair in zip(views.values(), row, strict=True))
     scale = fields.scale_of(field, np.concatenate([view.shown(window) for view, window in pairs]), vmin, vmax)
     shapes = [[(top - bottom) / (right - left) for left, right, bottom, top in row] for row in rows]
     tall = [(ACROSS - 0.7) * max(row) for row in shapes]
     figure = figures.new_figure(sum(tall) + 0.75 * len(rows), ACROSS * len(views) + 1.0)
+    figure.set_layout_engine("compressed")
     axes = figure.subplots(len(rows), len(views), squeeze=False, height_ratios=tall)
     for panels, row in zip(axes, rows, strict=True):
         reach = min(view.reach(window) for view, window in zip(views.values(), row, strict=True))
@@ -124,6 +126,7 @@ def side_by_side(
             ax.set_title(told(view.result, view.frame), fontsize="x-small")
     for ax in axes[:, 1:].ravel():
         ax.set_ylabel("")
+        ax.tick_params(labelleft=False)
     for ax in axes[:-1].ravel():
         ax.set_xlabel("")
     label_bar(figure.colorbar(mapped, ax=axes, shrink=0.8, extend=scale.extend), field, scale)
@@ -230,6 +233,12 @@ def _close(points: Floats, frame: Frame, height: fields.Height, flat: float) -> 
     tall = 2.0 * half * flat
     bottom = float(height(x).min()) - BELOW * tall
     return middle - half, middle + half, bottom, bottom + tall
+
+
+def _joined(windows: Sequence[fields.Window]) -> fields.Window:
+    """The window around several ones."""
+    left, right, bottom, top = zip(*windows, strict=True)
+    return min(left), max(right), min(bottom), max(top)
 
 
 def figure_height(window: fields.Window) -> float:
