@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from evfem.common.storage import format_of
+from evfem.common.storage import begins, format_of
 from evfem.common.tables import TABLES
 from evfem.errors import InputError
 
@@ -17,6 +17,8 @@ ALLOWED = (
 )
 #: format of the fast models that 0.2 saved
 FAST_MODEL = "evfem-reduced-1"
+#: how the file of a history begins
+HISTORY = b"step,motion_index,"
 #: how the formats of checkpoints of all versions begin
 CHECKPOINT = "evfem-checkpoint-"
 
@@ -123,6 +125,9 @@ def _signal(path: Path) -> Found:
 
     if table.is_table(path):
         return table.read(path)
+    if begins(path, HISTORY):
+        allowed = "the run's folder, or its .npz; `pandas.read_csv` reads the file itself"
+        raise InputError("path", f"{path}, the history of a run", allowed)
     try:
         return read_voltage(path)
     except InputError as error:

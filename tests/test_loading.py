@@ -96,6 +96,7 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "notes.txt").write_text("mine")
     (place / "empty.npz").write_text("")
     (place / "sweep.parquet").write_bytes(b"PAR1")
+    fake_result().to_csv(place / "history.csv")
     (place / "buzz.ahap").write_text("{}")
     Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
     save_arrays("pad.npz", {"format": np.array("evfem-reduced-1")})  # as FastModel.save of 0.2 did
@@ -107,6 +108,7 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
         "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",
         "pad.npz": "a fast model; allowed: other files: the fast model is gone since 0.3, `ev.simulate`",
         "square.toml": "frictoin",
+        "history.csv": "the history of a run; allowed: the run's folder, or its .npz; `pandas.read_csv`",
         "sweep.parquet": "for other programs; allowed: the sweep's folder,",
         "scan.csv": "path: given scan.csv, which starts with 'x,height'; allowed: a voltage (position,",
     }

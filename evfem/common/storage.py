@@ -235,6 +235,12 @@ def unpacked(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return found
 
 
+def begins(path: Path, begin: bytes) -> bool:
+    """Whether a file begins with these bytes."""
+    with disk(f"read {path.name}"), path.open("rb") as file:
+        return file.read(len(begin)) == begin
+
+
 def format_of(path: str | Path) -> str:
     """What the array `format` of such a file says; nothing where there is none to be read."""
     with suppress(Exception), zipfile.ZipFile(path) as archive:

@@ -76,7 +76,8 @@ class Uncertainty:
         lines += [f"  {key}: {self.found.reasons[key]}" for key in self.found.missing]
         for name in ("normal_force", "tangential_force", "electrostatic_force"):
             if name in self.sd:
-                lines.append(f"  {name}: {self.result[name][-1]:.6g} +- {self.sd[name][-1]:.2g}")
+                found, unit = self.result[name][-1], self.result.units[name]
+                lines.append(f"  {name}: {found:.6g} +- {self.sd[name][-1]:.2g} {unit}")
         return "\n".join(lines)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.storage import disk, write_text
+from evfem.common.storage import begins, write_text
 from evfem.common.tables import csv_rows, dataset, frame
 from evfem.errors import InputError, describe_value
 from evfem.finger.fingerpad import MeshedFinger
@@ -262,9 +262,7 @@ def array_of(values: Sequence[Any]) -> Any:
 
 def is_table(path: Path) -> bool:
     """Whether a file begins as the table of a sweep does."""
-    begin = f"{FIRST[0]},".encode()
-    with disk(f"read {path.name}"), path.open("rb") as file:
-        return file.read(len(begin)) == begin
+    return begins(path, f"{FIRST[0]},".encode())
 
 
 def read(path: Path) -> SweepResult:

@@ -281,7 +281,7 @@ def test_results_beside_each_other_have_one_scale():
     np.testing.assert_allclose(mapped[1].get_array(), 2.0 * mapped[0].get_array())
     assert panels[2].get_xlim() == deformed(soft, near="contact").get_xlim()
     assert len(panels.figure.axes) == 5
-    moved = replace(soft.frames[-1], displacement=soft.frames[-1].displacement + [0.5, 0.0])
+    moved = replace(soft.frames[-1], displacement=np.add(soft.frames[-1].displacement, [0.5, 0.0]))
     panels = side_by_side({"soft": soft, "moved": replace(soft, frames=(moved,))})
     for near, row in ((None, panels[:2]), ("contact", panels[2:])):  # both in the window around both
         (left, right), again = (ax.get_xlim() for ax in row)
