@@ -281,6 +281,7 @@ MISTAKES = "../../tests/tools/mistakes.toml"
 BLOCKS: dict[str, tuple[Callable[..., str], list[str]]] = {
     "readme": (readme, ["peers.json", "runs.json"]),
     "readme-why": (readme_why, ["peers.json"]),
+    "readme-others": (others.readme, ["measured.json"]),
     "peers-run": (run, ["peers.json"]),
     "peers-costs": (costs, ["peers.json"]),
     "peers-ratios": (ratios, ["peers.json"]),
