@@ -252,7 +252,7 @@ class Sensitivities:
 
     @property
     def elasticity(self) -> Elasticity:
-        """d ln column / d ln parameter (steps,) by column and parameter; nan where the column is 0."""
+        """Per cent of a column for 1 % of a parameter, d ln / d ln (steps,), by both; nan where it is 0."""
         return Elasticity(self)
 
     def moved(self, changes: Mapping[str, float]) -> Result:
@@ -281,7 +281,7 @@ class Sensitivities:
     def effects(self, column: str, step: int = -1) -> tuple[dict[str, float], str]:
         """The relative derivatives of a column at a step, counted from 0, by parameter; and what they are."""
         values = {key: float(self.elasticity[column, key][step]) for key in self.parameters}
-        return values, f"d ln {column} / d ln parameter"
+        return values, f"{column}: % for 1 % of the parameter"
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the table and `valid_to`, a row for each step; whole or not at all."""
@@ -306,7 +306,8 @@ class Sensitivities:
 
     def __repr__(self) -> str:
         """The parameters by the relative change of normal and tangential force at the end."""
-        lines = [f"Sensitivities of {len(self.result.step)} steps, d ln column / d ln parameter at the end:"]
+        each = "% of a column for 1 % of a parameter, at the end:"
+        lines = [f"Sensitivities of {len(self.result.step)} steps, {each}"]
         known = [name for name in self.columns if name not in self.reasons]
         names = [name for name in known if name in ("normal_force", "tangential_force")] or known
         for key in self.parameters:
