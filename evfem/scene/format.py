@@ -391,11 +391,14 @@ HOMES: Mapping[str, tuple[Any, ...]] = {
 
 
 def dotted(name: str) -> str:
-    """The dotted key that a bare one may mean, nothing for none.
+    """The dotted key that a bare one may mean, or one in a table that there is not; nothing for none.
 
     >>> dotted("friction"), dotted("tilt"), dotted("speed"), dotted("colour")
     ('surface.friction', '', 'motion.0.speed', '')
+    >>> dotted("display.insulator_thickness")
+    'electrostatics.insulator_thickness'
     """
+    name = name.rpartition(".")[2]
     for meant in (name, *MEANT.get(name.lower(), "").split()):
         for table, classes in HOMES.items():
             if meant in names(*classes):
