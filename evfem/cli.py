@@ -250,8 +250,8 @@ def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
         print(f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it')
     for warning in json.loads((path / SUMMARY).read_text(encoding="utf-8")).get("warnings", []):
         print(f"warning: {warning}")
-    seconds = sum(float(row["seconds"]) for row in rows)
-    print(f"{len(rows)} of {scene.total_steps} steps in {seconds:.1f} s; results in {path}", flush=True)
+    cost = f"{len(rows)} of {scene.total_steps} steps in {sum(float(row['seconds']) for row in rows):.1f} s"
+    print(f"{cost}; results of every step in {path}", flush=True)
     return DONE
 
 
