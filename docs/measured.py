@@ -253,6 +253,28 @@ def campaigns(rows: list[Found]) -> str:
     return table(["seed", *(row["seed"] for row in rows)], lines)
 
 
+#: ways to run a scene that should end as it does, in words
+WAYS = {
+    "solver": "the other sparse solver",
+    "input": "an input changed by 1e-9",
+    "compiled": "without compiled code",
+    "kept": "no tangent kept",
+    "predicted": "nothing extrapolated",
+    "steps": "twice the steps",
+}
+
+
+def variants(rows: list[Found]) -> str:
+    """How drawn scenes end on other ways."""
+    lines = []
+    for row in sorted(rows, key=lambda row: [*WAYS].index(row["variant"])):
+        scenes = [row[name] for name in ("compared", "worse", "elsewhere", "largest")]
+        costs = [f"x {float(row[name]):.2f}" for name in ("iterations", "factorisations")]
+        lines.append([WAYS[row["variant"]], *scenes, *costs])
+    heads = ["way", "scenes", "end worse", "elsewhere by 1e-3", "largest difference"]
+    return table([*heads, "iterations", "factorisations"], lines)
+
+
 def rows_of(text: str) -> list[Found]:
     """Rows of a csv file by its header; ValueError where a row is longer or shorter."""
     head, *rows = csv.reader(text.splitlines())
@@ -268,9 +290,10 @@ def when() -> str:
         said = [f"evfem {made['versions']['evfem']}, Python {made['versions']['python']}"]
         said += [] if took is None else [seconds(max(took, 0.1))]
         rows.append([f"`{path.stem}`", made["date"][:10], made.get("commit") or "-", ", ".join(said)])
-    for name in ("long.csv", "campaigns.csv"):
+    for name in ("long.csv", "campaigns.csv", "variants.csv"):
         for row in rows_of((RESULTS / name).read_text(encoding="utf-8")):
-            what = row.get("question") or f"campaign {row['seed']}"
+            way = f"scenes of seed {row.get('seed')}, {WAYS.get(row.get('variant', ''))}"
+            what = row.get("question") or (way if "variant" in row else f"campaign {row['seed']}")
             rows.append([what, row["date"], row["commit"] or "-", ""])
     rows.sort(key=lambda row: row[0])
     return table(["what", "date", "commit", "with"], sorted(rows, key=lambda row: row[1], reverse=True))
@@ -294,6 +317,7 @@ BLOCKS: dict[str, tuple[Callable[..., str], list[str]]] = {
     "tips": (tips, ["runs.json"]),
     "robustness": (robustness, ["stability.json", "campaigns.csv", "long.csv", MISTAKES]),
     "campaigns": (campaigns, ["campaigns.csv"]),
+    "variants": (variants, ["variants.csv"]),
     "fringe": (fringe, ["fringe.json"]),
     "fingertip": (fingertip, ["fingertip.json"]),
     "fingerprint": (fingerprint, ["fingerprint.json"]),

@@ -2,16 +2,18 @@
 
     python tests/tools/same_ends.py record BEFORE.csv --seed 77 --scenes 270 [--variant steps] [--limit 60]
     python tests/tools/same_ends.py compare BEFORE.csv AFTER.csv [--tolerance 1e-6]
+    python tests/tools/same_ends.py table BEFORE.csv AFTER.csv... --out docs/results/variants.csv
 
 `record` runs scenes of `evfem study campaign`, each in a process of its own with a limit of CPU
 time, and writes how each ends: forces and indentation of the last row, counts and CPU seconds.
-`compare` lists the scenes that end elsewhere, or not, and the sums. A force differs relative to
+`compare` lists the scenes that end elsewhere, or not, and the sums; `table` has a row for each AFTER, by
+the name of its file, for the page on verification. A force differs relative to
 the largest force of its scene. `tests/tools/ends.csv` holds the ends that a change is judged by.
 Scenes that run out of time in either are left out of all but their count.
 
 A variant should have the same ends: no tangent is `kept`; nothing is `predicted` from the last step; the
-other sparse `solver`; no `compiled` code; an `input` changed by 1e-9; twice the `steps`. `--without`
-switches off one of the solver's safeguards (`tools.safeguards`).
+other sparse `solver`; no `compiled` code; an `input` changed by 1e-9; twice the `steps`.
+`--without` switches off one of the solver's safeguards (`tools.safeguards`).
 """
 
 import argparse
@@ -19,15 +21,19 @@ import csv
 import os
 import resource
 import signal
+import subprocess
 import sys
 import time
 import warnings
 from contextlib import nullcontext
+from datetime import date
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 VARIANTS = ("kept", "predicted", "solver", "compiled", "input", "steps")
+#: so many times the steps
+FACTORS = {"steps": 2, "steps4": 4, "steps8": 8}
 TIMEOUT = "timeout"
 #: compiled modules, without which the readable forms run
 COMPILED = ("loops", "solids", "contact", "cholesky")
@@ -49,7 +55,7 @@ def varied(scene, variant: str):
         return safeguards.of_scene(scene, **safeguards.STRATEGIES[variant])
     if variant == "input":
         return perturbed(scene) or scene
-    return more_steps(scene) if variant == "steps" else scene
+    return more_steps(scene, FACTORS[variant]) if variant in FACTORS else scene
 
 
 def run(key: tuple[int, int], variant: str = "", limit: float = LIMIT_S) -> Row:
@@ -144,6 +150,34 @@ def compare(before: Path, after: Path, tolerance: float) -> int:
     return 1 if worse else 0
 
 
+def summed(before: Path, after: Path, tolerance: float) -> Row:
+    """What a table has of the scenes that end within the limit of time in both."""
+    first, second = read(before), read(after)
+    both = [key for key in first if key in second]
+    keys = [key for key in both if TIMEOUT not in (first[key]["end"], second[key]["end"])]
+    apart = [difference(first[key], second[key]) for key in keys]
+    ends = [first[key]["end"] == "equilibrium" != second[key]["end"] for key in keys]
+    found = {"variant": after.stem, "seed": keys[0][0], "scenes": len(both), "compared": len(keys)}
+    found |= {"worse": sum(ends), "elsewhere": sum(one > tolerance for one in apart)}
+    found |= {"largest": f"{max((one for one in apart if one < float('inf')), default=0.0):.2g}"}
+    for name in ("iterations", "factorisations"):
+        sums = [sum(float(table[key][name] or 0.0) for key in keys) for table in (first, second)]
+        found[name] = f"{sums[1] / sums[0]:.3g}"
+    return {name: str(value) for name, value in found.items()}
+
+
+def tabulate(before: Path, after: list[Path], out: Path, tolerance: float) -> int:
+    """Write a row for each recording, with date and commit."""
+    rows = [summed(before, one, tolerance) for one in after]
+    asked = ["git", "log", "-1", "--format=%h"]
+    commit = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+    with out.open("w", newline="") as file:
+        table = csv.DictWriter(file, [*rows[0], "date", "commit"], lineterminator="\n")
+        table.writeheader()
+        table.writerows(row | {"date": date.today().isoformat(), "commit": commit} for row in rows)
+    return 0
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
@@ -161,11 +195,18 @@ def main() -> int:
     comparing.add_argument("before", type=Path)
     comparing.add_argument("after", type=Path)
     comparing.add_argument("--tolerance", type=float, default=1e-6)
+    writing = commands.add_parser("table", help="a row for each of several recordings")
+    writing.add_argument("before", type=Path)
+    writing.add_argument("after", type=Path, nargs="+")
+    writing.add_argument("--out", type=Path, required=True)
+    writing.add_argument("--tolerance", type=float, default=1e-3)
     given = parser.parse_args()
     if given.command == "record":
         numbers = given.only if given.only else range(given.scenes)
         keys = [(given.seed, number) for number in numbers]
         return record(given.out, keys, given.workers, given.variant, given.limit)
+    if given.command == "table":
+        return tabulate(given.before, given.after, given.out, given.tolerance)
     return compare(given.before, given.after, given.tolerance)
 
 
