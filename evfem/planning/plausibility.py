@@ -167,8 +167,8 @@ def _relaxed_before(scene: Scene) -> Iterator[str]:
     timed = next((i for i, motion in enumerate(scene.motion) if motion.takes_time), 0)
     givers = (scene.finger, *scene.finger.materials.values())
     relaxes = scene.solver.timed and any(getattr(one, "relaxation", None) for one in givers)
-    still = isinstance(scene.motion[timed], Wait) and not isinstance(scene.voltage, TimeSignal)
-    if timed and relaxes and still:
+    relaxes = relaxes and not isinstance(scene.voltage, TimeSignal)
+    if timed and relaxes and isinstance(scene.motion[timed], Wait):
         yield (
             f"motion {timed} waits after motions without a speed, which end relaxed: the branches of the "
             "tissue relax after a press with a speed"

@@ -288,7 +288,7 @@ def friction(
     results: labels.Results, over: str | None = None, ax: Axes | None = None, *, start: float | None = None
 ) -> Axes:
     """Tangential over normal force on the bone, of steps with a load, over `over` (see `forces`), from its
-    value `start` on: the begin of a slide is most of the picture else.
+    value `start` on: without one, the beginning of a slide fills most of the picture.
     """
     found, over = _over(results, over)
     lines = []
