@@ -91,7 +91,7 @@ ROOMS = {
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
-        "manifest samples units file folder table means run accuracy check accurate",
+        "manifest samples keyunits file folder table means run accuracy check accurate",
     ),
     "response": (
         {"numpy", "scipy"},

@@ -38,9 +38,9 @@ from evfem.simulation.history import (
 )
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, is_key, plain_value
+from evfem.sweeps.keyunits import unit_of
 from evfem.sweeps.run import output
 from evfem.sweeps.table import units_of
-from evfem.sweeps.units import unit_of
 
 NUMBERS = tuple(name for name in (*COLUMNS, *ROOM_COLUMNS, *SPATIAL) if name != "motion")
 #: most measured numbers of one kind

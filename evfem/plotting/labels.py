@@ -16,7 +16,7 @@ from evfem.errors import InputError
 from evfem.scene import probes
 from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL, UNITS
 from evfem.simulation.result import FIELD_UNITS, Result
-from evfem.sweeps.units import unit_of
+from evfem.sweeps.keyunits import unit_of
 
 Units = Mapping[str, str]
 Results = Result | Mapping[str, Result]

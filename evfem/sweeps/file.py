@@ -32,8 +32,8 @@ from evfem.scene.schema import DRAFT, Schema, Section, section
 from evfem.scene.serialiser import dump
 from evfem.simulation.history import ROOM_COLUMNS, SPATIAL, no_column
 from evfem.simulation.result import COLUMNS
+from evfem.sweeps.keyunits import in_its_unit
 from evfem.sweeps.samples import Distribution, Normal, Samples, Uniform
-from evfem.sweeps.units import in_its_unit
 
 
 def sections() -> list[Section]:

@@ -21,7 +21,7 @@ from evfem.scene.scene import Scene
 from evfem.simulation.history import ABOUT, SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS, no_column
 from evfem.sweeps.file import FIRST, LAST, STATISTICS
 from evfem.sweeps.folder import PROVENANCE, STATUS, TABLE, cell_of, sweep_csv
-from evfem.sweeps.units import unit_of
+from evfem.sweeps.keyunits import unit_of
 
 Units = Mapping[str, str]
 #: what a plane finger with a depth has of the columns in three dimensions

@@ -37,7 +37,8 @@ def test_a_finger_in_the_plane_slides_along_x():
 
 
 def test_a_force_is_told_in_the_units_of_both():
-    refuses(r"given -1; allowed: a force in N/mm \(of a fingertip in N\) from 0 to", ev.Press, force=-1)
+    said = r"given -1; allowed: a force in N/mm, N over the mm of depth \(of a fingertip in N\), from 0 to"
+    refuses(said, ev.Press, force=-1)
 
 
 FOUR = [0.0, 1.0, 2.0, 3.0]

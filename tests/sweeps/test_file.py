@@ -11,7 +11,7 @@ from tools.refusals import refuses
 import evfem as ev
 from evfem.errors import InputError
 from evfem.sweeps import file as sweepfile
-from evfem.sweeps.units import unit_of
+from evfem.sweeps.keyunits import unit_of
 
 SCENE = """
 version = 1
