@@ -30,6 +30,7 @@ from datetime import date
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 VARIANTS = ("kept", "predicted", "solver", "compiled", "input", "steps")
 #: so many times the steps
@@ -128,11 +129,16 @@ def difference(one: Row, other: Row) -> float:
     return max(worst, abs(float(one["indentation"]) - float(other["indentation"])) / depth)
 
 
+def common(first: dict[Any, Row], second: dict[Any, Row]) -> tuple[list[Any], list[Any]]:
+    """Scenes of both, and those of them that end within the limit of time in both."""
+    both = [key for key in first if key in second]
+    return both, [key for key in both if TIMEOUT not in (first[key]["end"], second[key]["end"])]
+
+
 def compare(before: Path, after: Path, tolerance: float) -> int:
     """Print the scenes that end elsewhere and the sums; 1 if any ends worse than before."""
     first, second = read(before), read(after)
-    both = [key for key in first if key in second]
-    keys = [key for key in both if TIMEOUT not in (first[key]["end"], second[key]["end"])]
+    both, keys = common(first, second)
     worse = [key for key in keys if first[key]["end"] == "equilibrium" != second[key]["end"]]
     other = [key for key in keys if difference(first[key], second[key]) > tolerance]
     for key in sorted({*worse, *other}, key=keys.index):
@@ -153,8 +159,7 @@ def compare(before: Path, after: Path, tolerance: float) -> int:
 def summed(before: Path, after: Path, tolerance: float) -> Row:
     """What a table has of the scenes that end within the limit of time in both."""
     first, second = read(before), read(after)
-    both = [key for key in first if key in second]
-    keys = [key for key in both if TIMEOUT not in (first[key]["end"], second[key]["end"])]
+    both, keys = common(first, second)
     apart = [difference(first[key], second[key]) for key in keys]
     ends = [first[key]["end"] == "equilibrium" != second[key]["end"] for key in keys]
     found = {"variant": after.stem, "seed": keys[0][0], "scenes": len(both), "compared": len(keys)}
