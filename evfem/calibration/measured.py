@@ -257,13 +257,19 @@ class MeasuredValues:
 
     @classmethod
     def from_csv(
-        cls, path: str | Path, sd: float | None = None, depth: float | None = None
+        cls,
+        path: str | Path,
+        sd: float | None = None,
+        depth: float | None = None,
+        columns: Mapping[str, int | str] | None = None,
     ) -> MeasuredValues:
         """The values in a file with the header `KEY,...,OUTPUT[,sd]`, keys as `motion.0.gap`, perhaps with
-        units: `motion.0.gap [um]`. With a `depth` (mm) its forces, areas and energies are over it, as those
-        of `Result.total`, and are divided by it, `sd` too.
+        units: `motion.0.gap [um]`; or with another header, of which `columns` names those that are meant, the
+        output last, by names or numbers from 1: {"motion.0.force": "Load", "tangential_force.last": 3}. With
+        a `depth` (mm) its forces, areas and energies are over it, as those of `Result.total`, and are divided
+        by it, `sd` too.
         """
-        cells = read_table(Path(path), "data")
+        cells = read_table(Path(path), "data") if columns is None else _chosen(Path(path), columns)
         *keys, last = [name for cell in cells if (name := named_unit(cell)[0]) != "sd"] or [""]
         for name in (*(one for one in keys if not is_key(one)), *([] if "." in last else [last])):
             allowed = "keys of the scene, then an output: motion.0.force [N],tangential_force.last [N]"
@@ -351,6 +357,17 @@ def check_units(one: Measured, scene: Scene) -> None:
 def _whole(column: str) -> str | None:
     """Unit of a column over a whole depth."""
     return WHOLE_UNITS.get(column, SPATIAL_UNITS.get(column))
+
+
+def _chosen(path: Path, columns: Mapping[str, int | str]) -> dict[str, Floats]:
+    """Columns of a file with a header of its own, by the names that they have here, beside their units."""
+    used = {f"data.columns.{name}": entry for name, entry in columns.items()}
+    table = read_headed(path, "data", gaps=False, used=used)
+    found = {}
+    for (key, entry), name in zip(used.items(), columns, strict=True):
+        unit = table.unit(key, entry)
+        found[name if unit is None else f"{name} [{unit}]"] = table.columns[table.index(key, entry)]
+    return found
 
 
 def _without_units(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:

@@ -218,15 +218,18 @@ class Headed:
         i = self.index(key, entry)
         name, unit = self._called(i, entry)
         if unit is None and like is not None:
-            unit = self._called(self.index(key, like), like)[1]
+            unit = self.unit(key, like)
         size = units.factor(key, name, unit, bases, more) if factor is None else factor
         with np.errstate(over="ignore"):  # infinite ones are refused
             return self.columns[i] if size == 1.0 else self.columns[i] * size
 
     def base(self, key: str, entry: int | str) -> str | None:
         """The unit that a column, whose own is known, is given in."""
-        unit = self._called(self.index(key, entry), entry)[1]
-        return units.UNITS.get(unit or "", (None,))[0]
+        return units.UNITS.get(self.unit(key, entry) or "", (None,))[0]
+
+    def unit(self, key: str, entry: int | str) -> str | None:
+        """The unit that stands with a column, None for none."""
+        return self._called(self.index(key, entry), entry)[1]
 
     def _called(self, i: int, entry: int | str) -> tuple[str, str | None]:
         """Name and unit of a column; below another text a cell is a name where it is called by it."""

@@ -374,6 +374,28 @@ def test_keys_and_outputs_of_a_file_have_units(tmp_path):
     refuses(gap, MeasuredValues.from_csv, tmp_path / "hover.csv")
 
 
+def test_columns_of_a_log_are_chosen_by_names_and_numbers(tmp_path):
+    """Those of a tribometer, some columns with words, with units in their heads or in a line of their own."""
+    log = "Run;Friction force [mN];Load [N];Remark;Spread\n1;200;0,5;dry;4\n2;500;1,0;moist;8\n"
+    (tmp_path / "log.csv").write_text(log)
+    called = {"motion.0.force": "load", "tangential_force.last": 2, "sd": "spread"}
+    values = MeasuredValues.from_csv(tmp_path / "log.csv", depth=10.0, columns=called)
+    assert values.output == "tangential_force.last"
+    assert values.where == {"motion.0.force": [0.05, 0.1]}
+    assert values.values.tolist() == pytest.approx([0.02, 0.05])
+    assert values.sd.tolist() == pytest.approx([4e-4, 8e-4])
+    for wrong, sentence in (
+        (
+            {"motion.0.force": "weight", "tangential_force.last": 2},
+            'motion.0.force: given "weight", which',
+        ),
+        ({"load": "load", "tangential_force.last": 2}, 'data: given log.csv with the column "load"'),
+        ({"motion.0.force": "load", "friction.last": 2}, "data.friction.last: given friction.last in mN"),
+        ({"motion.0.force": "remark", "tangential_force.last": 2}, "log.csv, line 2"),
+    ):
+        refuses(sentence, MeasuredValues.from_csv, tmp_path / "log.csv", columns=wrong)
+
+
 def test_values_from_a_file(tmp_path):
     head = "finger.participant,electrostatics.voltage,motion.0.gap,electrostatic_force.last"
     (tmp_path / "hover.csv").write_text(f"{head}\ni,2000,0.5,2e-4\nii,1414,0.25,1e-4\n")
