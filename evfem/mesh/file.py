@@ -198,10 +198,18 @@ def _guard(content: bytes) -> None:
 
 
 def check_numbers(raw: meshio.Mesh) -> None:
-    """Raise ValueError for points of another dimension, and for cells and sets of nodes that do not exist."""
+    """Raise ValueError for points of another dimension, for cells of another number of nodes than their kind
+    has, and for cells and sets of nodes that do not exist.
+    """
+    import meshio
+
+    widths = meshio._common.num_nodes_per_cell
     if raw.points.ndim != 2 or raw.points.shape[1] not in (2, 3):
         raise ValueError("no points in the plane or in space")
     for block in raw.cells:
+        width = np.shape(block.data)[1:]
+        if len(block) and width != (widths.get(block.type, *width),):
+            raise ValueError(f"cells of the kind {block.type} with {width[-1]} nodes")
         if len(block) and not 0 <= np.min(block.data) <= np.max(block.data) < len(raw.points):
             raise ValueError("cells of nodes that do not exist")
     for nodes in raw.point_sets.values():

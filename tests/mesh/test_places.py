@@ -203,6 +203,9 @@ def test_groups_of_a_meshio_mesh_are_named_by_its_field_data():
     found = ev.MeshedFinger(raw, {"tissue": LAW})
     assert found.mesh(1).node_sets["bone"].tolist() == [6, 7, 8]
     assert "point_tags" in raw.point_data
+    halved = meshio.Mesh(raw.points, [("quad", mesh.cells[:, :2]), ("line", lines)], cell_data=raw.cell_data)
+    sentence = "given the meshio.Mesh with cells of the kind quad with 2 nodes"
+    refuses(sentence, ev.MeshedFinger, halved, {"tissue": LAW})
     raw.cells[1].data[0, 0] = 99
     refuses(
         "given the meshio.Mesh with cells of nodes that do not exist", ev.MeshedFinger, raw, {"tissue": LAW}

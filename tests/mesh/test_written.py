@@ -432,3 +432,10 @@ def test_a_pointer_of_git_lfs_is_no_damaged_file(tmp_path):
     path = tmp_path / "body.msh"
     path.write_text(f"version https://git-lfs.github.com/spec/v1\noid sha256:{64 * '0'}\nsize 5479\n")
     refuses("a pointer of Git LFS, not the file: git lfs pull", read, path)
+
+
+def test_a_file_that_was_cut_off_within_its_cells_is_refused(tmp_path):
+    """Of which meshio makes cells of three nodes, after a word on the screen."""
+    whole = (WRITTEN / "gmsh_quad9_4.1.msh").read_text()
+    (tmp_path / "cut.msh").write_text(whole.partition("$EndElements")[0].rsplit(maxsplit=12)[0])
+    refuses(r"given cut.msh \(cells of the kind quad9 with 3 nodes\)", read, tmp_path / "cut.msh")
