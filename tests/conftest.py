@@ -12,6 +12,11 @@ collect_ignore = [] if find_spec("evfem.tissue.kernels.loops") else ["tissue/ker
 type(pytest.approx(1.0)).DEFAULT_ABSOLUTE_TOLERANCE = 0.0
 
 
+def pytest_addoption(parser):
+    parser.addoption("--damaged", type=int, default=250, help="damaged files of each format in a slow test")
+    parser.addoption("--kills", type=int, default=6, help="kills of each scene in a slow test")
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
     """Collected tests live to the end: they are not searched for garbage, again and again."""

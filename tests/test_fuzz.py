@@ -31,18 +31,20 @@ from evfem.mesh.quality import check
 from evfem.scene.file import load, loads
 from evfem.studio import page
 
+#: damaged files of a format in the default tests; in the slow ones `--damaged`, drawn by `--hypothesis-seed`
+FEW = 30
 SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
 
 
-@pytest.mark.parametrize("count", [50, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("more", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", hostile.FORMATS)
-def test_damaged_files_are_read_or_refused_with_one_sentence(kind, count):
+def test_damaged_files_are_read_or_refused_with_one_sentence(kind, more, pytestconfig):
     statuses = set()
 
     @settings(
-        max_examples=count,
+        max_examples=pytestconfig.getoption("damaged") if more else FEW,
         deadline=60_000,
-        derandomize=True,
+        derandomize=pytestconfig.getoption("hypothesis_seed") is None,
         database=None,
         suppress_health_check=HealthCheck,
     )

@@ -31,11 +31,12 @@ from evfem.textures.texture import Texture
 
 
 @pytest.mark.parametrize(
-    ("name", "count"),
-    [("force", 3), *(pytest.param(name, 17, marks=pytest.mark.slow) for name in kills.SCENES)],
+    ("name", "more"),
+    [("force", False), *(pytest.param(name, True, marks=pytest.mark.slow) for name in kills.SCENES)],
 )
-def test_kills_at_random_moments_lose_nothing(name, count, tmp_path):
+def test_kills_at_random_moments_lose_nothing(name, more, tmp_path, pytestconfig):
     kills.prepare(tmp_path, name)
+    count = pytestconfig.getoption("kills") if more else 3
     words, rng, hits, number = ["run", f"{name}.toml", "--no-plots", "--out"], Random(20), 0, 0
     begin = time.time()
     assert run_process(tmp_path, *words, "whole")[0] == 0

@@ -129,10 +129,10 @@ def test_two_layers_of_unlike_thickness_under_a_cylinder(below, half_width, expe
 def test_a_coated_half_plane_under_a_cylinder():
     """What a finite depth H adds to the load falls with 1/H^2."""
     loads = []
-    for depth in (25.0, 50.0):
+    for depth in (12.5, 25.0):
         stack = ev.ElasticStack([ev.ElasticLayer(*COATED), ev.ElasticLayer(0.08, 0.48, depth)])
         loads.append(under_cylinder([stack], 1.0)[0])
-    assert (4.0 * loads[1] - loads[0]) / 3.0 == pytest.approx(0.0111773257, rel=2e-5)
+    assert (4.0 * loads[1] - loads[0]) / 3.0 == pytest.approx(0.0111773257, rel=5e-6)
 
 
 def grid(count, distance, seed=3):
