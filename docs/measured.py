@@ -253,6 +253,8 @@ def campaigns(rows: list[Found]) -> str:
     return table(["seed", *(row["seed"] for row in rows)], lines)
 
 
+#: what a way to run a scene may cost
+COSTS = ("iterations", "factorisations")
 #: ways to run a scene that should end as it does, in words
 WAYS = {
     "solver": "the other sparse solver",
@@ -264,15 +266,44 @@ WAYS = {
 }
 
 
-def variants(rows: list[Found]) -> str:
-    """How drawn scenes end on other ways."""
-    lines = []
-    for row in sorted(rows, key=lambda row: [*WAYS].index(row["variant"])):
-        scenes = [row[name] for name in ("compared", "worse", "elsewhere", "largest")]
-        costs = [f"x {float(row[name]):.2f}" for name in ("iterations", "factorisations")]
-        lines.append([WAYS[row["variant"]], *scenes, *costs])
-    heads = ["way", "scenes", "end worse", "elsewhere by 1e-3", "largest difference"]
-    return table([*heads, "iterations", "factorisations"], lines)
+#: safeguards of the solver, in words
+SAFEGUARDS = {
+    "release": "release",
+    "barrier": "barriers",
+    "stuck": "stagnation",
+    "stability": "stability of what is accepted",
+    "fold": "folds of the outline",
+    "volume": "volume ratios above 0.05",
+    "travel": "bone's travel limited",
+    "softening": "softening scaled below critical",
+    "gain": "gain between rough faces limited",
+    "slope": "slope of friction in the compliance",
+    "follower": "turning contact forces",
+    "brackets": "bracketed friction",
+    "pins": "pins at jumps of friction",
+    "rounds": "nodes added before the next iterate",
+    "damped": "damped changes of status",
+    "worst": "worst node first",
+    "coarser": "longer substeps after a release",
+    "combined": "combined iterates",
+    "predicted": "extrapolated start",
+    "kept": "tangents kept",
+}
+
+
+def ends(words: dict[str, str], what: str) -> Callable[[list[Found]], str]:
+    """What shows how drawn scenes end on other ways, which have these `words`."""
+
+    def made(rows: list[Found]) -> str:
+        lines = []
+        for row in sorted(rows, key=lambda row: [*words].index(row["variant"])):
+            scenes = [row[name] for name in ("compared", "worse", "elsewhere", "largest")]
+            costs = [f"x {float(row[name]):.2f}" for name in COSTS]
+            lines.append([words[row["variant"]], *scenes, *costs])
+        heads = [what, "scenes", "end worse", "elsewhere by 1e-3", "largest difference"]
+        return table([*heads, *COSTS], lines)
+
+    return made
 
 
 def rows_of(text: str) -> list[Found]:
@@ -317,7 +348,8 @@ BLOCKS: dict[str, tuple[Callable[..., str], list[str]]] = {
     "tips": (tips, ["runs.json"]),
     "robustness": (robustness, ["stability.json", "campaigns.csv", "long.csv", MISTAKES]),
     "campaigns": (campaigns, ["campaigns.csv"]),
-    "variants": (variants, ["variants.csv"]),
+    "variants": (ends(WAYS, "way"), ["variants.csv"]),
+    "safeguards": (ends(SAFEGUARDS, "without"), ["safeguards.csv"]),
     "fringe": (fringe, ["fringe.json"]),
     "fingertip": (fingertip, ["fingertip.json"]),
     "fingerprint": (fingerprint, ["fingerprint.json"]),

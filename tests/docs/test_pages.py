@@ -57,7 +57,8 @@ FENCED = re.compile(r"^```\w+\n(.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FORMS, WORDS = "docs/howto/form.md", "docs/words.md"
 #: pages with so much to compute that `.ci/run` alone runs them
-HEAVY = ("element", "field", "fit", "friction", "pictures", "rough", "texture")
+HEAVY = ("element", "field", "fingertip", "fit", "friction", "pictures", "rough", "signal")
+HEAVY += ("texture", "touchscreen")
 LONG = {"gallery.md", *(f"howto/{p}.md" for p in HEAVY)}
 #: pages with blocks that take long
 SLOW = [page for page in PAGES if "<!-- takes long -->" in (DOCS / page).read_text(encoding="utf-8")]

@@ -22,7 +22,7 @@ def slid(wish, steps, largest=10_000.0):
     )
 
 
-@pytest.mark.parametrize(("wish", "numbers"), [(0.032, [6]), (0.035, [4, 6]), (0.04, [2, 8])])
+@pytest.mark.parametrize(("wish", "numbers"), [(0.032, [6]), (0.035, [4, 6]), (0.04, [3, 8])])
 def test_a_friction_force_within_reach_is_met_whatever_the_steps(wish, numbers):
     """In full slip friction is mu times load and attraction, and a given voltage has that attraction too."""
     results = [slid(wish, steps) for steps in numbers]
