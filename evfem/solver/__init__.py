@@ -83,29 +83,13 @@ stability, the body moves on under drag of a rate s in pseudo-time steps: each i
 s falls while the body slows down, and rises after failures. The end is an equilibrium without drag.
 What the drag dissipates is `snap_dissipation`.
 
-**Safeguards**, and what 211 drawn scenes lost without each (version 0.2; factors are those of the sum
-over the scenes in which it acts):
-
-=====================================  ======  =======================================================
-safeguard                              scenes  without it
-=====================================  ======  =======================================================
-slope of friction in the compliance    8       iterations x12.6, factorisations x51
-turning contact forces (`follower`)    23      iterations x2.2, factorisations x4.6
-softening scaled below critical        8       iterations x1.9, factorisations x3.8
-gain between rough faces limited       49      4 scenes do not end (`traction.limited_gain`)
-bracketed friction (`terms.slipping`)  12      iterations x1.2, factorisations x1.5
-pins at jumps of friction              1       1 scene does not end (`interface.FrictionJumps`)
-release (`relaxation`)                 2       1 scene does not end
-longer substeps after a release        4       iterations x2.2 (`stepping`)
-bone's travel limited (`travel`)       9       factorisations x1.3; of bodies in the air x1.3
-factorisations kept (`linearisation`)  173     factorisations x5.2, CPU time x1.65
-worst node first (active set)          73      iterations x1.27
-extrapolated start (`factorised`)      22      iterations x1.13
-stagnation (`strategy.stuck`)          24      iterations x1.08, factorisations x1.2
-combined iterates (`anderson`)         22      factorisations x1.23
-volume ratio kept above 0.05           4       the same ends; 5 tests fail (Poisson's ratio near 1/2)
-stability of what is accepted          5       the same ends; 3 tests find unstable equilibria
-=====================================  ======  =======================================================
+**Safeguards.** What drawn scenes lose without each of them is on the page on verification (`tests/tools`
+has what switches them off): the slope of friction in the compliance; turning contact forces (`follower`);
+softening scaled below critical, and a gain between rough faces that is limited (`traction`); bracketed
+friction (`terms.slipping`) and pins at its jumps (`interface.FrictionJumps`); release; barriers; the bone's
+travel (`travel`); tangents that are kept (`linearisation`); combined iterates (`anderson`); the worst node
+first; an extrapolated start; stagnation (`strategy.stuck`). Others only refuse: volume ratios below 0.05,
+folds, unstable states.
 
 Every constant is in `evfem.common.constants`; none decides what is accepted.
 
