@@ -286,8 +286,6 @@ SAFEGUARDS = {
     "worst": "worst node first",
     "coarser": "longer substeps after a release",
     "combined": "combined iterates",
-    "predicted": "extrapolated start",
-    "kept": "tangents kept",
 }
 
 
