@@ -295,10 +295,11 @@ def ends(words: dict[str, str], what: str) -> Callable[[list[Found]], str]:
     def made(rows: list[Found]) -> str:
         lines = []
         for row in sorted(rows, key=lambda row: [*words].index(row["variant"])):
-            scenes = [row[name] for name in ("compared", "worse", "elsewhere", "largest")]
+            late = str(int(row["scenes"]) - int(row["compared"]))
+            scenes = [row["compared"], late, *(row[name] for name in ("worse", "elsewhere", "largest"))]
             costs = [f"x {float(row[name]):.2f}" for name in COSTS]
             lines.append([words[row["variant"]], *scenes, *costs])
-        heads = [what, "scenes", "end worse", "elsewhere by 1e-3", "largest difference"]
+        heads = [what, "scenes", "out of time", "end worse", "elsewhere by 1e-3", "largest difference"]
         return table([*heads, *COSTS], lines)
 
     return made
@@ -310,6 +311,15 @@ def rows_of(text: str) -> list[Found]:
     return [dict(zip(head, row, strict=True)) for row in rows]
 
 
+#: table -> what a row of it is of
+TABLES = {
+    "long.csv": "{question}",
+    "campaigns.csv": "campaign {seed}",
+    "variants.csv": "scenes of seed {seed} on other ways",
+    "safeguards.csv": "scenes of seed {seed} without safeguards",
+}
+
+
 def when() -> str:
     """What was run when, at which commit, with which version, for how long."""
     rows = []
@@ -319,11 +329,10 @@ def when() -> str:
         said = [f"evfem {made['versions']['evfem']}, Python {made['versions']['python']}"]
         said += [] if took is None else [seconds(max(took, 0.1))]
         rows.append([f"`{path.stem}`", made["date"][:10], made.get("commit") or "-", ", ".join(said)])
-    for name in ("long.csv", "campaigns.csv", "variants.csv"):
-        for row in rows_of((RESULTS / name).read_text(encoding="utf-8")):
-            way = f"scenes of seed {row.get('seed')}, {WAYS.get(row.get('variant', ''))}"
-            what = row.get("question") or (way if "variant" in row else f"campaign {row['seed']}")
-            rows.append([what, row["date"], row["commit"] or "-", ""])
+    for name, what in TABLES.items():
+        found = rows_of((RESULTS / name).read_text(encoding="utf-8"))
+        said = {what.format(**row): [row["date"], row["commit"] or "-", ""] for row in found}
+        rows += [[one, *more] for one, more in said.items()]
     rows.sort(key=lambda row: row[0])
     return table(["what", "date", "commit", "with"], sorted(rows, key=lambda row: row[1], reverse=True))
 
