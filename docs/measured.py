@@ -299,8 +299,8 @@ def ends(words: dict[str, str], what: str) -> Callable[[list[Found]], str]:
             scenes = [row["compared"], late, *(row[name] for name in ("worse", "elsewhere", "largest"))]
             costs = [f"x {float(row[name]):.2f}" for name in COSTS]
             lines.append([words[row["variant"]], *scenes, *costs])
-        heads = [what, "scenes", "out of time", "end worse", "elsewhere by 1e-3", "largest difference"]
-        return table([*heads, *COSTS], lines)
+        heads = [what, "scenes", "out of time", "end worse", "elsewhere", "largest", *COSTS]
+        return table(heads, lines)
 
     return made
 
