@@ -23,9 +23,9 @@ language = "en"
 extensions = [
     "myst_parser",  # pages in Markdown
     "sphinx.ext.autodoc",  # reference from docstrings
-    "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",  # equations without a network
 ]
+extensions += ["sphinx.ext.viewcode"] * ("quick" not in tags)  # noqa: F821, 70 s of 166
 extensions += ["sphinx_copybutton"] * (find_spec("sphinx_copybutton") is not None)
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -13,7 +13,7 @@ type(pytest.approx(1.0)).DEFAULT_ABSOLUTE_TOLERANCE = 0.0
 
 
 def pytest_addoption(parser):
-    parser.addoption("--damaged", type=int, default=250, help="damaged files of each format in a slow test")
+    parser.addoption("--damaged", type=int, default=100, help="damaged files of each format in a slow test")
     parser.addoption("--kills", type=int, default=6, help="kills of each scene in a slow test")
 
 
