@@ -262,7 +262,7 @@ def _archive(path, rng):
 def _other_kind(array, rng):
     kind = rng.choice(("f4", ">f8", "i8", "u1", "?", "U3", "S4", "c16", "M8[s]"))
     with np.errstate(all="ignore"):
-        return (array if array.dtype.kind not in "UO" else np.array([1.0, 2.0])).astype(kind)
+        return (array.real if array.dtype.kind not in "UO" else np.array([1.0, 2.0])).astype(kind)
 
 
 def _other_shape(array, rng):
