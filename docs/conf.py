@@ -25,7 +25,8 @@ extensions = [
     "sphinx.ext.autodoc",  # reference from docstrings
     "sphinx-mathjax-offline",  # equations without a network
 ]
-extensions += ["sphinx.ext.viewcode"] * ("quick" not in tags)  # noqa: F821, 70 s of 166
+# highlighted sources, nearly half of the time, but with `-t quick`; sphinx knows `tags`
+extensions += ["sphinx.ext.viewcode"] * ("quick" not in tags)  # noqa: F821
 extensions += ["sphinx_copybutton"] * (find_spec("sphinx_copybutton") is not None)
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
