@@ -253,7 +253,7 @@ def campaigns(rows: list[Found]) -> str:
     return table(["seed", *(row["seed"] for row in rows)], lines)
 
 
-#: what a way to run a scene may cost
+#: what a way to run a scene may cost, in the scenes in which it acts
 COSTS = ("iterations", "factorisations")
 #: ways to run a scene that should end as it does, in words
 WAYS = {
@@ -292,17 +292,17 @@ SAFEGUARDS = {
 def ends(words: dict[str, str], what: str) -> Callable[[list[Found]], str]:
     """What shows how drawn scenes end on other ways, which have these `words`."""
 
-    def made(rows: list[Found]) -> str:
+    def shown(rows: list[Found]) -> str:
         lines = []
         for row in sorted(rows, key=lambda row: [*words].index(row["variant"])):
             late = str(int(row["scenes"]) - int(row["compared"]))
             scenes = [row["compared"], late, *(row[name] for name in ("worse", "elsewhere", "largest"))]
             costs = [f"x {float(row[name]):.2f}" for name in COSTS]
-            lines.append([words[row["variant"]], *scenes, *costs])
-        heads = [what, "scenes", "out of time", "end worse", "elsewhere", "largest", *COSTS]
+            lines.append([words[row["variant"]], *scenes, row["acts"], *costs])
+        heads = [what, "scenes", "out of time", "worse", "elsewhere", "largest", "acts in", *COSTS]
         return table(heads, lines)
 
-    return made
+    return shown
 
 
 def rows_of(text: str) -> list[Found]:

@@ -127,7 +127,7 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
 def test_blocks_that_take_long_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     run(page, {"takes long"}, capsys)
-    assert Path("footprint.png" if page == "gallery.md" else "pairs.csv").exists()
+    assert [*tmp_path.iterdir()]
 
 
 @pytest.mark.xarray

@@ -36,6 +36,8 @@ VARIANTS = ("kept", "predicted", "solver", "compiled", "input", "steps")
 #: so many times the steps
 FACTORS = {"steps": 2, "steps4": 4, "steps8": 8}
 TIMEOUT = "timeout"
+#: counts that tell scenes in which a variant acts, and what it costs there
+COSTS = ("iterations", "factorisations")
 #: compiled modules, without which the readable forms run
 COMPILED = ("loops", "solids", "contact", "cholesky")
 FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
@@ -165,9 +167,11 @@ def summed(before: Path, after: Path, tolerance: float) -> Row:
     found = {"variant": after.stem, "seed": keys[0][0], "scenes": len(both), "compared": len(keys)}
     found |= {"worse": sum(ends), "elsewhere": sum(one > tolerance for one in apart)}
     found |= {"largest": f"{max((one for one in apart if one < float('inf')), default=0.0):.2g}"}
-    for name in ("iterations", "factorisations"):
-        sums = [sum(float(table[key][name] or 0.0) for key in keys) for table in (first, second)]
-        found[name] = f"{sums[1] / sums[0]:.3g}"
+    acts = [key for key in keys if any(first[key][name] != second[key][name] for name in COSTS)]
+    found["acts"] = len(acts)
+    for name in COSTS:
+        sums = [sum(float(table[key][name] or 0.0) for key in acts) for table in (first, second)]
+        found[name] = f"{sums[1] / sums[0]:.3g}" if acts else 1
     return {name: str(value) for name, value in found.items()}
 
 
