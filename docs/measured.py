@@ -299,7 +299,7 @@ def ends(words: dict[str, str], what: str) -> Callable[[list[Found]], str]:
             scenes = [row["compared"], late, *(row[name] for name in ("worse", "elsewhere", "largest"))]
             costs = [f"x {float(row[name]):.2f}" for name in COSTS]
             lines.append([words[row["variant"]], *scenes, row["acts"], *costs])
-        heads = [what, "scenes", "timeouts", "worse", "elsewhere", "largest", "acts in", *COSTS]
+        heads = [what, "scenes", "timeouts", "worse", "elsewhere", "largest", "acts", *COSTS]
         return table(heads, lines)
 
     return shown
