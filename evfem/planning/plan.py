@@ -26,7 +26,7 @@ from evfem.planning.cost import needs
 from evfem.planning.loaddrift import drifting
 from evfem.planning.parts import check_components
 from evfem.planning.plausibility import implausible, jumps, locking, touching_traction
-from evfem.planning.resolution import oscillating, skipped, steps_line, too_fast, unresolved
+from evfem.planning.resolution import aliased, oscillating, skipped, steps_line, too_fast, unresolved
 from evfem.planning.rooms import rooms_of
 from evfem.planning.timescales import left_out, time_scales
 from evfem.protocols import TimeSignal
@@ -176,6 +176,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     closing = Closing(scene, mesh)
     others = (
         unresolved(scene, mesh),
+        aliased(scene, mesh),
         too_fast(scene),
         left_out(scene),
         unseen(closing),

@@ -39,6 +39,8 @@ AUTO = "auto"
 PER_PERIOD = 20.0
 #: fraction of its range by which a profile may vary between two rows
 SKIPPED = 0.2
+#: rows in a wave of the surface, at least: with fewer it shows as a longer one
+ROWS_PER_WAVE = 2.0
 
 
 def unresolved(scene: Scene, mesh: Mesh) -> str | None:
@@ -144,6 +146,44 @@ def skipped(scene: Scene) -> Iterator[str]:
                 f"motion {i} has rows {abs(way) / motion.steps:.3g} mm apart, and between them what is "
                 f"prescribed over the position varies by {off / whole:.0%} of its range: more steps show it"
             )
+
+
+def aliased(scene: Scene, mesh: Mesh) -> str | None:
+    """A sentence if waves with fewer than `ROWS_PER_WAVE` rows of any slide are needed for all but `SKIPPED`
+    of the variance of the surface's height or friction, else None: the curve over the position then has
+    waves that are not there. A slide with coarser rows than another only leads to where that one begins.
+    """
+    slides = [(i, one, one.course) for i, one in enumerate(scene.motion) if one.course.distance]
+    rows = [(abs(course.distance) / one.steps, i, course) for i, one, course in slides if one.steps > 1]
+    if not rows:
+        return None
+    apart, finest, course = min(rows, key=lambda row: row[:2])
+    pad = mesh.points[mesh.node_sets["pad"], ::2]
+    reach = float(np.ptp(pad, axis=0).max()) + sum(abs(course.distance) for *_, course in slides)
+    way = np.linspace(-0.5 * reach, 0.5 * reach, int(np.clip(2 * PER_SPACING * reach / apart, 2, MOST)))
+    places = pad.mean(axis=0) + way[:, None] * np.array(course.direction)[: mesh.dim - 1]
+    surface: Any = scene.ground
+    for what, values in (("height", surface.relief(places)[0]), ("friction", surface.friction_at(places))):
+        wave = _shortest_wave(values, way[1] - way[0])
+        if wave < ROWS_PER_WAVE * apart:
+            needed = math.ceil(ROWS_PER_WAVE * abs(course.distance) / wave)
+            return (
+                f"slides have rows {apart:.3g} mm apart or more, and the surface's {what} waves of "
+                f"{wave:.2g} mm: with fewer than {ROWS_PER_WAVE:g} rows in a wave curves over the position "
+                f"have longer waves that are not there; take more than {needed} steps in motion {finest}"
+            )
+    return None
+
+
+def _shortest_wave(values: Floats, step: float) -> float:
+    """The wavelength above which all but `SKIPPED` of the variance of evenly spaced values lies; infinite
+    where they are even.
+    """
+    if np.ptp(values) <= 1e-9 * np.abs(values).max():
+        return math.inf
+    power = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values)))) ** 2
+    known = int(np.searchsorted(np.cumsum(power), (1.0 - SKIPPED) * power.sum()))
+    return len(values) * step / max(known, 1)
 
 
 def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:

@@ -341,6 +341,28 @@ def test_grooves_between_the_nodes_are_warned_of():
     assert [Path(one.filename).name for one in caught] == ["test_plausibility.py"]
 
 
+STRIPES = Flat(friction=np.column_stack([X, 0.3 + 0.1 * np.sin(2.0 * np.pi * X)]).tolist())
+WAVES = Sinusoid(terms=[[0.02, 2.0 * np.pi, 0.0], [0.004, 4.0 * np.pi, 0.0]], friction=0.3)
+
+
+@pytest.mark.parametrize(("what", "surface"), [("height", WAVES), ("friction", STRIPES)])
+def test_waves_with_fewer_than_two_rows_are_warned_of(what, surface):
+    """Waves of 1 mm, with a weak second harmonic: as fine as the rows of the finest slide allow."""
+
+    def told(*slides):
+        pressed = Scene(finger(block(40, 3)), surface, motion=[Press(indentation=0.02, steps=1), *slides])
+        return [one for one in plan(pressed).warnings if "rows" in one]
+
+    (said,) = told(ev.Slide(distance=-12.0, steps=20))
+    pattern = rf"slides have rows 0.6 mm apart or more, and the surface's {what} waves of (\S+) mm: .*"
+    wave, steps = re.fullmatch(pattern + r"take more than (\d+) steps in motion 1", said).groups()
+    assert float(wave) == pytest.approx(1.0, rel=0.1)
+    assert int(steps) == pytest.approx(24, rel=0.1)
+    assert not told(ev.Slide(distance=-12.0, steps=27))
+    assert not told(ev.Slide(distance=-12.0, steps=20), ev.Slide(distance=1.0, steps=4))
+    assert not told(ev.Slide(distance=-12.0, steps=1))  # its end alone is asked for
+
+
 @pytest.mark.parametrize("surface", [Flat(friction=0.0), Sinusoid(terms=[[0.05, 1.0, 0.0]], friction=0.0)])
 def test_what_the_nodes_can_feel_is_not(surface):
     assert plan(rubbed(surface)).warning is None
