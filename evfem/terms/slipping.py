@@ -3,6 +3,10 @@ r"""Nodes whose status or speed oscillates under a law of friction in the iterat
 The contact problem has the tangent of a law at the iterate. If the law rises steeply from rest and levels
 off, or has a kink, Newton's iterations may cycle: a node returns to an earlier speed. The root is then
 bracketed with the values of the law found so far (`OscillatingNodes`).
+
+At no force a law may be far steeper than under the next one: the bound of a `SlipMemory` is S, but no more
+than 20 p. With the tangent there a node that closes again would wedge, lift its neighbour off, and so on from
+node to node: it begins with the tangent from before it opened.
 """
 
 from __future__ import annotations
@@ -35,11 +39,21 @@ class OscillatingNodes:
         self._speed, self._change = np.full(size, np.nan), np.zeros(size)
         self._slope, self._slip = np.zeros(size), np.full(size, np.nan)
         self._fastest = np.zeros(size)
+        self._tangent = np.full((2, size), np.nan)
 
     def linearised(
         self, law: FrictionLaw, moving: Slipping, c: Ints, status: Ints, force: Floats
     ) -> Linearised:
         """The law linearised for nodes c (k,) at an iterate with statuses and shear forces (k,)."""
+        found = self._bracketed(law, moving, c, status, force)
+        was, now = self._tangent[:, c], np.array([found.slope, found.offset])
+        self._tangent[:, c] = now = np.where((status == OPEN) & ~np.isnan(was), was, now)
+        return replace(found, slope=now[0], offset=now[1])
+
+    def _bracketed(
+        self, law: FrictionLaw, moving: Slipping, c: Ints, status: Ints, force: Floats
+    ) -> Linearised:
+        """The same with the roots bracketed of nodes that oscillate."""
         self.watch(c, status, moving.speed)
         self._fastest[c] = np.maximum(self._fastest[c], moving.speed)
         here = moving.linearised(law)
