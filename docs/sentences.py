@@ -17,7 +17,10 @@ def fringe(found: Found) -> str:
         for pad in ("ridged", "smooth")
         for field in ("full", "local")
     )
-    over = [n[f"participants.full_over_measured.{case}"] for case in cases]
+    full, measured = (
+        [n[f"participants.{one}_median_mN.{case}"] for case in cases] for one in ("full", "measured")
+    )
+    over = [own / theirs for own, theirs in zip(full, measured, strict=True)]
     held = [n[f"participants.tilted_full_median_over_measured.{case}"] for case in cases]
     gain = max(abs(n[f"participants.gain_median.{case}"] - 1.0) for case in cases)
     flat, filling = n["spreading.smooth"], n["spreading.filled.smooth"]
@@ -61,7 +64,10 @@ def fingertip(found: Found) -> str:
 def fingerprint(found: Found) -> str:
     """What prints do to stiffness, in a sentence."""
     stiff = {key: value for key, value in found["numbers"].items() if key.endswith("stiffness_N_per_mm")}
-    across, along, *_ = (stiff[f"along.{way}.stiffness_N_per_mm"] for way in "xz")
+    ridged, smooth = (
+        1.0 - stiff[f"{one}.x.stiffness_N_per_mm"] / stiff[f"{one}.z.stiffness_N_per_mm"]
+        for one in ("along", "smooth")
+    )
     softer = {
         f"{one}.{way}": 100.0 * (1.0 - stiff[f"{one}.{way}.stiffness_N_per_mm"] / own)
         for way in "xz"
@@ -69,8 +75,8 @@ def fingerprint(found: Found) -> str:
         for one in ("whorl", "loop", "arch")
     }
     return filled(
-        f"Parallel ridges are {percent(1.0 - across / along)} softer across than along themselves; curved "
-        f"ones {spread(softer, '')} % softer than the smooth pad."
+        f"Parallel ridges are {percent(ridged)} softer across than along themselves, a smooth pad by "
+        f"{percent(smooth)} already; curved ones are {spread(softer, '')} % softer than the smooth pad."
     )
 
 

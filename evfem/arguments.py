@@ -19,8 +19,8 @@ from evfem.templates import TEMPLATES
 
 BAD_INPUT = 2
 STATUS = (
-    "exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk failed, "
-    "130 interrupted"
+    "exit status: 0 done, 1 checked ends differ or a voltage at its limit, 2 bad input, "
+    "3 a step did not converge, 4 disk failed, 130 interrupted"
 )
 #: completion of an argument in a shell, in the notation of shtab: `shtab --shell bash evfem.cli.parser`
 FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}

@@ -1,7 +1,7 @@
 """The command `evfem`: runs one command line and returns its exit status; heavy imports are lazy.
 
-Exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk or folder
-failed, 130 interrupted.
+Exit status: 0 done, 1 checked ends differ or a voltage at its limit, 2 bad input, 3 a step did not
+converge, 4 disk or folder failed, 130 interrupted.
 """
 
 from __future__ import annotations

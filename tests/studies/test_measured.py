@@ -13,9 +13,11 @@ import pytest
 import evfem as ev
 from evfem import data
 from evfem.studies import common, frequency
+from evfem.studies.fingertip import force_on
 from evfem.studies.measured import hovering, moving, pressed, touching
 from evfem.studies.measured.study import LEFT_OUT
 from evfem.studies.measured.table import Experiment, Row, numbers_of
+from evfem.surface.skin import make_skin
 
 DOCS = Path(__file__).parents[2] / "docs"
 KEPT = json.loads((DOCS / "results/measured.json").read_text(encoding="utf-8"))
@@ -113,18 +115,17 @@ def test_thresholds_by_hand():
 
 
 def test_hovering_fingers_are_those_of_the_closed_forms():
-    """Tilted, columns at the nodes of a fine mesh (4 % off where cells are wide) against those over the
-    turned ellipsoid; untilted, by another quadrature (polar, 0.1 %).
+    """Tilted, columns over the turned ellipsoid against those at the nodes of a mesh (4 % off where cells are
+    wide); untilted, by another quadrature (polar, 0.1 %).
     """
+    finger = ev.Fingertip(resolution="medium", ridges="none", posture=30.0, length=26.05)
+    skin = make_skin(mesh := finger.mesh())
     flat = {"strong_troxel": (2.446, 5.093, 2.546), "kaczmarek": (1.673, 2.848, 1.423)}
     for law, forces in flat.items():
         for (case, (voltage, gap)), force in zip(common.CASES.items(), forces, strict=True):
             assert NUMBERS[f"hover_flat.{law}.{case}.predicted"] == pytest.approx(force, rel=1e-3)
-            turned = ev.forces.outline_force(
-                common.LAWS[law], 16.68, 12.79, 26.05, gap, voltage, common.table2_layers(), tilt=30.0
-            )
-            own = NUMBERS[f"hover_30deg.{law}.{case}.predicted"]
-            assert own == pytest.approx(1e3 * turned, rel=0.04)
+            nodal = force_on(finger, mesh, skin, common.LAWS[law], voltage, gap)
+            assert NUMBERS[f"hover_30deg.{law}.{case}.predicted"] == pytest.approx(nodal, rel=0.04)
 
 
 def test_the_impedance_by_hand():
