@@ -58,7 +58,7 @@ class Electrical(Checked):
         "without it the region's local thickness",
     ] = None
     stratum_corneum_eps_r: Annotated[
-        float, number("a relative permittivity, at least 1", Within(1.0, 1e9)), "relative permittivity"
+        float, number("a relative permittivity from 1 to 1e9", Within(1.0, 1e9)), "relative permittivity"
     ] = 1650.0
     _table = "finger.electrical."
 

@@ -64,11 +64,11 @@ _SHARE = number("a fraction from 0 to 1", Within(0.0, 1.0))
 _INDEX = number("an exponent from 0.1 to 3", Within(0.1, 3.0))
 _RATIO = number("a ratio from 0 to 100", Within(0.0, 100.0))
 _EXPONENT = number("an exponent from -2 to 2", Within(-2.0, 2.0))
-_TIME = number("a time in s, larger than 0", Within(0.0, 1e6, above=True), "s")
+_TIME = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "s")
 _SLIP = number("a length in mm, larger than 0, up to 1000", Within(0.0, 1e3, above=True), "mm")
 _COEFFICIENT = Within(0.0)
 _INNER = "a coefficient, not negative, or a law of friction without a memory"
-_AT_REST = "a time in s, larger than 0, or inf"
+_AT_REST = "a time in s, larger than 0, up to 1e6, or inf"
 
 
 class NamedFriction(Named):

@@ -318,7 +318,10 @@ def test_a_node_that_closes_again_does_not_wedge():
     pad = ev.FingerPad(resolution="coarse", ridges=False, viscosity=0.0168)
     display = ev.Display(ev.Layer(0.178, 10.3), friction=0.77)
     motion = [ev.Press(indentation=0.18, steps=2), ev.Slide(0.4, steps=3, speed=130.0, hold="force")]
-    settings = {"friction_law": ev.SlipMemory(0.5, 0.2), "solver": ev.Solver(element="q1_fbar", dynamics="viscous")}
+    settings = {
+        "friction_law": ev.SlipMemory(0.5, 0.2),
+        "solver": ev.Solver(element="q1_fbar", dynamics="viscous"),
+    }
     result = ev.simulate(ev.Scene(pad, display, ev.Kaczmarek(), 2600.0, motion, breakdown="off", **settings))
     assert result.newton_iterations.max() <= 10
     assert result.substeps.max() == 1

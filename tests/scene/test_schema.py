@@ -2,9 +2,13 @@
 of the files, but not stricter.
 """
 
+import importlib
+import math
+import pkgutil
 import re
 import tomllib
 from contextlib import suppress
+from dataclasses import is_dataclass
 from decimal import Decimal
 
 import jsonschema
@@ -13,7 +17,9 @@ import tomli_w
 from tools.meshes import square_mesh
 from tools.refusals import refuses
 
+import evfem
 from evfem import FingerPad, Grating, NeoHookean, Probe, templates
+from evfem.common.checks import Checked, Within, keys_of
 from evfem.common.units import SIZES, UNITS
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
@@ -26,6 +32,8 @@ from evfem.sweeps import file as sweepfile
 from evfem.sweeps import file as sweeps
 from evfem.tissue.laws import LAWS
 
+#: the largest seed of random numbers
+SEEDS = 2**63 - 1
 #: a scene for each table, with the dotted place of the table
 SLIDE = """
 version = 1
@@ -84,6 +92,43 @@ def test_every_key_says_what_it_is_and_what_is_allowed():
         for key in one.keys:
             assert key.meaning, key
             assert key.allowed, key
+
+
+#: words that stand for a bound of 0
+NOTHING = re.compile("not negative|above zero|positive|above 0|larger than 0")
+#: keys whose words name a bound that is none of numbers: (class, key)
+ELSE = {("Vibration", "friction_rms")}
+
+
+def ranges():
+    """(class, key) of every part of a scene, a sweep or a command, words and bounds of numbers in a range."""
+    for module in pkgutil.walk_packages(evfem.__path__, "evfem."):
+        if "studies" not in module.name and "__main__" not in module.name:
+            importlib.import_module(module.name)
+    parts = [Checked]
+    for part in parts:
+        parts += part.__subclasses__()
+    named = {part for part in parts if part.__module__.startswith("evfem") and is_dataclass(part)}
+    for part in sorted(named, key=lambda one: one.__name__):
+        for key in keys_of(part):
+            if isinstance(bounds := key.rule.get("test"), Within) and (part.__name__, key.name) not in ELSE:
+                yield part.__name__, key.name, key.rule["allowed"], bounds
+
+
+def test_the_words_of_a_range_have_its_bounds():
+    tried = 0
+    for part, key, words, bounds in ranges():
+        if "whole number" in words and bounds.high == SEEDS:
+            continue
+        numbers = {float(one) for one in re.findall(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?", words)}
+        numbers |= {-max(numbers)} if re.search("within|either way", words) else set()
+        numbers |= {0.0} if NOTHING.search(words) else set()
+        for bound in (bounds.low, bounds.high):
+            assert math.isinf(bound) or bound in numbers, (part, key, words, bound)
+        outside = bool(re.search("above|larger than|positive", words))
+        assert bounds.above == outside, (part, key, words)
+        tried += 1
+    assert tried > 100
 
 
 def test_the_defaults_are_those_of_a_scene(scene_schema):
