@@ -35,9 +35,9 @@ State = Any
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
 STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
-_STIFFNESS = number("a stiffness in N/mm, larger than 0", Within(0.0, 1e9, above=True), "N/mm")
-_DAMPING = number("a damping in N s/mm, not negative", Within(0.0, 1e9), "N s/mm")
-_MASS = number("a mass in t, not negative", Within(0.0, 1e3), "t")
+_STIFFNESS = number("a stiffness in N/mm, larger than 0, up to 1e9", Within(0.0, 1e9, above=True), "N/mm")
+_DAMPING = number("a damping in N s/mm, not negative, up to 1e9", Within(0.0, 1e9), "N s/mm")
+_MASS = number("a mass in t, not negative, up to 1e3", Within(0.0, 1e3), "t")
 
 
 @dataclass(frozen=True)

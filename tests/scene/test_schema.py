@@ -8,7 +8,7 @@ import pkgutil
 import re
 import tomllib
 from contextlib import suppress
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from decimal import Decimal
 
 import jsonschema
@@ -19,7 +19,7 @@ from tools.refusals import refuses
 
 import evfem
 from evfem import FingerPad, Grating, NeoHookean, Probe, templates
-from evfem.common.checks import Checked, Within, keys_of
+from evfem.common.checks import Within, keys_of
 from evfem.common.units import SIZES, UNITS
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
@@ -102,14 +102,11 @@ ELSE = {("Vibration", "friction_rms")}
 
 def ranges():
     """(class, key) of every part of a scene, a sweep or a command, words and bounds of numbers in a range."""
-    for module in pkgutil.walk_packages(evfem.__path__, "evfem."):
-        if "studies" not in module.name and "__main__" not in module.name:
-            importlib.import_module(module.name)
-    parts = [Checked]
-    for part in parts:
-        parts += part.__subclasses__()
-    named = {part for part in parts if part.__module__.startswith("evfem") and is_dataclass(part)}
-    for part in sorted(named, key=lambda one: one.__name__):
+    names = [one.name for one in pkgutil.walk_packages(evfem.__path__, "evfem.")]
+    modules = [importlib.import_module(name) for name in names if "studies" not in name and "__" not in name]
+    types = {part for module in modules for part in vars(module).values() if isinstance(part, type)}
+    parts = [part for part in types if is_dataclass(part) and "Annotated" in str(fields(part))]
+    for part in sorted(parts, key=lambda one: one.__name__):
         for key in keys_of(part):
             if isinstance(bounds := key.rule.get("test"), Within) and (part.__name__, key.name) not in ELSE:
                 yield part.__name__, key.name, key.rule["allowed"], bounds
