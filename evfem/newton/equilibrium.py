@@ -78,9 +78,12 @@ class Equilibrium:
 
     def restart(self, old: State, target: Target) -> State:
         """The accepted state where a requested step to `target` begins, whose prescribed speeds may jump."""
-        for room in (*self.rooms, self.attraction):
-            old = old.remembering(room.restart(old, target))
-        return old
+        return old.remembering(self.set_anew(old, target))
+
+    def set_anew(self, old: State, target: Target) -> dict[str, Floats]:
+        """What of its memory does not depend on the steps before."""
+        rooms = (*self.rooms, self.attraction)
+        return {name: kept for room in rooms for name, kept in room.restart(old, target).items()}
 
     def begin(self, old: State, target: Target) -> Target:
         """Start a trial step from `old`, from which every room takes its increments. Returns the target with

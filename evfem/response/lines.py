@@ -10,7 +10,7 @@ derivative of the states at fixed parameter, in one more model of the scene (`Li
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -56,11 +56,11 @@ UNKNOWN, SURFACE_FIELDS = (
     ("memory.surface_displacement", "memory.surface_gradient"),
 )
 #: fields of a state with the kinks of the attraction
-NONSMOOTH_FIELDS = ("attraction", "memory.charges")
+NONSMOOTH_FIELDS = ("attraction", "memory.charges", "memory.forces.")
 TIED = "several nodes touch the surface first, and which one is next depends on the sign of the change"
 LOST = "the linear equations of step {} were not solved"
 #: endings of columns with units that are counts all the same: not differentiable
-DISCRETE = ("contact_width", "contact_area", "mean_contact_pressure")
+DISCRETE = ("contact_width", "contact_area", "mean_contact_pressure", "breakdown_x")
 #: columns without a unit that are smooth
 SMOOTH_RATIOS = (*COEFFICIENTS,)
 Jumps = Sequence[Steps]
@@ -187,6 +187,11 @@ class Line:
     def runs(self) -> list[Beside]:
         """All perturbed runs."""
         return self.beside if self.wide is self.beside else [*self.beside, *self.wide]
+
+    def forget(self, anew: Iterable[str]) -> None:
+        """What memories with these names are set to where a requested step begins has no derivative."""
+        for name in {f"memory.{one}" for one in anew} & set(self.state):
+            self.state[name] = 0.0 * self.state[name]
 
     # -- a substep
 
@@ -341,7 +346,7 @@ class Line:
             near, margins = self._slopes(substep, jumps, change, way, ask)
             along = self._slopes(substep, jumps, change, FAR * self.longest, ask)[0]
             rate = margins + difference([one.margins(substep.new) for one in equations], step)
-        along |= {name: value for name, value in near.items() if name in NONSMOOTH_FIELDS}
+        along |= {name: value for name, value in near.items() if name.startswith(NONSMOOTH_FIELDS)}
         state = added(by_parameter, along) | change
         counts = np.isfinite(substep.margins) & np.isfinite(rate) & (rate != 0.0)
         reach = np.abs(substep.margins[counts] / rate[counts])

@@ -143,6 +143,9 @@ class _Differentiated:
         for each in (one for line in self._followed for one in line.runs):
             each.request = next(each.requests)
         self._request, self._calls = request, []
+        anew = self.run.model.equilibrium.set_anew(self.run.state, request.path(0.0, 1.0))
+        for line in self._followed:
+            line.forget(anew)
         self.run.advance(replace(request, path=path))
         if not self.stopped and self.run.rows[-1]["relaxations"]:
             self._stop(SNAPPED)

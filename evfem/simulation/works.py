@@ -100,6 +100,8 @@ SNAP = 0.5
 #: fraction of the work of the internal forces, absolute values added, that is the solver's tolerance; of
 #: a body without forces `SMALLEST_FORCE` takes their place
 NOISE = 1e-7
+#: shear of a node relative to that after a substep below which it is none
+UNSHEARED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +191,8 @@ class SubstepWork:
         """
         old, new, slip = self.old, self.new, self._slip
         before, after = old.contact_force[:, 1:], new.contact_force[:, 1:]
-        begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > 0.0))
+        rounding = UNSHEARED * sizes(after) * sizes(slip)  # which way a node without shear points says nothing
+        begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > rounding))
         return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
 
     def pulled(self) -> dict[str, float]:
