@@ -20,9 +20,10 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.rooms import Column, Room
 from evfem.electrostatics.alternating import admittance
-from evfem.electrostatics.breakdown import Limited, across_gap, breakdown_voltage
+from evfem.electrostatics.breakdown import Limited, breakdown_voltage
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.localgaps import roughness_below
+from evfem.surface.surfaces import voltage_fraction
 
 #: of lengths in mm: C/mm2 per V/mm, and W per N mm/s
 PER_MM, MILLI = 1e-3 * eps_0, 1e-3
@@ -31,6 +32,20 @@ COLUMNS = (
     Column("current_rms", "A/mm", "into the electrode, effective, from the amplifier"),
     Column("power", "W/mm", "mean, from the amplifier"),
 )
+
+
+def finger_potential(model: Any, over: Floats, each: Any) -> Any:
+    """Potential of the finger over the voltage: 0 where it is grounded, else where as much current leaves it
+    as enters, by columns of the admittances `each` (P,) over the fractions `over` (P,) of the voltage.
+    """
+    return 0.0 if model.scene.grounded else np.sum(over * each) / np.sum(each)
+
+
+def admittance_of(model: Any, attraction: Any, pad: Any, frequency: float) -> complex:
+    """Current over voltage of a pad in S (in the plane S/mm), where electrodes have fractions of a source."""
+    each = nodal_admittances(attraction, pad, model.closing.electrics, frequency)
+    over = voltage_fraction(model.surface, pad.position[:, 0])
+    return complex(np.sum(over * (over - finger_potential(model, over, each)) * each))
 
 
 def nodal_admittances(attraction: Any, pad: Any, electrics: Any, frequency: float) -> Any:
@@ -51,8 +66,7 @@ class Load(Room):
         order, share = electrics.harmonics
         order, share = order[electrics.smooth], share[electrics.smooth]
         frequency = electrics.frequency * order
-        each = [nodal_admittances(model.attraction.parts[0], pad, electrics, one) for one in frequency]
-        found = np.array([one.sum() for one in each])
+        found = np.array([admittance_of(model, model.attraction.parts[0], pad, one) for one in frequency])
         volts = abs(state.voltage)
         square = share * np.abs(found) ** 2
         return {
@@ -106,8 +120,13 @@ class Air(Room):
         attraction, electrics = model.attraction.parts[0], model.closing.electrics
         if electrics.resolved:
             return np.abs(attraction.charging.across(attraction.charged(pad)))
-        peak = electrics.crest * abs(pad.voltage)
-        return peak * across_gap(gap, attraction.layers, electrics.gap_eps_r)
+        volts = abs(pad.voltage) * electrics.peak_across(gap, attraction.layers)
+        over = voltage_fraction(model.surface, pad.position[:, 0])
+        if model.scene.grounded or not electrics.conducts:
+            each = attraction.carrying(pad) / (gap + electrics.gap_eps_r * electrics.reduced)
+        else:
+            each = nodal_admittances(attraction, pad, electrics, electrics.frequency)
+        return volts * np.abs(over - finger_potential(model, over, each))
 
     def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         yield from self._sparks(scene, rows)

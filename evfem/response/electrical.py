@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.circuit.load import nodal_admittances
+from evfem.circuit.load import admittance_of
 from evfem.common.arrays import Floats, blas_limits
 from evfem.common.checks import Values, to_python
 from evfem.common.storage import write_text
@@ -110,8 +110,8 @@ def electrical_impedance(
             run.advance(request)
     model = run.model
     attraction = make_attraction(model.closing, model.pad, model.surface)
-    pad, electrics = model.equilibrium.pad_state(run.state), model.closing.electrics
-    each = [nodal_admittances(attraction, pad, electrics, float(one)).sum() for one in frequency]
+    pad = model.equilibrium.pad_state(run.state)
+    each = [admittance_of(model, attraction, pad, float(one)) for one in frequency]
     in_space = model.mesh.dim == 3
     whole = 1.0 if in_space or scene.depth is None else scene.depth
     unit = "ohm" if in_space or scene.depth is not None else "ohm mm"

@@ -15,9 +15,9 @@ from evfem.circuit.signals import FollowForce, VoltageProfile, carrier_amplitude
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Values
 from evfem.electrostatics.alternating import SINGLE
-from evfem.electrostatics.breakdown import Limited
+from evfem.electrostatics.breakdown import Limited, across_gap
 from evfem.electrostatics.dielectrics import seen_at
-from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
+from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum, steady_layers
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import Sandwich
 from evfem.electrostatics.roughness import NONE, distribution_of
@@ -28,6 +28,8 @@ from evfem.protocols import TimeSignal
 
 #: voltages that follow from the charge of the electrode
 CHARGED = (OpenCircuit, ChargeControl)
+#: samples of a period in which peaks are sought
+SAMPLES = 1024
 #: thickness of the stratum corneum (mm) where only the mesh knows it
 SKIN = 0.4
 
@@ -159,12 +161,41 @@ class Electrics:
         """Peak of the scene's voltage over what a run has as voltage."""
         drive, given = self.drive, self.given
         if drive is None or drive.resolved:
-            return 1.0
+            averaged = drive is None and isinstance(given, Carrier) and not given.resolved
+            return float(carrier_amplitude(1.0)) if averaged else 1.0
         if (found := powers(given)) is not None:
             return float(given.largest / found[0])
         if isinstance(given, Carrier):
             return float(carrier_amplitude(1.0))
         return float(drive.peak(1.0))
+
+    def peak_across(self, gap: Floats, layers: Layers) -> Floats:
+        """Peak voltages (P,) of gaps (P,) in mm over what a run has as voltage. Under several harmonics a gap
+        that leaks has the sum of what each leaves it, which may be twice the peak of the source.
+        """
+        several = self.alternates and spectrum(self.drive, self.given)[0].size > 1  # type: ignore[arg-type]
+        if not (several and self.conducts):
+            return np.asarray(self.crest * across_gap(gap, layers, self.gap_eps_r))
+        amplitudes, stacks = self._period
+        shares = [0.0 * gap if one is None else gap / (gap + self.gap_eps_r * one) for one in stacks]
+        return np.abs(np.fft.irfft(amplitudes[:, None] * shares, SAMPLES, axis=0)).max(axis=0)
+
+    @cached_property
+    def _period(self) -> tuple[Any, list[Any]]:
+        """Complex amplitudes (h,) of an alternating voltage at its harmonics, over its effective value, and
+        the complex reduced thicknesses (mm) of the layers there; None where the gap has no field.
+        """
+        drive, given, at = self.drive, self.given, self.frequency
+        wave: Any = given
+        assert drive is not None
+        assert at is not None
+        found = powers(given)
+        wave, effective = (drive.signal(1.0), 1.0) if found is None else (wave, found[0])
+        volts = [wave((k + 0.5) / (SAMPLES * at)) / effective for k in range(SAMPLES)]
+        still = steady_layers((self.skin, self.insulator), drive, self.gap_eps_r)
+        layers = [still, *(self.layers_at(at * n) for n in range(1, SAMPLES // 2 + 1))]
+        stacks = [None if one is None else one.reduced + 1j * np.asarray(one.loss) for one in layers]
+        return np.fft.rfft(volts), stacks
 
     @cached_property
     def harmonics(self) -> tuple[Floats, Floats]:
@@ -209,6 +240,11 @@ class Electrics:
     def lossless(self, layer: Layer) -> Layer:
         """A layer with its real permittivity alone, at the drive's frequency or static without one."""
         return Layer(layer.thickness, seen_at(layer, self.frequency)[0])
+
+    @property
+    def reduced(self) -> Any:
+        """Reduced thickness (mm) of the solid layers without losses."""
+        return sum(one.thickness / one.eps_r for one in map(self.lossless, (self.skin, self.insulator)))
 
     @property
     def films(self) -> dict[str, Layer]:

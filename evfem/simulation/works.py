@@ -191,7 +191,7 @@ class SubstepWork:
         """
         old, new, slip = self.old, self.new, self._slip
         before, after = old.contact_force[:, 1:], new.contact_force[:, 1:]
-        rounding = UNSHEARED * sizes(after) * sizes(slip)  # which way a node without shear points says nothing
+        rounding = UNSHEARED * sizes(after) * sizes(slip)  # its sign says nothing
         begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > rounding))
         return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
 

@@ -107,6 +107,27 @@ def test_without_losses_it_is_a_capacitor():
     assert driven.charge[-1] == pytest.approx(driven.current_rms[-1] / (1e3 * np.pi), rel=1e-12)
 
 
+def test_electrodes_that_end_and_a_finger_without_ground_are_capacitors_in_series():
+    """Of two halves one is live: half of the current; without ground the finger joins both, with half of
+    that, and half of the voltage over each gap.
+    """
+    halves = ev.Display(electrodes=[[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]])
+    drive = ev.Drive(frequency=100.0, skin="gabriel_dry")
+    runs = [
+        scene(drive, finger=PAD, surface=one, motion=ev.Hover(0.1), field="full", grounded=ground)
+        for one, ground in ((ev.Display(), True), (halves, True), (halves, False))
+    ]
+    whole, live, floating = (ev.simulate(one) for one in runs)
+    assert live.current_rms[0] == pytest.approx(0.5 * whole.current_rms[0], rel=0.05)
+    assert floating.current_rms[0] == pytest.approx(0.5 * live.current_rms[0], rel=0.05)
+    assert floating.power[0] == pytest.approx(0.5 * live.power[0], rel=0.08)
+    assert live.breakdown[0] == pytest.approx(whole.breakdown[0], rel=0.01)
+    assert floating.breakdown[0] == pytest.approx(0.5 * live.breakdown[0], rel=0.05)
+    for one, result in zip(runs, (whole, live, floating), strict=True):
+        found = ev.electrical_impedance(one, [100.0]).current_rms(50.0)
+        assert result.current_rms[0] == pytest.approx(found[0], rel=1e-9)
+
+
 def test_a_square_wave_is_the_sum_of_its_first_sines():
     drive = ev.Drive(frequency=200.0, waveform="square", skin="gabriel_dry")
     square = ev.simulate(scene(drive=drive, roughness_gap=ROUGH))

@@ -76,3 +76,45 @@ def test_its_potential_has_its_traction_as_slope(law, loss):
         up, down = (np.asarray(limited.potential(gap + s * h, voltage, layers)) for s in (1.0, -1.0))
         assert (up - down) / (2.0 * h) == pytest.approx(limited.traction(gap, voltage, layers), rel=1e-6)
     assert limited.potential(1e3, 1777.0, layers) == law.potential(1e3, 1777.0, layers)
+
+
+GAP, SOLIDS, SIGMA = 0.05, 0.38 / 1650.0 + 0.001 / 3.9, 1e-7
+
+
+def hovering(voltage, **drive):
+    """The largest share of Paschen's voltage below a finger 50 um above a touchscreen."""
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    drive = ev.Drive(**drive) if drive else None
+    motion = [ev.Hover(GAP), ev.Wait(0.01, steps=1)]
+    result = ev.simulate(
+        ev.Scene(pad, ev.Display(insulator=ev.TOUCHSCREEN), ev.StrongTroxel(), voltage, motion, drive=drive)
+    )
+    return result.breakdown[0]
+
+
+def by_hand(volts):
+    return volts * GAP / (GAP + SOLIDS) / breakdown_voltage(GAP)
+
+
+@pytest.mark.parametrize(("frequency", "sigma"), [(50.0, SIGMA), (50.0, 10.0 * SIGMA), (5000.0, SIGMA)])
+def test_a_gap_that_leaks_has_up_to_twice_a_square_wave(frequency, sigma):
+    """It is charged through the layers with tau = (1 + g / s) eps_0 / sigma: 2 / (1 + exp(-T / 2 tau)) of the
+    share of a gap that holds, where the voltage flips.
+    """
+    tau = (1.0 + GAP / SOLIDS) * ev.eps_0 / sigma
+    found = hovering(40.0, frequency=frequency, waveform="square", gap_conductivity=sigma)
+    assert found == pytest.approx(by_hand(80.0 / (1.0 + np.exp(-0.5 / frequency / tau))), rel=0.02)
+
+
+def test_a_bias_leaves_a_gap_that_leaks_no_field():
+    """Of 30 V and a sine of 60 V at 50 Hz the sine alone, by what the stack of gap and layers leaves it."""
+    held = 1.0 / (1.0 + SIGMA / (2j * np.pi * 50.0 * ev.eps_0))
+    share = GAP * held / (GAP * held + SOLIDS)
+    wanted = 60.0 * abs(share) / breakdown_voltage(GAP)
+    assert hovering(ev.Sine(50.0, 60.0, bias=30.0), gap_conductivity=SIGMA) == pytest.approx(wanted, rel=2e-3)
+    holds = hovering(ev.Sine(50.0, 60.0, bias=30.0), frequency=None)
+    assert holds == pytest.approx(by_hand(90.0), rel=2e-3)
+
+
+def test_an_averaged_carrier_has_its_peak_without_a_drive_too():
+    assert hovering(ev.Carrier(1e4, 40.0, resolved=False)) == pytest.approx(by_hand(40.0), rel=2e-3)
