@@ -32,6 +32,8 @@ COLUMNS = (
     Column("current_rms", "A/mm", "into the electrode, effective, from the amplifier"),
     Column("power", "W/mm", "mean, from the amplifier"),
 )
+#: those that are means over each step where the voltage is resolved in time
+STEP_MEANS = ("current_rms", "power")
 
 
 def finger_potential(model: Any, over: Floats, each: Any) -> Any:

@@ -187,8 +187,16 @@ Parameter = Keyed | ShapeChange
 
 
 def scene_of(source: Any) -> Scene:
-    """The scene given as such, as the path of its file, or by its `Result`."""
-    return source.scene if isinstance(source, Result) else scenefile.scene_at(source)
+    """The scene given as such, as a path of its file, or by its `Result`, which is run again: InputError for
+    a result that ended before its scene.
+    """
+    if not isinstance(source, Result):
+        return scenefile.scene_at(source)
+    done, asked = len(source.step), source.scene.total_steps
+    if done < asked:
+        allowed = "a whole result, or a scene that ends there: its own one is run again, to its end"
+        raise InputError("scene", f"a result that ended after {done} of {asked} steps", allowed)
+    return source.scene
 
 
 def parameter_of(scene: Scene, wanted: Any) -> Parameter:

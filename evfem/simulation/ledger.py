@@ -220,13 +220,26 @@ def _fields(
         "gap": on_pad(surface.gap, np.nan),
         "contact_pressure": on_pad(tractions(interface, state, pressing, pressing), 0.0),
         "shear_traction": on_pad(tractions(interface, state, pressing, _shear(state)), 0.0),
-        "electrostatic_traction": on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
+        "electrostatic_traction": on_pad(_electrostatic(interface, attraction, state) / pulled, 0.0),
         "surface_sink": on_pad(interface.foundation.sink(state), 0.0),
         "contact_status": on_pad(status, 0).astype(np.int64),
         "von_mises": _von_mises(stress),
         "cauchy_stress": stress,
         "J": J,
     }
+
+
+def _electrostatic(interface: Interface, attraction: PadTraction, state: State) -> Floats:
+    """Attraction (P,) of the voltage, N/mm or N, with what its regularised law removes; without adhesion."""
+    pull = interface.foundation.turned_back(state, state.attraction)
+    for other in attraction.parts[1:]:
+        pull = pull - state.memory[f"forces.{other.name}"]
+    for first in attraction.parts[:1]:
+        if first.name == ELECTROSTATIC and first.acts(state.voltage):
+            both = attraction.restored(state.voltage)[0]
+            share = first.restored(state.voltage)[0] / np.where(both > 0.0, both, np.inf)
+            return np.asarray(reduce(np.hypot, pull.T) + share * interface.withheld(state))
+    return np.zeros(len(pull))
 
 
 def _shear(state: State) -> Floats:

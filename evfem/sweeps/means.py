@@ -8,13 +8,15 @@ The mean of a column c is over the time t where time passes, else over the way s
 
 with the column linear within each step, as the trapezoidal rule has it (error of second order in the steps).
 The state before the first step of a run is in no row: that step counts with its end. A ramp of the voltage
-is no way, and alone it counts by its equal steps; so do columns that count something of each step.
+is no way, and alone it counts by its equal steps; so do columns that count something of each step. Columns
+that are means over each step, the supply of a drive resolved in time, count as such.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from evfem.circuit.load import STEP_MEANS
 from evfem.common.arrays import Floats
 from evfem.simulation.history import INTEGERS, SAME
 from evfem.simulation.result import Result
@@ -35,7 +37,8 @@ def mean(result: Result, column: str, motion: int | None = None) -> tuple[float,
     """
     values, rows = np.asarray(getattr(result, column), dtype=float), chosen(result, motion)
     weights, over = (np.ones(len(values)), "steps") if column in PER_STEP else weighed(result, rows)
-    before = values if over == "steps" else np.append(values[:1], values[:-1])
+    whole_step = over == "steps" or (column in STEP_MEANS and "source_work" in result.columns)
+    before = values if whole_step else np.append(values[:1], values[:-1])
     return float(np.average(0.5 * (before + values)[rows], weights=weights[rows])), over
 
 

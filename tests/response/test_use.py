@@ -242,3 +242,17 @@ def test_parameters_that_err_together_cancel_or_add():
 def test_a_matrix_that_is_no_correlation_is_refused(given, said):
     with pytest.raises(ev.InputError, match=f"correlation: .*{said}"):
         ev.uncertainty(hovering(), dict.fromkeys(INSULATOR, 0.01), ["electrostatic_force"], correlation=given)
+
+
+def test_a_result_that_ended_early_is_not_run_further():
+    """Its whole scene slides on until all slips, where the impedance is another one."""
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    motion = [ev.Press(force=0.05, steps=1), ev.Slide(0.5, steps=4, hold="force")]
+    asked = ev.Scene(pad, ev.Flat(friction=0.4), motion=motion)
+    result = ev.simulate(asked, observers=[ev.StopWhen("tangential_force > 1e-4")])
+    assert len(result.step) < asked.total_steps
+    said = f"scene: given a result that ended after {len(result.step)} of 5 steps"
+    for ask in (ev.impedance, ev.electrical_impedance):
+        refuses(said, ask, result, [10.0])
+    refuses(said, ev.sensitivities, result, "surface.friction")
+    refuses(said, ev.uncertainty, result, {"surface.friction": 0.01})

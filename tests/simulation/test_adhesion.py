@@ -271,3 +271,19 @@ FULL = {"law": ev.StrongTroxel(), "voltage": 10.0, "field": "full"}
 )
 def test_what_is_no_adhesion_is_refused(make, message):
     refuses(message, make)
+
+
+@pytest.mark.parametrize("voltage", [0.0, 60.0])
+def test_the_field_of_the_attraction_is_that_of_the_voltage_alone(voltage):
+    """Times what nodes stand for it is the column `electrostatic_force`, not that and the adhesion."""
+    display = ev.Display(insulator=ev.TOUCHSCREEN, friction=0.4)
+    water = {"adhesion": ev.Capillary(0.0728, 40.0, 0.02), "roughness_gap": 0.005}
+    result = ev.simulate(
+        ev.Scene(PAD, display, ev.StrongTroxel(), voltage, [ev.Press(force=0.05, steps=1)], **water)
+    )
+    pad, frame = result.mesh.node_sets["pad"], result.frames[-1]
+    x = (result.mesh.points + frame.displacement)[pad, 0]
+    spans = np.gradient(np.sort(x))[np.argsort(np.argsort(x))]
+    found = float(np.sum(frame.electrostatic_traction[pad] * spans))
+    assert found == pytest.approx(result.electrostatic_force[-1], rel=0.02, abs=1e-12)
+    assert result.adhesive_force[-1] > 1e-3
