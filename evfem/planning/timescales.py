@@ -15,7 +15,7 @@ from evfem.electrostatics.dielectrics import Dielectric, seen_at
 from evfem.electrostatics.drive import powers
 from evfem.electrostatics.laws import Layer
 from evfem.electrostatics.relaxation import Sandwich
-from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
+from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 
@@ -41,7 +41,7 @@ def time_scales(scene: Scene) -> str:
     parts = [f"{what}, {how}", *charge, f"mechanics: {follows}"]
     if drive.resolved and not getattr(scene.law, "of_a_field", False):
         parts.append("no balance of the source, which only Strong and Troxel's law has")
-    if not drive.resolved and at is not None:
+    if not drive.resolved and at is not None and _swings(scene):
         parts.append(f"left out: the swing of the attraction at {slowest_swing(scene):g} Hz")
     return "; ".join(parts)
 
@@ -88,6 +88,13 @@ def bandwidth(scene: Scene) -> float:
     return 1.0 / (2.0 * np.pi * slowest)
 
 
+def _swings(scene: Scene) -> bool:
+    """Whether the attraction swings within a period: not that of a square wave where nothing conducts."""
+    assert scene.drive is not None
+    square = scene.drive.waveform == "square" and powers(scene.voltage) is None
+    return not square or isinstance(scene.voltage, Carrier) or scene.electrics.conducts
+
+
 def slowest_swing(scene: Scene) -> float:
     """Lowest frequency (Hz) of the attraction: twice the voltage's; once with a bias or even harmonics."""
     at, found = scene.electrics.frequency or 0.0, powers(scene.voltage)
@@ -99,6 +106,8 @@ def left_out(scene: Scene) -> str | None:
     """A sentence if a mean over the cycle leaves out what moves the tissue, else None."""
     at, highest = scene.electrics.frequency, bandwidth(scene)
     if scene.drive is None or scene.drive.resolved or at is None or np.isinf(highest):
+        return None
+    if not _swings(scene):
         return None
     swing = slowest_swing(scene)
     if swing >= FOLLOWS * highest:

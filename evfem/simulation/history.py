@@ -105,7 +105,9 @@ class History:
         metadata=column("V", "effective; of the moment where it is resolved in time", "needed")
     )
     applied_force: Floats = field(metadata=column("N/mm", "down, on the bone", "needed"))
-    applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
+    applied_tangential_force: Floats = field(
+        metadata=column("N/mm", "along +x, in space along the slide's angle, on the bone")
+    )
     normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards", "shown"))
     tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x", "shown"))
     electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards", "shown"))

@@ -9,10 +9,13 @@ The mean of a column c is over the time t where time passes, else over the way s
 with the column linear within each step, as the trapezoidal rule has it (error of second order in the steps).
 The state before the first step of a run is in no row: that step counts with its end. A ramp of the voltage
 is no way, and alone it counts by its equal steps; so do columns that count something of each step. Columns
-that are means over each step, the supply of a drive resolved in time, count as such.
+that are means over each step, the supply of a drive resolved in time, count as such, and steps at whose ends
+a column is no number do not count.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -39,7 +42,9 @@ def mean(result: Result, column: str, motion: int | None = None) -> tuple[float,
     weights, over = (np.ones(len(values)), "steps") if column in PER_STEP else weighed(result, rows)
     whole_step = over == "steps" or (column in STEP_MEANS and "source_work" in result.columns)
     before = values if whole_step else np.append(values[:1], values[:-1])
-    return float(np.average(0.5 * (before + values)[rows], weights=weights[rows])), over
+    each = 0.5 * (before + values)
+    known = rows & np.isfinite(each) & (weights > 0.0)
+    return float(np.average(each[known], weights=weights[known])) if known.any() else math.nan, over
 
 
 def weighed(result: Result, rows: np.ndarray) -> tuple[Floats, str]:

@@ -291,7 +291,8 @@ def output(result: Result, name: str) -> float | None:
         found = mean(result, column, motion)[0]
     else:
         values = np.asarray(getattr(result, column), dtype=float)[chosen(result, motion)]
-        found = values[-1] if statistic == "last" else getattr(np, statistic)(values)
+        values = values[-1:] if statistic == "last" else values[np.isfinite(values)]
+        found = values[0] if len(values) == 1 else getattr(np, statistic)(values) if len(values) else math.nan
     return float(found) if math.isfinite(found) else None
 
 

@@ -111,3 +111,16 @@ def test_derivative_by_the_gap_follows_the_charges():
     slope = charging.effective(GAPS + 1j * step, 60.0, LENGTH).imag / step
     low, high = (charging.effective(GAPS + d, 60.0, LENGTH) for d in (-1e-7, 1e-7))
     np.testing.assert_allclose(slope, (high - low) / 2e-7, rtol=1e-5)
+
+
+def test_charges_that_pull_from_the_first_moment_are_no_snap():
+    """Half of their work on a finger that comes from afar is left over, as of a weight that is let go."""
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    motion = [ev.Hover(gap=0.5), ev.Wait(1.0, steps=1)]
+    drive = ev.Drive(resolved=True)
+    result = ev.simulate(ev.Scene(pad, ev.Display(), ev.StrongTroxel(), 1.0, motion, drive=drive))
+    assert result.jumps.tolist() == [0, 0]
+    assert result.snap_dissipation.tolist() == [0.0, 0.0]
+    half = 0.5 * result.electrostatic_work[0]
+    assert result.integrator_dissipation[0] == pytest.approx(half, rel=1e-3)
+    assert not result.warnings

@@ -135,6 +135,9 @@ def test_the_plan_warns_of_a_mean_that_the_tissue_would_follow():
     )  # fmt: skip
     assert "swings at 100 Hz, and the tissue follows up to 159 Hz" in str(ev.plan(slow).warning)
     assert "swings" not in str(ev.plan(replace(slow, drive=ev.Drive(500.0))).warning)
+    even, leaking = (ev.Drive(50.0, "square", gap_conductivity=sigma) for sigma in (0.0, 1e-8))
+    assert "swing" not in str(ev.plan(replace(slow, drive=even)))  # its square is constant
+    assert "swings at 100 Hz" in str(ev.plan(replace(slow, drive=leaking)).warning)
 
 
 def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():

@@ -46,6 +46,15 @@ def test_without_time_it_is_over_the_path_and_without_path_over_the_steps():
     assert mean(made(position=[1.0, 1.1, 9.0], substeps=[1, 2, 6]), "substeps") == (3.0, "steps")
 
 
+def test_rows_in_which_a_column_is_no_number_do_not_count():
+    """A finger that hovers has no coefficient of friction."""
+    result = made(time=[1.0, 2.0, 3.0, 4.0], motion_index=[0, 0, 1, 1], friction=[math.nan, 0.1, 0.3, 0.5])
+    assert mean(result, "friction") == (pytest.approx(0.3), "time")
+    assert [output(result, f"friction.{one}") for one in ("min", "max", "last")] == [0.1, 0.5, 0.5]
+    alone = made(time=[1.0, 2.0], friction=[math.nan, math.nan])
+    assert [output(alone, f"friction.{one}") for one in ("mean", "max", "last")] == [None] * 3
+
+
 def test_a_motion_begins_where_the_last_one_ended():
     """Of a straight rise from 1 to 3 it is 2, though the row with 1 belongs to the press."""
     result = made(motion_index=[0, 1], time=[0.0, 1.0], normal_force=[1.0, 3.0])
