@@ -220,8 +220,8 @@ class Amplifier:
 
     def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
         """The profile cut off at the smallest of its `limits`, then followed no faster than `slew` at `speed`
-        (mm/s), both exactly: with rows where it crosses the limit or catches up. Raises InputError for a slew
-        without a speed.
+        (mm/s), both exactly: with rows where it crosses the limit or catches up, which may be behind its last
+        row. Raises InputError for a slew without a speed.
         """
         cut = self._clipped(profile)
         if self.slew is None:
@@ -240,7 +240,9 @@ class Amplifier:
 
 
 def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
-    """The profile from its first row on, with its slope limited to `steepest` (V/mm)."""
+    """The profile from its first row on, with its slope limited to `steepest` (V/mm); behind its last
+    position it goes on to the last voltage, which holds there.
+    """
     now = float(profile.voltage[0])
     rows = [(float(profile.position[0]), now)]
     for i in np.flatnonzero(np.diff(profile.position) > 0):
@@ -257,4 +259,15 @@ def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
                 rows.append((x, now))
             now = last if abs(slope) <= steepest else now + np.sign(slope) * steepest * (end - x)
         rows.append((end, now))
-    return VoltageProfile(*np.array(rows).T)
+    return VoltageProfile(*np.array([*rows, *_settled(*rows[-1], profile, steepest)]).T)
+
+
+def _settled(x: float, now: float, profile: VoltageProfile, steepest: float) -> list[tuple[float, float]]:
+    """The row behind `x` (mm) where `now` (V) has come to the last voltage of the profile, none where it is
+    there to rounding; at the largest position at most.
+    """
+    lag = float(profile.voltage[-1]) - now
+    if abs(lag) <= 1e-12 * np.abs(profile.voltage).max():
+        return []
+    way = min(abs(lag) / steepest, LARGEST - x)
+    return [(x + way, now + np.sign(lag) * min(steepest * way, abs(lag)))] if way > 0.0 else []

@@ -115,6 +115,45 @@ def test_a_jump_is_climbed_and_a_slew_needs_a_speed():
     refuses("slew", Amplifier, 1000.0, slew=0.0)
 
 
+@pytest.mark.parametrize(
+    ("rows", "x", "volts"),
+    [
+        # 50 V/mm: 0 V at 1 mm, where the wish jumps to 100 V for ever; 100 V at 3 mm
+        (([0.0, 1.0, 1.0], [0.0, 0.0, 100.0]), [1.0, 2.0, 3.0, 5.0], [0.0, 50.0, 100.0, 100.0]),
+        # 25 V at the last row, 100 V 1.5 mm behind it
+        (([0.0, 1.0, 1.5], [0.0, 0.0, 100.0]), [1.0, 1.5, 3.0, 9.0], [0.0, 25.0, 100.0, 100.0]),
+        # falling, through 0
+        (([0.0, 1.0, 1.0], [50.0, 50.0, -50.0]), [1.0, 2.0, 3.0, 5.0], [50.0, 0.0, -50.0, -50.0]),
+        (([0.0, 1.0, 1.0], [-20.0, -20.0, -120.0]), [1.0, 2.0, 3.0, 5.0], [-20.0, -70.0, -120.0, -120.0]),
+        # constant before its first row, a jump there, and no other row
+        (([1.0, 1.0], [0.0, 100.0]), [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 50.0, 100.0, 100.0]),
+        (([1.0, 1.0, 2.0], [0.0, 100.0, 100.0]), [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 50.0, 100.0, 100.0]),
+        (([0.0], [70.0]), [-1.0, 0.0, 1.0], [70.0, 70.0, 70.0]),
+    ],
+)
+def test_a_profile_that_lags_behind_its_last_row_goes_on_to_its_last_voltage(rows, x, volts):
+    slow = Amplifier(200.0, slew=500.0).limit(VoltageProfile(*rows), speed=10.0)
+    np.testing.assert_allclose(slow(x), volts, rtol=1e-14, atol=1e-12)
+    assert slow.steepest() <= 50.0 * (1.0 + 1e-12)
+
+
+def test_a_profile_that_has_caught_up_ends_at_its_last_row():
+    """Caught up with to rounding it has no steep row more, and positions stay within those of a profile."""
+    random = np.random.default_rng(5)
+    for _ in range(200):
+        x, rate = np.cumsum(random.uniform(0.01, 1.0, 3)), random.uniform(10.0, 500.0)
+        wish = VoltageProfile([x[0], x[0], x[1], x[2]], [0.0, *[rate * (x[1] - x[0])] * 3])
+        slow = Amplifier(1e4, slew=rate).limit(wish, speed=1.0)
+        assert slow.steepest() <= rate * (1.0 + 1e-9)
+        assert slow.position[-1] == pytest.approx(x[2], rel=1e-12)
+        met = Amplifier(1e4, slew=rate).limit(VoltageProfile(wish.position[:3], wish.voltage[:3]), speed=1.0)
+        assert met.steepest() <= rate * (1.0 + 1e-9)
+        assert met.voltage[-1] == pytest.approx(wish.voltage[-1], rel=1e-11)
+    far = Amplifier(200.0, slew=1e-4).limit(VoltageProfile([0.0, 1.0, 1.0], [0.0, 0.0, 100.0]), speed=10.0)
+    assert far.position[-1] == 1e6  # the largest position, where 1e-5 V/mm have made 10 V
+    assert far.voltage[-1] == pytest.approx(10.0, rel=1e-5)
+
+
 FINGER = SimpleNamespace(
     frequency=np.array([1e3, 1e4]), impedance=np.array([-2e5j, 1e4 - 2e4j]), unit="ohm"
 )  # as of `ev.electrical_impedance`
