@@ -1,12 +1,13 @@
 """Voltage profiles: interpolation with jumps, effective value, amplifier limit, files."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tools.refusals import refuses
 
-from evfem.circuit.signals import Amplifier, VoltageProfile, carrier_amplitude
+from evfem.circuit.signals import Amplifier, VoltageProfile, carrier_amplitude, mean_squares, waves_in
 
 JUMP = VoltageProfile([0.0, 2.0, 2.0, 4.0], [10.0, 10.0, 100.0, 50.0])
 
@@ -31,6 +32,39 @@ def test_rms_is_exact_for_pieces():
     assert JUMP.rms(-5.0, -1.0) == 10.0
     dense = JUMP(np.linspace(0.5, 3.7, 2_000_001))
     assert JUMP.rms(0.5, 3.7) == pytest.approx(np.sqrt(np.mean(dense**2)), rel=2e-6)
+
+
+def test_mean_squares_are_those_of_rms_between_any_edges():
+    edges = np.linspace(-0.7, 5.1, 30)
+    found = mean_squares(JUMP, edges)
+    expected = [JUMP.rms(a, b) ** 2 for a, b in pairwise(edges)]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    narrow = mean_squares(JUMP, np.array([1.0, 1.0, 3.0, 3.0, 3.0]))  # too narrow for their floats
+    np.testing.assert_allclose(narrow[[0, 2, 3]], [100.0, 75.0**2, 75.0**2], rtol=1e-12)
+    assert narrow[1] == pytest.approx(JUMP.rms(1.0, 3.0) ** 2, rel=1e-12)
+
+
+X = np.linspace(0.0, 10.0, 4001)
+
+
+@pytest.mark.parametrize(
+    ("rows", "waves"),
+    [
+        ((X, 50.0 + 9.0 * np.cos(np.pi * X)), [2.0] * 9),
+        ((np.repeat([0, 1, 2, 3, 4], 2)[1:-1], [0, 0, 80, 80, -80, -80, 0, 0]), [2.0, 2.0]),
+        (([0.0, 1.1, 1.1, 1.3, 1.3, 5.0], [0.0, 0.0, 80.0, 80.0, 0.0, 0.0]), [0.4]),
+        ((np.repeat([0, 4, 4.1, 8, 8.1, 9], 2)[1:-1], [0, 0, 80, 80, 0, 0, 80, 80, 0, 0]), [0.4, 4.0, 0.4]),
+        ((X, 9.0 * np.abs(np.sin(np.pi * X))), [1.0] * 19),  # crests of 2/3 and troughs of 1/3
+        (([0.0, 1.0, 1.0, 2.0, 3.0], [0.0, 0.0, 80.0, 80.0, 90.0]), []),  # jump and ramp
+        ((X, np.where(X < 5.0, 0.0, 98.0) + 1.9 * np.sin(2.0 * np.pi * X / 0.1)), []),  # ripples of 4 %
+        (([0.0, 1.0, 1.0, 1.0, 2.0], [0.0, 0.0, 80.0, 0.0, 0.0]), []),  # a row that never holds
+        (([1.0], [5.0]), []),
+        (([1.0, 2.0], [0.0, 0.0]), []),
+    ],
+)
+def test_waves_are_two_widths_of_their_crests_and_troughs(rows, waves):
+    found = waves_in(VoltageProfile(*rows))
+    assert found.tolist() == pytest.approx(waves, rel=1e-2)
 
 
 def test_amplifier_cuts_exactly_at_its_limit():
