@@ -25,7 +25,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.circuit.signals import VoltageProfile, carrier_amplitude
+from evfem.circuit.signals import VoltageProfile, carrier_amplitude, mean_squares, warn_of_waves
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, among, check_fields, count, number, real, set_frozen
 from evfem.common.storage import replacing, write_text
@@ -105,9 +105,11 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     - `.wav`: PCM; sample k is the voltage at the first position + k speed / rate, rounded to full_scale /
       32767 (of 16 bit). Full scale, speed and first position stand in the comment (LIST/INFO/ICMT, JSON).
     - `.png`: friction map, 8-bit grey, columns along the slide: 0 natural friction, 255 that at full scale.
-      It is 255 (U / full_scale)^2, as attraction grows with U^2, in the middle of each column. The scale
+      It is 255 (U / full_scale)^2, as attraction grows with U^2: its mean over each column. The scale
       stands in the text chunk Comment (JSON), the size of a pixel in pHYs.
     - `.hjif`: MPEG haptics, see `haptics`.
+
+    Waves with less than two samples, pixels or ticks, which do not hold them, are warned of.
 
     Parameters
     ----------
@@ -157,10 +159,21 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     if ending == ".hjif":
         scale: Any = playback.full_scale, playback.speed, playback.friction, playback.carrier
         write_text(path, json.dumps(haptics(profile, *scale), separators=(",", ":")) + "\n")
-        return
-    data = _wav(profile, playback) if ending == ".wav" else _map(profile, playback)
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
+    else:
+        data = _wav(profile, playback) if ending == ".wav" else _map(profile, playback)
+        with replacing(path) as temporary:
+            temporary.write_bytes(data)
+    warn_of_waves(Path(path).name, profile, *_spaced(ending, profile, playback))
+
+
+def _spaced(ending: str, profile: VoltageProfile, playback: Playback) -> tuple[float, str, str]:
+    """Distance (mm) of the samples of a file, their name, and how they become closer."""
+    if ending == ".png":
+        return playback.pixel, "pixels", "a smaller `pixel`"
+    speed = playback.speed or 0.0
+    if ending == ".wav":
+        return speed / playback.rate, "samples", f"a `rate` above {playback.rate} Hz, or a slower slide"
+    return 10.0 ** (ticks(float(np.ptp(profile.position)), speed)[0] + 3), "ticks", "a shorter signal"
 
 
 def read_signal(path: str | Path) -> VoltageProfile:
@@ -285,13 +298,13 @@ def _map(profile: VoltageProfile, playback: Playback) -> bytes:
 
     columns = _number(profile, playback.pixel, MOST_COLUMNS, "columns")
     start = float(profile.position[0])
-    middle = _positions(columns, start + 0.5 * playback.pixel, playback.pixel)
-    fraction = np.minimum((profile(middle) / playback.full_scale) ** 2, 1.0)
+    squares = mean_squares(profile, _positions(columns + 1, start, playback.pixel))
+    fraction = np.minimum(squares / playback.full_scale**2, 1.0)
     grey = np.rint(255.0 * fraction).astype(np.uint8)
     natural, largest = playback.friction or (None, None)
     scale = {
         "format": MAP_FORM,
-        "grey": "255 (U / full scale)^2: 0 natural friction, 255 friction at full scale",
+        "grey": "255 (U / full scale)^2, mean over a pixel: 0 natural friction, 255 friction at full scale",
         "full_scale_V": playback.full_scale,
         "pixel_mm": playback.pixel,
         "start_mm": start,

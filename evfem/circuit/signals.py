@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.common.checks import Values, Within, above, check_fields, number, set_frozen, to_python
+from evfem.common.notices import warn
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
 from evfem.common.views import plus
@@ -21,6 +24,8 @@ from evfem.errors import ABSENT, InputError
 HEADER = {"position": "mm", "voltage": "V"}
 #: largest magnitude of a position (mm) and of a voltage (V)
 LARGEST = 1e6
+#: share of the largest voltage by which a wave swings that matters
+SWING = 0.05
 _POSITION = {"allowed": "positions in mm that never fall", "type": list[float], "unit": "mm"}
 _FORCE = {"allowed": "as many forces in N/mm", "type": list[float], "unit": "N/mm"}
 _LARGEST = number(f"a voltage in V, above 0, up to {LARGEST:g}", Within(0.0, LARGEST, above=True), "V")
@@ -77,11 +82,7 @@ class VoltageProfile:
         """
         if not (np.isfinite([start, stop]).all() and start < stop):
             raise InputError("start, stop", (start, stop), "two positions in mm, the second one larger")
-        inside = (self.position > start) & (self.position < stop)
-        x = np.concatenate([[start], self.position[inside], [stop]])
-        middle, half = 0.5 * (x[1:] + x[:-1]), 0.5 * np.diff(x)
-        square = sum(np.asarray(self(middle + side * half)) ** 2 for side in (-(3.0**-0.5), 3.0**-0.5))
-        return float(np.sqrt(np.sum(half * square) / (stop - start)))
+        return float(np.sqrt(mean_squares(self, np.array([start, stop], dtype=float))[0]))
 
     def steepest(self) -> float:
         """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in V/s."""
@@ -90,6 +91,67 @@ class VoltageProfile:
         if rise.size == 0:
             return 0.0
         return float(np.max(rise / run)) if np.all(run > 0) else float("inf")
+
+
+def mean_squares(profile: VoltageProfile, edges: Floats) -> Floats:
+    """Mean of U^2 (V^2, one less than `edges`) between neighbours of rising `edges` (mm): exact by two points
+    of Gauss on each straight piece, and U^2 itself where an interval is too narrow for its floats.
+    """
+    between = profile.position[(profile.position > edges[0]) & (profile.position < edges[-1])]
+    x, width = np.union1d(edges, between), np.diff(edges)
+    middle, half = 0.5 * (x[1:] + x[:-1]), 0.5 * np.diff(x)
+    square = sum(np.asarray(profile(middle + side * half)) ** 2 for side in (-(3.0**-0.5), 3.0**-0.5))
+    whole = np.add.reduceat(np.append(half * square, 0.0), np.searchsorted(x, edges[:-1]))
+    return np.where(width > 0.0, whole / np.where(width > 0.0, width, 1.0), profile(edges[:-1]) ** 2)
+
+
+def waves_in(profile: VoltageProfile) -> Floats:
+    """Wave (mm) of each crest and trough that swings by at least `SWING` of the largest voltage:
+    its width at half height and that of its wider neighbour, of at most three times that width.
+
+    Jumps and ramps are none; a single pulse counts as half a wave.
+
+    >>> waves_in(VoltageProfile([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 10.0, 0.0, 10.0, 0.0])).tolist()
+    [2.0, 2.0, 2.0]
+    """
+    x, u = profile.position, profile.voltage
+    passed = np.zeros(x.size, bool)  # the rows between two others at one position never hold
+    passed[1:-1] = x[2:] == x[:-2]
+    x, u, at = x[~passed], u[~passed], []
+    for a, b in pairwise(_turns(u.tolist(), SWING * float(np.abs(u).max()))):
+        middle, side = 0.5 * (u[a] + u[b]), np.sign(u[b] - u[a])
+        i = a + int(np.argmax(side * (u[a + 1 : b + 1] - middle) >= 0.0))
+        at.append(x[i] + (middle - u[i]) / (u[i + 1] - u[i]) * (x[i + 1] - x[i]))
+    widths = np.diff(at)
+    beside = np.pad(widths, 1)
+    wider = np.maximum(beside[2:], beside[:-2]) if widths.size > 1 else widths
+    return widths + np.minimum(wider, 3.0 * widths)
+
+
+def warn_of_waves(file: str, profile: VoltageProfile, spacing: float, samples: str, closer: str) -> None:
+    """A warning where a file whose `samples` are `spacing` (mm) apart has less than two in a wave of a
+    profile; it says what spacing holds the waves, and what makes it.
+    """
+    waves = waves_in(profile)
+    if lost := int(np.sum(waves < 2.0 * spacing * (1.0 - 1e-9))):
+        short = (
+            f"{lost} of {waves.size} crests and troughs of the signal, in waves down to {waves.min():.3g} mm"
+        )
+        few = f"have less than two {samples} of {spacing:.3g} mm in a wave, which do not hold them"
+        warn(f"{file}: {short}, {few}; {samples} of at most {0.25 * waves.min():.3g} mm do ({closer})")
+
+
+def _turns(voltage: list[float], least: float) -> list[int]:
+    """The first row and those where a voltage turns, after and before a change of at least `least` (V)."""
+    found, side = [0], 0.0
+    for row, now in enumerate(voltage):
+        change = now - voltage[found[-1]]
+        if side * change > 0.0:
+            found[-1] = row
+        elif abs(change) >= least and change != 0.0:
+            found.append(row)
+            side = change
+    return found
 
 
 def _over_position(position: Any, values: Any, told: tuple[str, str, str, str]) -> tuple[Any, Any]:
@@ -220,8 +282,8 @@ class Amplifier:
 
     def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
         """The profile cut off at the smallest of its `limits`, then followed no faster than `slew` at `speed`
-        (mm/s), both exactly: with rows where it crosses the limit or catches up. Raises InputError for a slew
-        without a speed.
+        (mm/s), both exactly: with rows where it crosses the limit or catches up, which may be behind its last
+        row. Raises InputError for a slew without a speed.
         """
         cut = self._clipped(profile)
         if self.slew is None:
@@ -240,7 +302,9 @@ class Amplifier:
 
 
 def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
-    """The profile from its first row on, with its slope limited to `steepest` (V/mm)."""
+    """The profile from its first row on, with its slope limited to `steepest` (V/mm); behind its last
+    position it goes on to the last voltage, which holds there.
+    """
     now = float(profile.voltage[0])
     rows = [(float(profile.position[0]), now)]
     for i in np.flatnonzero(np.diff(profile.position) > 0):
@@ -257,4 +321,15 @@ def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
                 rows.append((x, now))
             now = last if abs(slope) <= steepest else now + np.sign(slope) * steepest * (end - x)
         rows.append((end, now))
-    return VoltageProfile(*np.array(rows).T)
+    return VoltageProfile(*np.array([*rows, *_settled(*rows[-1], profile, steepest)]).T)
+
+
+def _settled(x: float, now: float, profile: VoltageProfile, steepest: float) -> list[tuple[float, float]]:
+    """The row behind `x` (mm) where `now` (V) has come to the last voltage of the profile, none where it is
+    there to rounding; at the largest position at most.
+    """
+    lag = float(profile.voltage[-1]) - now
+    if abs(lag) <= 1e-12 * np.abs(profile.voltage).max():
+        return []
+    way = min(abs(lag) / steepest, LARGEST - x)
+    return [(x + way, now + np.sign(lag) * min(steepest * way, abs(lag)))] if way > 0.0 else []

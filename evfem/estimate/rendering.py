@@ -197,8 +197,11 @@ def voltage_for(
 
 
 def _share_apart(one: VoltageProfile, other: VoltageProfile) -> float:
-    """Fraction of the path on which two profiles differ, sampled in the middle of intervals between rows."""
-    x = np.unique(np.concatenate([one.position, other.position]))
+    """Fraction of the path of the first of two profiles on which they differ, sampled in the middle of
+    intervals between rows.
+    """
+    ends = one.position[[0, -1]]
+    x = np.unique(np.clip(np.concatenate([one.position, other.position]), *ends))
     middle = 0.5 * (x[:-1] + x[1:])
     apart = np.abs(one(middle) - other(middle)) > 1e-9 * np.max(np.abs(one.voltage), initial=1.0)
     return float(np.sum(np.diff(x)[apart]) / (x[-1] - x[0]))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from evfem.common.checks import count
-from evfem.errors import InputError, StopRun, describe_value
-from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL, Values, no_column
+from evfem.errors import InputError, StopRun, describe_value, readable
+from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL, WIDTHS, Values, no_column
 
 #: signs of a comparison, the longer ones first
 SIGNS: Mapping[str, Callable[[float, float], bool]] = {
@@ -21,6 +21,8 @@ SIGNS: Mapping[str, Callable[[float, float], bool]] = {
 }
 ALLOWED = 'a comparison of a column with a number, as "tangential_force >= 0.02", or a function of a row'
 COMPARISON = re.compile(rf"\s*(\w+)\s*({'|'.join(SIGNS)})\s*(\S+)\s*")
+#: dimension -> columns of the other one, which this one has not or leaves empty, and where it is
+ELSEWHERE: Mapping[int, tuple[Sequence[str], str]] = {2: (tuple(SPATIAL), "the plane"), 3: (WIDTHS, "space")}
 NUMBERS = tuple(name for name in (*COLUMNS, *ROOM_COLUMNS, *SPATIAL) if name != "motion")
 
 
@@ -38,7 +40,8 @@ class StopWhen:
     Raises
     ------
     InputError
-        Another condition, or a column that does not exist.
+        Another condition, a column that does not exist, or, as a run begins, one of the other dimension:
+        `contact_area` in the plane, `contact_width` in space.
 
     Examples
     --------
@@ -53,21 +56,43 @@ class StopWhen:
         self, condition: str | Callable[[Mapping[str, Any]], Any], motion: int | None = None
     ) -> None:
         self.motion = motion if motion is None else count("motion", motion, least=0)
-        self.true = condition if callable(condition) else _comparison(condition)
+        found = ("", condition) if callable(condition) else _comparison(condition)
+        self.column: str = found[0]
+        self.true: Callable[[Mapping[str, Any]], Any] = found[1]
         self.words = "a condition is met" if callable(condition) else " ".join(condition.split())
 
     def __repr__(self) -> str:
         where = "" if self.motion is None else f", motion={self.motion}"
         return f"StopWhen({self.words!r}{where})"
 
+    def started(self, mesh: Any, scene: Any = None, total_steps: int = 0) -> None:
+        """A run begins: raise InputError where its finger has not the column."""
+        _there(self.column, mesh.dim)
+
     def step(self, row: Mapping[str, Any], frame: Any = None, checkpoint: Any = None) -> None:
         """A step has converged: raise `StopRun` where the condition is true."""
-        if self.motion in (None, row["motion_index"]) and self.true(Values(row)):
+        dimension = 3 if "position_z" in row else 2
+        _there(self.column, dimension)
+        try:
+            met = self.motion in (None, row["motion_index"]) and self.true(Values(row))
+        except KeyError as error:  # of a function
+            for name in error.args[:1]:
+                _there(name, dimension)
+            raise
+        if met:
             raise StopRun(f"{self.words} in step {row['step']}")
 
 
-def _comparison(text: Any) -> Callable[[Mapping[str, Any]], bool]:
-    """The function of a row that a text says; nothing of it is evaluated as code."""
+def _there(name: Any, dimension: int) -> None:
+    """InputError for a column of the other dimension, with one of this that is like it."""
+    others, where = ELSEWHERE[dimension]
+    if name in others:
+        likely = no_column("condition", name, [one for one in NUMBERS if one not in others]).allowed
+        raise InputError("condition", f"{readable(name)}, no column of a finger in {where}", likely)
+
+
+def _comparison(text: Any) -> tuple[str, Callable[[Mapping[str, Any]], bool]]:
+    """The column, and the function of a row that a text says; nothing of it is evaluated as code."""
     found = COMPARISON.fullmatch(text) if isinstance(text, str) else None
     if found is None:
         raise InputError("condition", describe_value(text), ALLOWED)
@@ -78,4 +103,4 @@ def _comparison(text: Any) -> Callable[[Mapping[str, Any]], bool]:
         value = float(number)
     except ValueError:
         raise InputError("condition", describe_value(text), ALLOWED) from None
-    return lambda row: SIGNS[sign](float(row[name]), value)
+    return name, lambda row: SIGNS[sign](float(row[name]), value)

@@ -158,8 +158,13 @@ def _scale(own: Result, name: str) -> float:
     """What errors of an output are relative to."""
     size = abs(_value(own, name))
     if name.split(".")[0].removesuffix("_x").removesuffix("_z").endswith("_force"):
-        size = max(size, LEAST * max(float(np.abs(getattr(own, one)).max()) for one in FORCES))
+        size = max(size, least_force(own))
     return size or 1.0
+
+
+def least_force(own: Result) -> float:
+    """The force that errors of smaller ones are relative to: 1e-3 of the largest one of the whole run."""
+    return LEAST * max(float(np.abs(getattr(own, name)).max()) for name in FORCES)
 
 
 def accuracy_table(found: Sequence[Accuracy]) -> str:

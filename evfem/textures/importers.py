@@ -20,6 +20,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, above, instance, number, one_of, real
 from evfem.common.foreign import read_grey
+from evfem.common.notices import warn
 from evfem.common.tables import TABLES, is_even, names_of, read_headed
 from evfem.common.units import UNITS, factor
 from evfem.electrostatics import wav
@@ -40,6 +41,8 @@ RECORDED = {"acceleration": 2, "velocity": 1, "displacement": 0, "height": 0, "f
 INTEGRATED = ("", ", integrated once", ", integrated twice")
 #: how many of the longest waves a window holds; frequencies that are kept, and the highest in 1/mm
 WAVES, MOST_LINES, HIGHEST_FREQUENCY = 10, 400, 20.0
+#: rows of a friction profile at most, and of each of its waves at least
+MOST_ROWS, FEWEST = 20_000, 4
 IMAGES = ("PNG", "JPEG", "TIFF", "BMP")
 #: largest image in pixels; largest scan in bytes and in points
 MOST_PIXELS, MOST_BYTES, MOST_POINTS = 40_000_000, 512_000_000, 50_000_000
@@ -374,17 +377,43 @@ def _lines(frequency: Floats, amplitude: Floats, longest: float) -> tuple[Floats
 
 
 def friction_profile(spectrum: Texture, mean: float, rms: float, length: float, seed: int = 0) -> Texture:
-    """A profile over `length` (mm) with this spectrum, mean and rms, phases by `seed`, nowhere below 0."""
+    """A profile over `length` (mm) with this spectrum, phases by `seed`, nowhere below 0.
+
+    Its rows have the `mean` and the `rms` (deviation from it) that are given, whatever the phases; where it
+    would be below 0 it is cut off, and a warning and its provenance say what it has then. Raises InputError
+    for what is no friction spectrum, and for a length whose `MOST_ROWS` rows do not hold its waves.
+    """
     if spectrum.quantity != "friction_spectrum":
         raise InputError("texture", f"{spectrum.name}, {spectrum.quantity}", "a friction spectrum")
+    if not spectrum.values.any():
+        raise InputError("texture", f"{spectrum.name}, whose amplitudes are 0", "a spectrum with waves")
     real("mean", mean, "a friction coefficient from 0 to 10", lambda mu: 0.0 <= mu <= 10.0)
     real("rms", rms, "a number from 0 to the mean", lambda size: 0.0 <= size <= mean)
     above("length", length, 0.0, "a length in mm above zero")
+    x = _rows_for(spectrum, length)
     phase = phases(seed, spectrum.x.size)
-    size = int(min(np.ceil(8.0 * length * spectrum.x[-1]), 20_000)) + 2
-    x = np.linspace(0.0, length, size)
     waves = np.sin(2.0 * np.pi * np.outer(x, spectrum.x) + phase) @ spectrum.values
-    waves *= np.sqrt(2.0) * rms / np.sqrt(np.sum(spectrum.values**2))
+    waves -= waves.mean()
+    waves /= waves.std()
+    values = np.clip(mean + rms * waves, 0.0, None)
     note = f"Friction {mean:g} on average, rms {rms:g}, phases from seed {seed}."
-    values, notes = np.clip(mean + waves, 0.0, None), (*spectrum.provenance, note)
-    return replace(spectrum, x=x, values=values, quantity="friction", provenance=notes)
+    if cut := float(np.mean(mean + rms * waves < 0.0)):
+        has = f"Friction {values.mean():.3g} on average, rms {values.std():.3g}"
+        asked = f"cut off at 0 on {100.0 * cut:.2g} % of {length:g} mm, of mean {mean:g}, rms {rms:g}"
+        note = f"{has}: {asked}, phases from seed {seed}."
+        warn(f"{spectrum.name}: {note} Up to an rms of about {-mean / waves.min():.2g} nothing is cut off.")
+    return replace(spectrum, x=x, values=values, quantity="friction", provenance=(*spectrum.provenance, note))
+
+
+def _rows_for(spectrum: Texture, length: float) -> Floats:
+    """Positions (mm) over `length` (mm): eight of the shortest wave, or as many as there may be. Raises
+    InputError for less than `FEWEST` of the shortest wave that has a thousandth of the largest amplitude.
+    """
+    shortest = 1.0 / float(spectrum.x[spectrum.values > 1e-3 * spectrum.values.max()][-1])
+    if length * FEWEST > shortest * MOST_ROWS:
+        rows = f"of whose {MOST_ROWS} rows a wave of {shortest:.3g} mm has less than {FEWEST}"
+        most, least = shortest * MOST_ROWS / FEWEST, FEWEST * length / MOST_ROWS
+        allowed = f"at most {most:.4g} mm, or a spectrum without waves below {least:.3g} mm"
+        raise InputError("length", f"{length:g} mm, {rows}", allowed)
+    size = int(min(np.ceil(8.0 * length * spectrum.x[-1]), MOST_ROWS)) + 2
+    return np.linspace(0.0, length, size)

@@ -173,12 +173,50 @@ def test_the_friction_map_is_linear_in_friction(tmp_path):
     }
 
 
-def test_a_column_has_the_voltage_in_its_middle(tmp_path):
+def test_a_column_has_the_mean_square_of_its_voltage(tmp_path):
+    """Of a ramp from i to i + 1 tenths: (i^2 + i + 1/3) / 100."""
     ramp = ev.VoltageProfile([5.0, 15.0], [0.0, 100.0])
     ev.write_signal(tmp_path / "map.png", ramp, ev.Playback(full_scale=100.0, pixel=1.0))
     with Image.open(tmp_path / "map.png") as picture:
         grey = np.asarray(picture)[0]
-    assert grey.tolist() == [round(255 * ((i + 0.5) / 10.0) ** 2) for i in range(10)]
+    assert grey.tolist() == [round(255 * (i**2 + i + 1 / 3) / 100) for i in range(10)]
+
+
+def greys(path):
+    with Image.open(path) as picture:
+        return np.asarray(picture)[0]
+
+
+def test_waves_finer_than_the_samples_are_their_mean_square_in_a_map_and_said(tmp_path):
+    """|sin| of 0.1 mm is 1 in the middle of each pixel of 0.1 mm; the mean of its square is 1/2."""
+    x = np.linspace(0.0, 2.0, 2001)
+    fine = ev.VoltageProfile(x, 100.0 * np.abs(np.sin(np.pi * x / 0.1)))
+    with pytest.warns(UserWarning, match="m.png: 39 of 39 crests and troughs") as warned:
+        ev.write_signal(tmp_path / "m.png", fine, ev.Playback(full_scale=100.0, speed=20.0))
+    (said,) = (str(one.message) for one in warned)
+    assert said.endswith(
+        "of the signal, in waves down to 0.1 mm, have less than two pixels of 0.1 mm in a wave, "
+        "which do not hold them; pixels of at most 0.025 mm do (a smaller `pixel`)"
+    )
+    assert set(greys(tmp_path / "m.png").tolist()) <= {127, 128}
+    ev.write_signal(tmp_path / "m.png", fine, ev.Playback(full_scale=100.0, pixel=0.025))  # without a word
+    np.testing.assert_allclose(greys(tmp_path / "m.png")[:4] / 255, [0.182, 0.818, 0.818, 0.182], atol=3e-3)
+
+
+def test_waves_of_a_wav_and_a_hjif_with_less_than_two_samples_are_said(tmp_path):
+    """Of 10 um in a WAV of 10 um, which reads back as 60 V, and of 40 um in 0.1 mm, the ticks over 1 m."""
+    x = np.linspace(0.0, 0.1, 1001)
+    wave_ = ev.VoltageProfile(x, 60.0 + 20.0 * np.sin(2.0 * np.pi * x / 0.01))
+    slow = ev.Playback(full_scale=100.0, speed=20.0, rate=2000, friction=(0.5, 0.6))
+    with pytest.warns(
+        UserWarning,
+        match="down to 0.00917 mm, .* of at most 0.00229 mm do .*above 2000 Hz, or a slower slide",
+    ):
+        ev.write_signal(tmp_path / "a.wav", wave_, slow)
+    ev.write_signal(tmp_path / "a.wav", wave_, replace(slow, rate=8000))  # without a word
+    far = ev.VoltageProfile([*(4.0 * x), 1000.0], [*wave_.voltage, 60.0])
+    with pytest.warns(UserWarning, match="two ticks of 0.1 mm in .*a shorter signal"):
+        ev.write_signal(tmp_path / "a.hjif", far, slow)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,13 @@
 """Voltage profiles: interpolation with jumps, effective value, amplifier limit, files."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tools.refusals import refuses
 
-from evfem.circuit.signals import Amplifier, VoltageProfile, carrier_amplitude
+from evfem.circuit.signals import Amplifier, VoltageProfile, carrier_amplitude, mean_squares, waves_in
 
 JUMP = VoltageProfile([0.0, 2.0, 2.0, 4.0], [10.0, 10.0, 100.0, 50.0])
 
@@ -31,6 +32,39 @@ def test_rms_is_exact_for_pieces():
     assert JUMP.rms(-5.0, -1.0) == 10.0
     dense = JUMP(np.linspace(0.5, 3.7, 2_000_001))
     assert JUMP.rms(0.5, 3.7) == pytest.approx(np.sqrt(np.mean(dense**2)), rel=2e-6)
+
+
+def test_mean_squares_are_those_of_rms_between_any_edges():
+    edges = np.linspace(-0.7, 5.1, 30)
+    found = mean_squares(JUMP, edges)
+    expected = [JUMP.rms(a, b) ** 2 for a, b in pairwise(edges)]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    narrow = mean_squares(JUMP, np.array([1.0, 1.0, 3.0, 3.0, 3.0]))  # too narrow for their floats
+    np.testing.assert_allclose(narrow[[0, 2, 3]], [100.0, 75.0**2, 75.0**2], rtol=1e-12)
+    assert narrow[1] == pytest.approx(JUMP.rms(1.0, 3.0) ** 2, rel=1e-12)
+
+
+X = np.linspace(0.0, 10.0, 4001)
+
+
+@pytest.mark.parametrize(
+    ("rows", "waves"),
+    [
+        ((X, 50.0 + 9.0 * np.cos(np.pi * X)), [2.0] * 9),
+        ((np.repeat([0, 1, 2, 3, 4], 2)[1:-1], [0, 0, 80, 80, -80, -80, 0, 0]), [2.0, 2.0]),
+        (([0.0, 1.1, 1.1, 1.3, 1.3, 5.0], [0.0, 0.0, 80.0, 80.0, 0.0, 0.0]), [0.4]),
+        ((np.repeat([0, 4, 4.1, 8, 8.1, 9], 2)[1:-1], [0, 0, 80, 80, 0, 0, 80, 80, 0, 0]), [0.4, 4.0, 0.4]),
+        ((X, 9.0 * np.abs(np.sin(np.pi * X))), [1.0] * 19),  # crests of 2/3 and troughs of 1/3
+        (([0.0, 1.0, 1.0, 2.0, 3.0], [0.0, 0.0, 80.0, 80.0, 90.0]), []),  # jump and ramp
+        ((X, np.where(X < 5.0, 0.0, 98.0) + 1.9 * np.sin(2.0 * np.pi * X / 0.1)), []),  # ripples of 4 %
+        (([0.0, 1.0, 1.0, 1.0, 2.0], [0.0, 0.0, 80.0, 0.0, 0.0]), []),  # a row that never holds
+        (([1.0], [5.0]), []),
+        (([1.0, 2.0], [0.0, 0.0]), []),
+    ],
+)
+def test_waves_are_two_widths_of_their_crests_and_troughs(rows, waves):
+    found = waves_in(VoltageProfile(*rows))
+    assert found.tolist() == pytest.approx(waves, rel=1e-2)
 
 
 def test_amplifier_cuts_exactly_at_its_limit():
@@ -113,6 +147,45 @@ def test_a_jump_is_climbed_and_a_slew_needs_a_speed():
     np.testing.assert_allclose(slow([2.0, 2.5, meets, 4.0]), [10.0, 55.0, 10.0 + 90.0 * (meets - 2.0), 50.0])
     refuses("needed with a slew", Amplifier(1000.0, slew=90.0).limit, JUMP)
     refuses("slew", Amplifier, 1000.0, slew=0.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "x", "volts"),
+    [
+        # 50 V/mm: 0 V at 1 mm, where the wish jumps to 100 V for ever; 100 V at 3 mm
+        (([0.0, 1.0, 1.0], [0.0, 0.0, 100.0]), [1.0, 2.0, 3.0, 5.0], [0.0, 50.0, 100.0, 100.0]),
+        # 25 V at the last row, 100 V 1.5 mm behind it
+        (([0.0, 1.0, 1.5], [0.0, 0.0, 100.0]), [1.0, 1.5, 3.0, 9.0], [0.0, 25.0, 100.0, 100.0]),
+        # falling, through 0
+        (([0.0, 1.0, 1.0], [50.0, 50.0, -50.0]), [1.0, 2.0, 3.0, 5.0], [50.0, 0.0, -50.0, -50.0]),
+        (([0.0, 1.0, 1.0], [-20.0, -20.0, -120.0]), [1.0, 2.0, 3.0, 5.0], [-20.0, -70.0, -120.0, -120.0]),
+        # constant before its first row, a jump there, and no other row
+        (([1.0, 1.0], [0.0, 100.0]), [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 50.0, 100.0, 100.0]),
+        (([1.0, 1.0, 2.0], [0.0, 100.0, 100.0]), [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 50.0, 100.0, 100.0]),
+        (([0.0], [70.0]), [-1.0, 0.0, 1.0], [70.0, 70.0, 70.0]),
+    ],
+)
+def test_a_profile_that_lags_behind_its_last_row_goes_on_to_its_last_voltage(rows, x, volts):
+    slow = Amplifier(200.0, slew=500.0).limit(VoltageProfile(*rows), speed=10.0)
+    np.testing.assert_allclose(slow(x), volts, rtol=1e-14, atol=1e-12)
+    assert slow.steepest() <= 50.0 * (1.0 + 1e-12)
+
+
+def test_a_profile_that_has_caught_up_ends_at_its_last_row():
+    """Caught up with to rounding it has no steep row more, and positions stay within those of a profile."""
+    random = np.random.default_rng(5)
+    for _ in range(200):
+        x, rate = np.cumsum(random.uniform(0.01, 1.0, 3)), random.uniform(10.0, 500.0)
+        wish = VoltageProfile([x[0], x[0], x[1], x[2]], [0.0, *[rate * (x[1] - x[0])] * 3])
+        slow = Amplifier(1e4, slew=rate).limit(wish, speed=1.0)
+        assert slow.steepest() <= rate * (1.0 + 1e-9)
+        assert slow.position[-1] == pytest.approx(x[2], rel=1e-12)
+        met = Amplifier(1e4, slew=rate).limit(VoltageProfile(wish.position[:3], wish.voltage[:3]), speed=1.0)
+        assert met.steepest() <= rate * (1.0 + 1e-9)
+        assert met.voltage[-1] == pytest.approx(wish.voltage[-1], rel=1e-11)
+    far = Amplifier(200.0, slew=1e-4).limit(VoltageProfile([0.0, 1.0, 1.0], [0.0, 0.0, 100.0]), speed=10.0)
+    assert far.position[-1] == 1e6  # the largest position, where 1e-5 V/mm have made 10 V
+    assert far.voltage[-1] == pytest.approx(10.0, rel=1e-5)
 
 
 FINGER = SimpleNamespace(

@@ -107,6 +107,17 @@ def test_an_amplifier_costs_what_it_cuts_off():
     assert slow.error_of_amplifier == pytest.approx(0.15 / np.linalg.norm([0.2, 0.4, 0.4]), rel=1e-6)
 
 
+def test_a_profile_that_goes_on_behind_the_path_is_limited_on_a_share_of_the_path():
+    """0 V over the first of 2 mm, then a rise to U at twice the slew: half of the path, whatever the 1 mm
+    behind it that the rise takes.
+    """
+    wish = voltage_for(felt([0.2, 0.2, 0.3]), encoding(0.2))
+    amplifier = ev.Amplifier(2.0 * wish.largest, slew=0.5 * wish.largest)
+    slow = voltage_for(felt([0.2, 0.2, 0.3]), encoding(0.2), amplifier=amplifier, speed=1.0)
+    assert slow.profile([1.0, 2.0, 3.0]) == pytest.approx([0.0, 0.5 * wish.largest, wish.largest], abs=1e-2)
+    assert slow.share_limited == pytest.approx(0.5, rel=1e-3)
+
+
 def test_exact_encoding_reproduces_a_friction_step(jump):
     found = exact(jump, ev.Display(friction=0.3), ev.Kaczmarek())
     fidelity = compare(jump.result, found.result)

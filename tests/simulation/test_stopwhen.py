@@ -1,5 +1,7 @@
 """A run ends when a column has come so far, and says why."""
 
+from types import SimpleNamespace
+
 import pytest
 from tools.builders import finger
 from tools.meshes import block
@@ -92,6 +94,47 @@ def test_what_is_no_condition_is_refused(condition, said):
     with pytest.raises(ev.InputError) as refused:
         ev.StopWhen(condition)
     assert said in str(refused.value)
+
+
+ROWS = {2: {"step": 1, "motion_index": 0}, 3: {"step": 1, "motion_index": 0, "position_z": 0.0}}
+ROWS[3]["contact_width"] = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("name", "dimension", "instead"),
+    [
+        ("contact_area", 2, "contact_width"),
+        ("real_contact_area", 2, "real_contact_width"),
+        ("position_z", 2, "position"),
+        ("tangential_force_z", 2, "tangential_force"),
+        ("contact_width", 3, "contact_area"),
+        ("real_contact_width", 3, "real_contact_area"),
+    ],
+)
+def test_a_column_of_the_other_dimension_is_refused(name, dimension, instead):
+    """As the run begins, and by the row of a step, the first of which was a KeyError, or nan for ever."""
+    where = {2: "plane", 3: "space"}[dimension]
+    for event, told in (("started", SimpleNamespace(dim=dimension)), ("step", ROWS[dimension])):
+        with pytest.raises(ev.InputError) as refused:
+            getattr(ev.StopWhen(f"{name} > 0.1"), event)(told)
+        assert str(refused.value) == (
+            f'condition: given "{name}", no column of a finger in {"the " * (dimension == 2)}{where}; '
+            f"allowed: {instead}? (docs/notation)"
+        )
+    other = SimpleNamespace(dim=5 - dimension)
+    assert ev.StopWhen(f"{name} > 0.1").started(other) is None
+
+
+def test_a_run_with_a_column_of_the_other_dimension_ends_before_its_first_step():
+    seen = []
+    with pytest.raises(ev.InputError, match=r"contact_area.*no column of a finger in the plane"):
+        run(SimpleNamespace(step=lambda row, *_: seen.append(row)), ev.StopWhen("contact_area > 3"))
+    assert seen == []
+    with pytest.raises(ev.InputError, match=r"contact_area.*no column of a finger in the plane"):
+        run(ev.StopWhen(lambda row: row["contact_area"] > 3.0))
+    mine = {}
+    with pytest.raises(KeyError, match="mine"):
+        run(ev.StopWhen(lambda row: mine["mine"]))
 
 
 def test_a_motion_is_a_whole_number():

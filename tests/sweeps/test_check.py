@@ -2,13 +2,15 @@
 `ev.accurate`, which keeps to an error asked for.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tools.meshes import block
 
 import evfem as ev
 from evfem import cli
-from evfem.sweeps.check import more_steps, remeshed
+from evfem.sweeps.check import Variant, _row, more_steps, remeshed
 
 FORCES = ["normal_force", "tangential_force"]
 
@@ -131,6 +133,35 @@ def test_meshes_have_no_part_in_whether_the_ends_agree():
     assert found.agrees
     assert found.error["real_contact_width.max.0"] > 0.05
     assert not [way for way in ways(ev.check(scene, mesh=False)) if "mesh" in way]
+
+
+def test_the_ends_of_a_finger_that_ends_free_agree():
+    """Its forces there are 1e-15 N/mm, rounding, of which runs had 3e-3 as their difference."""
+    motion = [ev.Press(indentation=0.2, steps=2), ev.Press(indentation=-0.1, steps=2)]
+    found = ev.check(ev.Scene(pad(), ev.Flat(friction=0.0), motion=motion), mesh=False)
+    assert 0.0 < max(abs(row["applied_force"]) for row in found.rows) < 1e-12
+    assert max(row["difference"] for row in found.rows) < 1e-8
+    assert str(found).splitlines()[-1] == "the ends agree (allowed: 0.001)"
+
+
+@pytest.mark.parametrize(
+    ("end", "other", "difference"),
+    [
+        (1e-15, 3e-15, 5e-11),  # free, to rounding
+        (0.0, 4e-5, 1.0),  # 1e-3 of the largest force of the run is still borne
+        (0.0, 4e-7, 1e-2),
+        (1e-3, 1.002e-3, 2e-3),  # relative to the end, as any that is more
+        (0.03, 0.0303, 1e-2),
+    ],
+)
+def test_ends_differ_relative_to_their_forces_or_a_share_of_the_largest_of_the_run(end, other, difference):
+    def ended(last):
+        forces = dict.fromkeys(("applied_force", "normal_force"), np.array([0.02, 0.04, last]))
+        nothing = dict.fromkeys(("tangential_force", "electrostatic_force"), np.zeros(3))
+        return SimpleNamespace(**forces, **nothing, indentation=np.array([0.2, 0.4, -0.1]))
+
+    row = _row(Variant("steps", "twice the steps", pressed), ended(other), ended(end))
+    assert row["difference"] == pytest.approx(difference, rel=1e-9)
 
 
 def test_outputs_that_are_none():
