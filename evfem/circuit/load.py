@@ -19,11 +19,10 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.rooms import Column, Room
-from evfem.electrostatics.alternating import admittance
+from evfem.electrostatics.alternating import admittance, voltage_fraction
 from evfem.electrostatics.breakdown import Limited, breakdown_voltage
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.localgaps import roughness_below
-from evfem.surface.surfaces import voltage_fraction
 
 #: of lengths in mm: C/mm2 per V/mm, and W per N mm/s
 PER_MM, MILLI = 1e-3 * eps_0, 1e-3
@@ -36,6 +35,11 @@ COLUMNS = (
 STEP_MEANS = ("current_rms", "power")
 
 
+def _fractions(model: Any, pad: Any) -> Any:
+    """Fractions (P,) of the voltage of the electrodes below the nodes of a pad."""
+    return voltage_fraction(getattr(model.surface, "electrodes", None), pad.position[:, 0])
+
+
 def finger_potential(model: Any, over: Floats, each: Any) -> Any:
     """Potential of the finger over the voltage: 0 where it is grounded, else where as much current leaves it
     as enters, by columns of the admittances `each` (P,) over the fractions `over` (P,) of the voltage.
@@ -46,7 +50,7 @@ def finger_potential(model: Any, over: Floats, each: Any) -> Any:
 def admittance_of(model: Any, attraction: Any, pad: Any, frequency: float) -> complex:
     """Current over voltage of a pad in S (in the plane S/mm), where electrodes have fractions of a source."""
     each = nodal_admittances(attraction, pad, model.closing.electrics, frequency)
-    over = voltage_fraction(model.surface, pad.position[:, 0])
+    over = _fractions(model, pad)
     return complex(np.sum(over * (over - finger_potential(model, over, each)) * each))
 
 
@@ -123,7 +127,7 @@ class Air(Room):
         if electrics.resolved:
             return np.abs(attraction.charging.across(attraction.charged(pad)))
         volts = abs(pad.voltage) * electrics.peak_across(gap, attraction.layers)
-        over = voltage_fraction(model.surface, pad.position[:, 0])
+        over = _fractions(model, pad)
         if model.scene.grounded or not electrics.conducts:
             each = attraction.carrying(pad) / (gap + electrics.gap_eps_r * electrics.reduced)
         else:

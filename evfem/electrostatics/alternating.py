@@ -279,3 +279,15 @@ def shares(order: Floats, square: Floats) -> tuple[float, Floats, Floats]:
     total = float(square.sum())
     kept = square > 0.0
     return float(np.sqrt(total)), order[kept], square[kept] / (total if total > 0.0 else 1.0)
+
+
+def voltage_fraction(electrodes: Any, x: Any) -> Any:
+    """Fraction (...) of the voltage of the electrode below x (...) in mm, 0 where there is none, of rows (from,
+    to, fraction) of `electrodes`; 1 everywhere where they are None.
+
+    >>> voltage_fraction([[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]], np.array([-1.0, 0.0, 1.0])).tolist()
+    [1.0, 0.0, 0.0]
+    """
+    if electrodes is None:
+        return np.ones_like(x)
+    return np.asarray(sum(np.where((x >= a) & (x <= b), fraction, 0.0) for a, b, fraction in electrodes))

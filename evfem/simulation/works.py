@@ -175,7 +175,7 @@ class SubstepWork:
         lost += _mean_work(begin.forces, end.forces, moved) - (end.energy - begin.energy) - viscous
         lost -= _mean_work(*self._on_surface, moved[self.model.pad.nodes])
         lost -= (drag := body.drag_dissipation(new.u))
-        free = lost - sum(self.control.apart(*each) for each in self._paths()) - self._sudden()
+        free = lost - self._apart()
         snap = drag + lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, free))
         snapped = (0.0, drag + lost) if snap else (drag + lost, 0.0)
         own = {"electrostatic_work": 0.0, "external_work": external_work, "friction_dissipation": friction}
@@ -199,10 +199,14 @@ class SubstepWork:
         """Works of the tractions by name, N mm per mm of depth."""
         return {one.name: one.work_along(path) for one, path in self._paths()}
 
-    def _sudden(self) -> float:
-        """What charges do that are there from the first moment, beyond loads that grow evenly: no snap."""
-        charged = ((one, path) for one, path in self._paths() if self.first and one.flows)
-        return float(sum(one.work_along(path) - path.trapezoidal for one, path in charged))
+    def _apart(self) -> float:
+        """Work of the tractions in the books that is none of a snap: it is not on the path of the end forces,
+        or of a traction that is there at once in the first substep, as a weight is that is let go.
+        """
+        paths = self._paths()
+        if self.first:
+            return float(sum(traction.work_apart(path) for traction, path in paths))
+        return sum(self.control.apart(*each) for each in paths)
 
     def _paths(self) -> list[tuple[Any, PadPath]]:
         """The tractions with their paths."""

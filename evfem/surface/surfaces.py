@@ -233,19 +233,6 @@ class Display(_Level):
         set_frozen(self, electrodes=rows)
 
 
-def voltage_fraction(surface: Any, x: Array) -> Array:
-    """Fraction (...) of the voltage of the electrode below x (...) in mm; 0 where there is none.
-
-    >>> halves = Display(electrodes=[[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]])
-    >>> voltage_fraction(halves, np.array([-1.0, 0.0, 1.0])).tolist()
-    [1.0, 0.0, 0.0]
-    """
-    electrodes = getattr(surface, "electrodes", None)
-    if electrodes is None:
-        return np.ones_like(x)
-    return np.asarray(sum(np.where((x >= a) & (x <= b), fraction, 0.0) for a, b, fraction in electrodes))
-
-
 @dataclass(frozen=True)
 class Sinusoid(RigidSurface):
     """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase); without `terms` equation (25)

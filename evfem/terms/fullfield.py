@@ -27,12 +27,12 @@ import scipy.sparse as sparse
 
 from evfem.common.arrays import ENDS, Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
+from evfem.electrostatics.alternating import voltage_fraction
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
 from evfem.field.columns import Capacitance, Columns
 from evfem.surface.pad import Pad, surface_state
-from evfem.surface.surfaces import voltage_fraction
 from evfem.terms.attraction import Attraction
 from evfem.terms.traction import TOUCHING, Entries, PadPath, PadState
 
@@ -177,7 +177,7 @@ class FieldAttraction(Attraction):
 
     def forces_along(self, path: PadState) -> Floats:
         """Forces (W, P, 2) in the states of a path, each from its own solution."""
-        fraction = voltage_fraction(self.surface, path.position[..., 0])[..., None]
+        fraction = voltage_fraction(self._electrodes, path.position[..., 0])[..., None]
         forces = fraction**2 * self.flanks.forces_along(path)
         for k, pad in enumerate(path.states()):
             if pad.voltage != 0.0:
@@ -205,7 +205,7 @@ class FieldAttraction(Attraction):
         less.
         """
         if self.roughness is None:
-            return voltage_fraction(self.surface, pad.position[:, 0]) ** 2
+            return voltage_fraction(self._electrodes, pad.position[:, 0]) ** 2
         columns, forces = (law.forces(pad)[:, 1] for law in (self.column_law, self))
         pulled = columns < 0.0
         return np.where(pulled, np.clip(forces / np.where(pulled, columns, 1.0), 0.0, 1.0), 1.0)
@@ -295,7 +295,7 @@ class FieldAttraction(Attraction):
             column = 2 * moved[nearest.astype(int)] + axis
             blocks += [(2 * nodes + k, column, rate[:, k]) for k in range(2)]
         outer = self.flanks.stiffness(replace(pad, touching=np.ones(self._size, dtype=bool)))
-        fraction = voltage_fraction(self.surface, position[:, 0])[outer.row // 2] ** 2
+        fraction = voltage_fraction(self._electrodes, position[:, 0])[outer.row // 2] ** 2
         return Entries.of(outer.size, [*blocks, (outer.row, outer.column, fraction * outer.value)])
 
     def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
