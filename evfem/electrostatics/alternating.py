@@ -282,8 +282,8 @@ def shares(order: Floats, square: Floats) -> tuple[float, Floats, Floats]:
 
 
 def voltage_fraction(electrodes: Any, x: Any) -> Any:
-    """Fraction (...) of the voltage of the electrode below x (...) in mm, 0 where there is none, of rows (from,
-    to, fraction) of `electrodes`; 1 everywhere where they are None.
+    """Fraction (...) of the voltage of the electrode below x (...) in mm, 0 where there is none, of
+    `electrodes` as rows (from, to, fraction); 1 everywhere where they are None.
 
     >>> voltage_fraction([[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]], np.array([-1.0, 0.0, 1.0])).tolist()
     [1.0, 0.0, 0.0]
