@@ -192,6 +192,8 @@ def test_what_is_written_is_read_back_but_for_the_sign(tmp_path):
     assert (back.position[0], back.position[-1]) == (1.0, pytest.approx(11.0))
     assert np.abs(back(x) ** 2 - JUMP(x) ** 2).max() < 1.1e-4 * 2000.0**2
     assert back.voltage.min() >= 0.0
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"description": "without a start"}))
+    assert signalfile.read_signal(path).position[0] == 0.0
     texture = Haptics(licence="CC0-1.0")(path)
     share = (JUMP(x) / 2000.0) ** 2
     friction = 1.0 / 3.0 + (0.6 - 1.0 / 3.0) * share
