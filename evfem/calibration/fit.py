@@ -157,6 +157,9 @@ class _Problem:
                 asked += [(key, name) for name in question.names]
         self.runs = [(keys, tuple(questions)) for keys, questions in runs.values()]
         self.places = [(list(runs).index(key), name) for key, name in asked]
+        if len({one.sd is None for one in self.data}) > 1:
+            allowed = "an sd for each measurement, or for none: without one the sd is the rms of the values"
+            raise InputError("data.sd", "one for some measurements and none for others", allowed)
         self.measured = np.concatenate([[], *(np.asarray(one.values) for one in self.data)])
         self.scale = np.concatenate([[], *(_scale(one) for one in self.data)])
         if len(self.measured) <= len(self.parameters.free):

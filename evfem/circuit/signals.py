@@ -182,10 +182,10 @@ def _over_position(position: Any, values: Any, told: tuple[str, str, str, str]) 
 class FollowForce:
     """A voltage that is not given but found: whatever makes the friction force on the bone follow a target.
 
-    `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between
-    its rows; during slides the effective voltage stays between 0 and `largest_voltage` (V),
-    elsewhere it stays as it is. A force out of reach is followed as nearly as possible; the column
-    `missed_force` and a warning tell it. For `Scene(voltage=...)`.
+    `position` (mm) and `tangential_force` (N/mm, on the bone) are a table along the slide, in the
+    plane along x, linear between its rows; during slides the effective voltage stays between 0 and
+    `largest_voltage` (V), elsewhere it stays as it is. A force out of reach is followed as nearly as
+    possible; the column `missed_force` and a warning tell it. For `Scene(voltage=...)`.
 
     >>> FollowForce([0.0, 1.0], [0.0, 0.02], largest_voltage=2000.0)(0.5)
     0.01

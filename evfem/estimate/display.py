@@ -184,7 +184,8 @@ def spectrum_of(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floa
     """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window."""
     even = np.interp(np.linspace(x[0], x[-1], x.size), x, friction)
     amplitude = amplitudes(even, "hann")[1:]
-    return np.arange(1.0, amplitude.size + 1.0) * speed / float(x[-1] - x[0]), amplitude
+    period = float(x[-1] - x[0]) * x.size / (x.size - 1)
+    return np.arange(1.0, amplitude.size + 1.0) * speed / period, amplitude
 
 
 def playback(profile: VoltageProfile, touch: Touch, device: Device) -> Playback:

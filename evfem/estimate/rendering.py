@@ -246,8 +246,18 @@ def exact(
     `result.voltage`, the `drive`'s peak in `peak_voltage`, the force that is missed in `missed_force`.
     """
     felt = apparent_friction(reference.result)
-    wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
+    wish = FollowForce(_along(reference), felt.tangential_force, largest_voltage)
     return replay(reference, display, law, wish, drive, roughness_gap)
+
+
+def _along(reference: Recording) -> Array:
+    """Positions (n,) in mm along the slide's own direction, as `FollowForce` counts them; else InputError."""
+    rows, result = _slide_rows(reference.result), reference.result
+    angles = {one.course.direction for one in reference.scene.motion if one.course.distance}
+    if len(angles) > 1:
+        raise InputError("slide", f"slides at {len(angles)} angles", "slides in one direction")
+    rows, (x, z) = np.arange(max(rows[0] - 1, 0), rows[-1] + 1), angles.pop()
+    return np.asarray(x * result.position[rows] + z * result.position_z[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,13 +296,15 @@ class Comparison:
 def compare(reference: Result, rendered: Result) -> Comparison:
     """Pearson's r and relative L2 error of `applied_tangential_force` over equal slides; else InputError."""
     rows, others = _slide_rows(reference), _slide_rows(rendered)
-    x, y = reference.position[rows], rendered.position[others]
+    x, y = (
+        np.column_stack([r.position[i], r.position_z[i]]) for r, i in ((reference, rows), (rendered, others))
+    )
     if x.shape != y.shape or not np.allclose(x, y, rtol=0.0, atol=1e-9):
         raise InputError("rendered", "a slide through other positions", "the same slide as the reference")
     wanted, felt = (r.applied_tangential_force[i] for r, i in ((reference, rows), (rendered, others)))
     voltages = rendered.voltage[others] - reference.voltage[rows]
     return Comparison(
-        position=x,
+        position=reference.position[rows],
         error=felt - wanted,
         pearson=pearson(wanted, felt),
         relative_l2=float(np.linalg.norm(felt - wanted) / np.linalg.norm(wanted)),

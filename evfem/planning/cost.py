@@ -17,6 +17,8 @@ Fitted to the CPU times of 330 scenes in the plane and 40 fingertips of `evfem s
 
 from __future__ import annotations
 
+import numpy as np
+
 from evfem.mesh.mesh import Mesh
 from evfem.planning.plausibility import touching_traction
 from evfem.scene.scene import Scene
@@ -31,6 +33,8 @@ SLIDING = {2: 0.72, 3: 0.15}
 FULL_FIELD, RELIEF = 2.9, 1.6
 #: an attraction over the shear modulus that counts as strong, and what one not known beforehand is taken for
 STRONG, UNKNOWN = 0.1, 0.3
+#: seconds of a step above an elastic surface in space with 1,000 pad nodes, stiff and soft
+SINKING = (20.0, 320.0)
 #: range about the estimate: without a strong attraction, with it, and with it on a relief
 CALM, ATTRACTED, SNAPPING = (0.4, 2.5), (0.3, 3.5), (0.3, 10.0)
 
@@ -50,7 +54,17 @@ def needed_time(scene: Scene, mesh: Mesh) -> tuple[float, float]:
         stepping = thousands**1.5 * steps
     middle = BEGINNING + STEP[mesh.dim] * stepping
     least, most = CALM if pulled < STRONG else SNAPPING if relief else ATTRACTED
-    return float(least * middle), float(most * middle)
+    sunk = np.array(SINKING) * _sinking(scene, mesh)
+    return float(least * middle + sunk[0]), float(most * middle + sunk[1])
+
+
+def _sinking(scene: Scene, mesh: Mesh) -> float:
+    """Squared thousands of pad nodes times steps, above an elastic surface in space: each iteration makes its
+    compliance anew.
+    """
+    if mesh.dim == 2 or scene.ground.elastic is None:
+        return 0.0
+    return (len(mesh.node_sets["pad"]) / 1000.0) ** 2 * scene.total_steps
 
 
 def _attraction(scene: Scene, mesh: Mesh) -> float:

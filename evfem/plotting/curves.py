@@ -34,7 +34,7 @@ FORCES = {
 ENERGIES = {
     "external_work": ("work of the bone", figures.BLACK, ":"),
     "electrostatic_work": ("work of the attraction", figures.GREEN, "--"),
-    "stored_energy": ("stored in the tissue", figures.BLUE, "-"),
+    "stored_energy": ("stored", figures.BLUE, "-"),
     "friction_dissipation": ("lost to friction", figures.VERMILION, "-"),
     "viscous_dissipation": ("lost to viscosity", figures.ORANGE, "-."),
     "kinetic_energy": ("kinetic", figures.SKY, "-."),

@@ -74,8 +74,9 @@ def kind_of(name: str, units: Units = UNITS) -> tuple[str, str]:
 
 
 def column_label(name: str, units: Units = UNITS) -> str:
-    """A column with its unit, for an axis of its own."""
-    return with_unit(column_text(name, units[name]), units[name])
+    """A column with its unit, for an axis of its own; in space a position is the x of the bone alone."""
+    text = "x of the bone" if name == "position" and "position_z" in units else column_text(name, units[name])
+    return with_unit(text, units[name])
 
 
 def axis_label(name: str, units: Units = UNITS) -> str:

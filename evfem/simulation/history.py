@@ -109,7 +109,9 @@ class History:
         metadata=column("N/mm", "along +x, in space along the slide's angle, on the bone")
     )
     normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards", "shown"))
-    tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x", "shown"))
+    tangential_force: Floats = field(
+        metadata=column("N/mm", "contact, against +x, in space against the slide's angle", "shown")
+    )
     electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards", "shown"))
     electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
     contact_width: Floats = field(

@@ -1,6 +1,7 @@
 """Fits: synthetic measurements recovered, closed forms, bounds, folders, processes, refused input."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -345,6 +346,11 @@ def test_data_that_do_not_fit_the_scene_are_refused(path):
     with pytest.raises(InputError, match='outputs: given "normal_force"'):
         ev.fit(path, ev.MeasuredValues("normal_force", [1, 2], {MU: [0.1, 0.2]}), {E: (0.1, 0.2)}, workers=1)
     refuses("data: given 3; allowed: MeasuredCurve", ev.fit, path, [3], {E: (0.1, 0.2)}, workers=1)
+    known = replace(curve, motion=0, sd=1e-4)
+    refuses(
+        "data.sd: given one for some measurements and none for others",
+        ev.fit, path, [known, replace(curve, motion=0)], {E: (0.1, 0.2)}, workers=1,
+    )  # fmt: skip
     values = ev.MeasuredValues("normal_force.last", [0.1, 0.2], {MU: [0.1, 0.2]})
     with pytest.raises(InputError, match=rf"parameters\.{MU}: given a key that the data set"):
         ev.fit(path, values, {MU: (0.1, 0.2)}, workers=1)

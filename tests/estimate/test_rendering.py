@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tools.builders import finger
+from tools.domes import dome_scene
 from tools.meshes import block
 from tools.refusals import refuses
 
@@ -210,6 +211,24 @@ def test_exact_encoding_reproduces_a_texture(texture):
     # the reference held its indentation; the display is pressed to the load that this took
     assert found.scene.motion[0] == ev.Press(force=texture.result.applied_force[2], steps=3)
     assert found.scene.motion[1] == texture.scene.motion[1]
+
+
+@pytest.mark.parametrize("angle", [0.0, 60.0, -40.0])
+def test_exact_encoding_goes_along_the_slide(angle):
+    """Friction that grows over x, felt on a display of one friction: the wish is over the way, of which x is
+    the cosine.
+    """
+    table = ev.Flat(friction=[[-2.0, 0.25], [0.0, 0.4], [0.3, 0.3], [2.0, 0.6]])
+    under = {"law": None, "voltage": 0.0, "surface": table}
+    motion = [ev.Press(indentation=0.2, steps=1), ev.Slide(0.9, steps=3, angle=angle, hold="force")]
+    reference = record(dome_scene(*motion, **under))
+    found = exact(reference, ev.Display(ev.Layer(0.02, 3.35), friction=0.15), ev.Kaczmarek(), 8000.0)
+    rows = (found.result.missed_force == 0.0) & (found.result.motion == "slide")
+    assert rows[-3:].any()
+    wanted = reference.result.applied_tangential_force
+    assert found.result.applied_tangential_force[rows] == pytest.approx(wanted[rows], rel=1e-6)
+    turned = record(dome_scene(motion[0], replace(motion[1], angle=-angle + 1.0), **under))
+    refuses("through other positions", compare, reference.result, turned.result)
 
 
 def test_slides_that_cannot_be_rendered_are_refused(jump):

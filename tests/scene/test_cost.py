@@ -34,6 +34,19 @@ def test_the_time_said_is_that_of_fingertips(resolution, ridges, steps, seconds)
     assert most <= 6.5 * least
 
 
+@pytest.mark.parametrize(
+    ("E", "steps", "seconds"), [(10.0, (1, 0), 11.4), (1e4, (2, 0), 20.0), (1e4, (2, 2), 30.0)]
+)
+def test_the_time_said_has_that_of_an_elastic_surface_in_space(E, steps, seconds):
+    """CPU seconds of coarse fingertips over 3 mm of it, measured once; rigid they take 1.1 s."""
+    pressed, slid = steps
+    motion = [ev.Press(force=0.3, steps=pressed), *([ev.Slide(1.0, steps=slid)] if slid else [])]
+    finger = ev.Fingertip(resolution="coarse", ridges="none")
+    ground = ev.Flat(friction=0.3, elastic=ev.ElasticLayer(E, 0.4, 3.0))
+    least, most = needed_time(ev.Scene(finger, ground, motion=motion), finger.mesh())
+    assert least < seconds < most
+
+
 def test_the_time_said_is_that_of_nine_of_ten_drawn_scenes(tmp_path):
     """Every sixteenth of the 370 scenes whose ends and CPU seconds, without those of packages, are kept."""
     with (Path(__file__).parents[1] / "tools/ends.csv").open(newline="") as file:
