@@ -186,11 +186,11 @@ def differenced(scene, apply, value, step, columns=FORCES):
     return [(ends[1][name] - ends[0][name]) / (2.0 * step) for name in columns]
 
 
-def largest(result, unit):
-    """The largest number of a unit in a run, of forces and works a thousandth of it."""
-    names = [name for name, own in result.units.items() if own == unit and name != "motion"]
-    found = max(np.abs(np.nan_to_num(result[name])).max() for name in names)
-    return found if unit in ("", "mm", "V") else 1e-3 * found
+def largest(result, name):
+    """The largest number of a column's unit in a run, of forces a thousandth of it."""
+    alike = [one for one, unit in result.units.items() if unit == result.units[name] and one != "motion"]
+    found = max(np.abs(np.nan_to_num(result[one])).max() for one in alike)
+    return 1e-3 * found if name.endswith("_force") else found
 
 
 def changed(scene, key, value):
@@ -331,9 +331,9 @@ def test_derivatives_are_those_of_differences_of_runs(case):
     holds = np.cumprod(found.valid_to[key] > 4 * size).astype(bool)
     assert holds[: min(5, len(holds))].all()
     for name, row in zip(columns, runs, strict=True):
-        # works depend on the parts of a step, gaps and voltages are known to 1e-6 of lengths and volts
+        # works depend on the parts of a step; but for forces 1e-6 is of the largest number of the unit
         same = holds & ~(is_work(name) & (np.cumsum(np.abs(parts)) > 0.0))
-        size = largest(found.result, found.result.units[name])
+        size = largest(found.result, name)
         scale = max(np.abs(row).max(), size / value)
         assert found[name, key][same] == pytest.approx(row[same], rel=1e-6, abs=1e-6 * scale), name
 
