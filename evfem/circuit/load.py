@@ -35,9 +35,11 @@ COLUMNS = (
 STEP_MEANS = ("current_rms", "power")
 
 
-def _fractions(model: Any, pad: Any) -> Any:
-    """Fractions (P,) of the voltage of the electrodes below the nodes of a pad."""
-    return voltage_fraction(getattr(model.surface, "electrodes", None), pad.position[:, 0])
+def _fractions(model: Any, pad: Any) -> tuple[Any, Any]:
+    """Fractions (P,) of the voltage of the electrodes below the nodes of a pad, and which have one below."""
+    electrodes, x = getattr(model.surface, "electrodes", None), pad.position[:, 0]
+    ones = None if electrodes is None else [(a, b, 1.0) for a, b, _ in electrodes]
+    return voltage_fraction(electrodes, x), voltage_fraction(ones, x)
 
 
 def finger_potential(model: Any, over: Floats, each: Any) -> Any:
@@ -49,8 +51,8 @@ def finger_potential(model: Any, over: Floats, each: Any) -> Any:
 
 def admittance_of(model: Any, attraction: Any, pad: Any, frequency: float) -> complex:
     """Current over voltage of a pad in S (in the plane S/mm), where electrodes have fractions of a source."""
-    each = nodal_admittances(attraction, pad, model.closing.electrics, frequency)
-    over = _fractions(model, pad)
+    over, there = _fractions(model, pad)
+    each = there * nodal_admittances(attraction, pad, model.closing.electrics, frequency)
     return complex(np.sum(over * (over - finger_potential(model, over, each)) * each))
 
 
@@ -127,12 +129,14 @@ class Air(Room):
         if electrics.resolved:
             return np.abs(attraction.charging.across(attraction.charged(pad)))
         volts = abs(pad.voltage) * electrics.peak_across(gap, attraction.layers)
-        over = _fractions(model, pad)
-        if model.scene.grounded or not electrics.conducts:
-            each = attraction.carrying(pad) / (gap + electrics.gap_eps_r * electrics.reduced)
-        else:
+        over, there = _fractions(model, pad)
+        if model.scene.grounded:
+            return volts * np.abs(over)
+        if electrics.conducts:
             each = nodal_admittances(attraction, pad, electrics, electrics.frequency)
-        return volts * np.abs(over - finger_potential(model, over, each))
+        else:
+            each = attraction.carrying(pad) / (gap + electrics.gap_eps_r * electrics.reduced)
+        return volts * there * np.abs(over - finger_potential(model, over, there * each))
 
     def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         yield from self._sparks(scene, rows)

@@ -160,11 +160,11 @@ def aliased(scene: Scene, mesh: Mesh) -> str | None:
     apart, finest, course = min(rows, key=lambda row: row[:2])
     pad = mesh.points[mesh.node_sets["pad"], ::2]
     reach = float(np.ptp(pad, axis=0).max()) + sum(abs(course.distance) for *_, course in slides)
-    way = np.linspace(-0.5 * reach, 0.5 * reach, int(np.clip(2 * PER_SPACING * reach / apart, 2, MOST)))
-    places = pad.mean(axis=0) + way[:, None] * np.array(course.direction)[: mesh.dim - 1]
+    line = np.linspace(-0.5 * reach, 0.5 * reach, int(np.clip(2 * PER_SPACING * reach / apart, 2, MOST)))
+    points = pad.mean(axis=0) + line[:, None] * np.array(course.direction)[: mesh.dim - 1]
     surface: Any = scene.ground
-    for what, values in (("height", surface.relief(places)[0]), ("friction", surface.friction_at(places))):
-        wave = _shortest_wave(values, way[1] - way[0])
+    for what, values in (("height", surface.relief(points)[0]), ("friction", surface.friction_at(points))):
+        wave = _shortest_wave(values, line[1] - line[0])
         if wave < ROWS_PER_WAVE * apart:
             needed = math.ceil(ROWS_PER_WAVE * abs(course.distance) / wave)
             return (

@@ -177,8 +177,8 @@ class Electrics:
         if not (several and self.conducts):
             return np.asarray(self.crest * across_gap(gap, layers, self.gap_eps_r))
         amplitudes, stacks = self._period
-        shares = [0.0 * gap if one is None else gap / (gap + self.gap_eps_r * one) for one in stacks]
-        return np.abs(np.fft.irfft(amplitudes[:, None] * shares, SAMPLES, axis=0)).max(axis=0)
+        fractions = [0.0 * gap if one is None else gap / (gap + self.gap_eps_r * one) for one in stacks]
+        return np.abs(np.fft.irfft(amplitudes[:, None] * fractions, SAMPLES, axis=0)).max(axis=0)
 
     @cached_property
     def _period(self) -> tuple[Any, list[Any]]:
@@ -186,11 +186,11 @@ class Electrics:
         the complex reduced thicknesses (mm) of the layers there; None where the gap has no field.
         """
         drive, given, at = self.drive, self.given, self.frequency
-        wave: Any = given
         assert drive is not None
         assert at is not None
         found = powers(given)
-        wave, effective = (drive.signal(1.0), 1.0) if found is None else (wave, found[0])
+        wave: Any = drive.signal(1.0) if found is None else given
+        effective = 1.0 if found is None else found[0]
         volts = [wave((k + 0.5) / (SAMPLES * at)) / effective for k in range(SAMPLES)]
         still = steady_layers((self.skin, self.insulator), drive, self.gap_eps_r)
         layers = [still, *(self.layers_at(at * n) for n in range(1, SAMPLES // 2 + 1))]

@@ -237,8 +237,8 @@ def _electrostatic(interface: Interface, attraction: PadTraction, state: State) 
     for first in attraction.parts[:1]:
         if first.name == ELECTROSTATIC and first.acts(state.voltage):
             both = attraction.restored(state.voltage)[0]
-            share = first.restored(state.voltage)[0] / np.where(both > 0.0, both, np.inf)
-            return np.asarray(reduce(np.hypot, pull.T) + share * interface.withheld(state))
+            fraction = first.restored(state.voltage)[0] / np.where(both > 0.0, both, np.inf)
+            return np.asarray(reduce(np.hypot, pull.T) + fraction * interface.withheld(state))
     return np.zeros(len(pull))
 
 

@@ -119,13 +119,28 @@ def test_electrodes_that_end_and_a_finger_without_ground_are_capacitors_in_serie
     ]
     whole, live, floating = (ev.simulate(one) for one in runs)
     assert live.current_rms[0] == pytest.approx(0.5 * whole.current_rms[0], rel=0.05)
-    assert floating.current_rms[0] == pytest.approx(0.5 * live.current_rms[0], rel=0.05)
-    assert floating.power[0] == pytest.approx(0.5 * live.power[0], rel=0.08)
+    assert floating.current_rms[0] == pytest.approx(0.5 * live.current_rms[0], rel=0.005)
+    assert floating.power[0] == pytest.approx(0.5 * live.power[0], rel=0.005)
     assert live.breakdown[0] == pytest.approx(whole.breakdown[0], rel=0.01)
-    assert floating.breakdown[0] == pytest.approx(0.5 * live.breakdown[0], rel=0.05)
+    assert floating.breakdown[0] == pytest.approx(0.5 * live.breakdown[0], rel=0.005)
     for one, result in zip(runs, (whole, live, floating), strict=True):
         found = ev.electrical_impedance(one, [100.0]).current_rms(50.0)
         assert result.current_rms[0] == pytest.approx(found[0], rel=1e-9)
+
+
+def test_a_finger_over_uneven_electrodes_joins_their_capacitors():
+    """C_1 C_2 / (C_1 + C_2) of those over each electrode alone; the smaller has the larger voltage."""
+    rows = np.array([[-20.0, 0.9, 0.0], [1.0, 20.0, 0.0]])
+    drive, runs = ev.Drive(frequency=100.0), []
+    for live, ground in (([1.0, 0.0], True), ([0.0, 1.0], True), ([1.0, 0.0], False)):
+        display = ev.Display(electrodes=np.column_stack([rows[:, :2], live]).tolist())
+        how = {"finger": PAD, "motion": ev.Hover(0.1), "field": "full", "grounded": ground}
+        runs.append(ev.simulate(scene(drive, surface=display, **how)))
+    first, second, joined = (one.current_rms[0] for one in runs)
+    assert first > 1.3 * second
+    assert joined == pytest.approx(first * second / (first + second), rel=0.01)
+    over = first / (first + second)
+    assert runs[2].breakdown[0] == pytest.approx(over * runs[1].breakdown[0], rel=0.02)
 
 
 def test_a_square_wave_is_the_sum_of_its_first_sines():
