@@ -34,7 +34,7 @@ FULL_FIELD, RELIEF = 2.9, 1.6
 #: an attraction over the shear modulus that counts as strong, and what one not known beforehand is taken for
 STRONG, UNKNOWN = 0.1, 0.3
 #: seconds of a step above an elastic surface in space with 1,000 pad nodes, stiff and soft
-SINKING = (20.0, 320.0)
+SINKING = (6.0, 60.0)
 #: range about the estimate: without a strong attraction, with it, and with it on a relief
 CALM, ATTRACTED, SNAPPING = (0.4, 2.5), (0.3, 3.5), (0.3, 10.0)
 

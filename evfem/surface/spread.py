@@ -20,7 +20,6 @@ follows every iterate makes frictionless ridges roll to and fro (1,400 iteration
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,8 @@ from evfem.surface.skin import Skin
 PARTS = np.array([[83.0, -7.0, 32.0], [-7.0, 83.0, 32.0], [32.0, 32.0, 368.0]]) / 648.0
 #: middles of a face's sides, between the corners
 SIDES = ((4, 0, 1), (5, 1, 2), (6, 2, 3), (7, 3, 0))
+#: of each of the components x, y, z the one of a surface's matrix, and its sign there
+ORDER, SIGN = np.array([1, 0, 2]), np.array([-1.0, 1.0, -1.0])
 #: a share of a side's size, and an angle (rad), that are none; and by how much smooth outlines bend at most
 STRAIGHT, SMOOTH = 1e-8, 0.1
 
@@ -47,9 +48,10 @@ class Strips:
     places: Floats
     sizes: Floats
 
-    def below_nodes(self, found: Floats) -> Floats:
-        """A matrix of the surface for forces on the strips as that for forces on the nodes, (c k, c k)."""
-        return found
+    @property
+    def shared(self) -> Floats:
+        """Forces on the strips by those on the nodes, T^-T in strips (m, k)."""
+        return np.eye(self.sizes.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +63,9 @@ class Spread(Strips):
     split: Any
     means: Any
 
-    def below_nodes(self, found: Floats) -> Floats:
-        k, m = self.split.shape
-        size = len(found) // m
-        made, blocks = np.empty((size, k, size, k)), found.reshape(size, m, size, m)
-        for p, q in product(range(size), repeat=2):
-            shared = self.split @ (self.split @ np.ascontiguousarray(blocks[p, :, q])).T
-            made[p, :, q] = self.means.solve(self.means.solve(shared).T)
-        return made.reshape(size * k, size * k)
+    @property
+    def shared(self) -> Floats:
+        return np.asarray(self.split.T @ self.means.solve(np.eye(self.split.shape[0]), "T"))
 
 
 def strips_below(pad: Pad | Skin, position: Floats, rest: Floats, over: Ints, least: float) -> Strips:
@@ -131,16 +128,31 @@ def _means(sides: Ints, place: Floats, length: Floats) -> Any:
     return (identity(length.size) + found).tocsc()
 
 
-def by_nodes(found: Floats, dim: int) -> Floats:
-    """A matrix (dim k, dim k) of a surface, for forces on the finger along x, y[, z] node by node: those on
-    the surface, component by component, are into it and along +x[, +z], F_y, -F_x[, -F_z].
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """How forces (k, dim) on the finger's nodes lie on m strips, `by_node` (m, k), and what a surface's
+    matrices (dim m, dim m) are to them. Those are component by component, into the surface and along
+    +x[, +z], of forces F_y, -F_x[, -F_z].
     """
-    size, order, sign = len(found) // dim, np.array([1, 0, 2])[:dim], np.array([-1.0, 1.0, -1.0])[:dim]
-    blocks = found.reshape(dim, size, dim, size)
-    made = np.empty((size, dim, size, dim))
-    for p, q in product(range(dim), repeat=2):
-        np.multiply(blocks[order[p], :, order[q]], sign[p] * sign[q], out=made[:, p, :, q])
-    return made.reshape(dim * size, dim * size)
+
+    by_node: Floats
+
+    def moved(self, found: Floats, force: Floats) -> Floats:
+        """What such a matrix gives at the nodes (k, dim) under a force (k, dim)."""
+        order, sign = ORDER[: force.shape[1]], SIGN[: force.shape[1]]
+        on_strips = (self.by_node @ (force * sign)[:, order]).T.ravel()
+        given = (found @ on_strips).reshape(force.shape[1], -1)
+        return np.asarray((given @ self.by_node).T[:, order] * sign)
+
+    def among(self, found: Floats, nodes: Ints, dim: int) -> Floats:
+        """Such a matrix of some of the nodes (dim c, dim c), node by node along x, y[, z]."""
+        by_node, (m, c) = np.ascontiguousarray(self.by_node[:, nodes]), (len(self.by_node), nodes.size)
+        made = np.empty((c, dim, c, dim))
+        for p, rows in enumerate(found.reshape(dim, m, dim * m)):
+            blocks = ((by_node.T @ rows).reshape(c * dim, m) @ by_node).reshape(c, dim, c)
+            made[:, ORDER[p], :, :] = (blocks.transpose(0, 2, 1) * SIGN[ORDER[p]])[:, :, ORDER[:dim]]
+        made *= SIGN[:dim]
+        return made.reshape(dim * c, dim * c)
 
 
 class Facets:

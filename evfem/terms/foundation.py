@@ -27,7 +27,7 @@ from evfem.contact.below import RIGID_BELOW, Level, RigidBelow, Tilt
 from evfem.contact.condensed import COMPONENTS
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
-from evfem.surface.spread import Facets, by_nodes, strips_below
+from evfem.surface.spread import Facets, Shared, strips_below
 
 #: height of the loaded zone in node distances: nodes above it have no foundation; in space with an attraction
 #: too
@@ -38,28 +38,29 @@ STEP = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Yielding:
-    """Surface compliance for k of P pad nodes, those in the loaded zone, `over` (k,), at one configuration:
-    `compliance` (dim k, dim k) from forces on the finger along x, y[, z], node by node, to their contribution
-    to the relative positions, and its derivatives `slope` (d, dim k, dim k) by the positions of the displaced
-    nodes along x[, z]; what is `left` of both from before the step.
+    """An elastic surface below k of P pad nodes, those in the loaded zone, `over` (k,), at one configuration:
+    the `compliance` (dim m, dim m) of its m strips, from forces on the finger's nodes `shared` among them to
+    their contribution to the relative positions, and its derivatives `slope` (d, dim m, dim m) by the
+    positions of the displaced strips along x[, z]; what is `left` of both from before the step.
     """
 
     over: Ints
     compliance: Floats
     slope: Floats
+    shared: Shared
     left: tuple[Any, Any] = (0.0, 0.0)
 
     def given(self, force: Floats) -> Floats:
         """Contribution C F to the relative positions (P, dim) by forces on the finger (P, dim)."""
         found = np.zeros_like(force) + self.left[0]
-        found[self.over] += (self.compliance @ force[self.over].ravel()).reshape(-1, force.shape[1])
+        found[self.over] += self.shared.moved(self.compliance, force[self.over])
         return found
 
     def change(self, force: Floats) -> Floats:
         """Its derivatives (P, d, dim) along x[, z]: stretch and slope of the displaced surface."""
         found = np.zeros((len(force), len(self.slope), force.shape[1])) + self.left[1]
-        moved = (self.slope @ force[self.over].ravel()).reshape(len(self.slope), -1, force.shape[1])
-        found[self.over] += moved.transpose(1, 0, 2)
+        for axis, slope in enumerate(self.slope):
+            found[self.over, axis] += self.shared.moved(slope, force[self.over])
         return found
 
     def among(self, nodes: Ints) -> Floats:
@@ -67,12 +68,12 @@ class Yielding:
         return self.picked(self.compliance, nodes)
 
     def picked(self, matrix: Floats, nodes: Ints) -> Floats:
-        """The same of a matrix (dim k, dim k)."""
+        """The same of a matrix (dim m, dim m)."""
         dim = len(self.slope) + 1
         (_, own, there) = np.intersect1d(nodes, self.over, assume_unique=True, return_indices=True)
         found = np.zeros((dim * nodes.size, dim * nodes.size))
-        rows, columns = ((dim * at[:, None] + np.arange(dim)).ravel() for at in (own, there))
-        found[np.ix_(rows, rows)] = matrix[np.ix_(columns, columns)]
+        rows = (dim * own[:, None] + np.arange(dim)).ravel()
+        found[np.ix_(rows, rows)] = self.shared.among(matrix, there, dim)
         return found
 
 
@@ -257,6 +258,7 @@ class ElasticFoundation(Rigid):
         self.surface, self.elastic, self.pad, self.least = surface, surface.elastic, pad, least
         self.spacing, self.reach = spacing, NEAR * spacing
         self._last: tuple[bytes, Yielding] | None = None
+        self._zone = np.zeros(len(rest), dtype=bool)
         own = deepcopy(self.elastic) if isinstance(self.elastic, Foundation) else None
         self.elastic, self._own = own or self.elastic, own or Memoryless()
         self._remembers = own is not None
@@ -268,6 +270,7 @@ class ElasticFoundation(Rigid):
         left = self._own.left
         self._left = left * old.memory[DISPLACEMENT], left * old.memory[GRADIENT]
         self._last = None
+        self._zone[:] = False
 
     def accept(self, old: Any, new: Any) -> dict[str, Floats]:
         if not self._remembers:
@@ -385,23 +388,23 @@ class ElasticFoundation(Rigid):
         return np.asarray(length * (1.0 - np.einsum("pk,pkj,pj->p", along, stretch, along)))
 
     def below(self, position: Floats, height: Floats) -> Yielding:
-        """Surface compliance and its x-derivative for the nodes at (P, dim) within `reach` of the undeformed
-        surface, which is `height` (P,) below. The last result is cached by position.
+        """Surface compliance and its derivatives for the nodes at (P, dim) that face the undeformed surface,
+        `height` (P,) below, within `reach`, or did in an iterate of this step: a node at the limit that comes
+        and goes would keep the step from its end. The last result is cached by position.
         """
         key = position[:, ::2].tobytes() + height.tobytes()
         if self._last is None or self._last[0] != key:
             reach = self.reach if position.shape[1] == 2 else NEAR_IN_SPACE * self.spacing
-            self._last = key, self._made(position, height <= reach)
+            self._zone |= (self.pad.tributary(position) > 0.0) & (height <= reach)
+            self._last = key, self._made(position)
         return self._last[1]
 
-    def _made(self, position: Floats, near: Any) -> Yielding:
-        length = self.pad.tributary(position)
-        over = np.flatnonzero((length > 0.0) & near)
+    def _made(self, position: Floats) -> Yielding:
+        over = np.flatnonzero(self._zone)
         below = strips_below(self.pad, position, self.rest, over, self.least)
-        x, size, dim = below.places, below.sizes, position.shape[1]
-        found = np.asarray(self.elastic.compliance(x, size)), *slopes(self.elastic, x, size)
-        compliance, *slope = (by_nodes(below.below_nodes(each), dim) for each in found)
-        return Yielding(over, compliance, np.stack(slope), self._left)
+        x, size = below.places, below.sizes
+        compliance = np.asarray(self.elastic.compliance(x, size))
+        return Yielding(over, compliance, slopes(self.elastic, x, size), Shared(below.shared), self._left)
 
 
 def in_laboratory(force: Floats, surface: SurfaceState) -> Floats:
