@@ -157,7 +157,7 @@ def voltage_for(
     with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear area law (m =
     1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops out. Otherwise the area
     law needs the force of `depth` mm. The voltage is 0 where the target is below the display's friction.
-    `amplifier` limits the profile (its slew needs `speed` in mm/s).
+    `amplifier` limits the profile (its slew needs the `speed` along x in mm/s).
 
     >>> from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
     >>> from evfem.circuit.encoding import AreaLaw

@@ -7,7 +7,10 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from evfem.common.checks import count
+from evfem.common.notices import warn
 from evfem.errors import InputError, StopRun, describe_value, readable
 from evfem.simulation.history import COLUMNS, ROOM_COLUMNS, SPATIAL, WIDTHS, Values, no_column
 
@@ -59,6 +62,7 @@ class StopWhen:
         found = ("", condition) if callable(condition) else _comparison(condition)
         self.column: str = found[0]
         self.true: Callable[[Mapping[str, Any]], Any] = found[1]
+        self.empty = bool(self.column)
         self.words = "a condition is met" if callable(condition) else " ".join(condition.split())
 
     def __repr__(self) -> str:
@@ -68,19 +72,26 @@ class StopWhen:
     def started(self, mesh: Any, scene: Any = None, total_steps: int = 0) -> None:
         """A run begins: raise InputError where its finger has not the column."""
         _there(self.column, mesh.dim)
+        self.empty = bool(self.column)
 
     def step(self, row: Mapping[str, Any], frame: Any = None, checkpoint: Any = None) -> None:
         """A step has converged: raise `StopRun` where the condition is true."""
-        dimension = 3 if "position_z" in row else 2
+        dimension, row = 3 if "position_z" in row else 2, Values(row)
         _there(self.column, dimension)
         try:
-            met = self.motion in (None, row["motion_index"]) and self.true(Values(row))
+            met = self.motion in (None, row["motion_index"]) and self.true(row)
         except KeyError as error:  # of a function
             for name in error.args[:1]:
                 _there(name, dimension)
             raise
+        self.empty = self.empty and not np.isfinite(row[self.column])
         if met:
             raise StopRun(f"{self.words} in step {row['step']}")
+
+    def finished(self, result: Any) -> None:
+        """The run has reached its end: a warning if the column had no value in any step."""
+        if self.empty:
+            warn(f"{self!r} could not stop the run: {self.column} was empty in every step of this scene")
 
 
 def _there(name: Any, dimension: int) -> None:

@@ -141,3 +141,10 @@ def test_a_motion_is_a_whole_number():
     with pytest.raises(ev.InputError, match="motion: given -1"):
         ev.StopWhen("step > 1", motion=-1)
     assert repr(ev.StopWhen("step >  1", motion=0)) == "StopWhen('step > 1', motion=0)"
+
+
+def test_a_column_without_a_value_in_any_step_is_said_at_the_end():
+    scene = ev.Scene(finger(block()), ev.Display(), motion=[ev.Hover(0.1, steps=2)])
+    with pytest.warns(UserWarning, match="friction was empty in every step"):
+        ev.simulate(scene, observers=[ev.StopWhen("friction > 0.3")])
+    assert len(ev.simulate(scene, observers=[ev.StopWhen("indentation > 0.3")]).step) == 2
