@@ -43,7 +43,7 @@ from evfem.protocols import ForceLaw, TimeSignal
 
 # keys that a scene file has beside others in [electrostatics]
 DriveFrequency = Annotated[float | None, FREQUENCY, "of the alternating voltage; without it a direct one"]
-Waveform = Annotated[str, among(WAVEFORMS), "of the alternating voltage"]
+Waveform = Annotated[str, among(WAVEFORMS), "of the alternating voltage; a signal over time has its own"]
 Skin = Annotated[
     Any,
     {"allowed": f"{' | '.join(SKINS)} | the path of a csv file", "type": str},
@@ -144,7 +144,12 @@ def spectrum(drive: Drive, signal: Any) -> tuple[Floats, Floats]:
     found = powers(signal)
     if found is not None:
         return found[1:]
-    return WAVEFORMS[drive.waveform].harmonics()
+    return WAVEFORMS[waveform(drive, signal)].harmonics()
+
+
+def waveform(drive: Drive, signal: Any) -> str:
+    """Name of the waveform of a voltage: the drive's; a carrier has its own."""
+    return str(getattr(signal, "waveform", drive.waveform))
 
 
 def steady_layers(solids: tuple[Layer, ...], drive: Drive, gap_eps_r: float) -> Layers | None:
@@ -165,7 +170,7 @@ def mean_law(
     """Law and layers of the mean attraction over the cycle at `frequency` (Hz), of drive or `signal`."""
     gap_eps_r = getattr(law, "gap_eps_r", 1.0)
     gap_layer = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": gap_eps_r}
-    single = powers(signal) is None and WAVEFORMS[drive.waveform].harmonics()[0].size == 1
+    single = powers(signal) is None and WAVEFORMS[waveform(drive, signal)].harmonics()[0].size == 1
     if frequency is None or single:
         return law, Layers.of(*solids, frequency=frequency, **gap_layer)
     order, weight = spectrum(drive, signal)

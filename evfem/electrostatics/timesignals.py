@@ -266,7 +266,7 @@ class Carrier:
         "height of the carrier: a number, or a signal that modulates it",
     ]
     resolved: Annotated[bool, yes_or_no(), "false: the root mean square over its cycles"] = True
-    kind = "carrier"
+    kind, waveform = "carrier", "sine"
 
     def __post_init__(self) -> None:
         check_fields(self)

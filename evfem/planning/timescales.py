@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.electrostatics.dielectrics import Dielectric, seen_at
-from evfem.electrostatics.drive import powers
+from evfem.electrostatics.drive import powers, waveform
 from evfem.electrostatics.laws import Layer
 from evfem.electrostatics.relaxation import Sandwich
-from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 
@@ -91,8 +91,8 @@ def bandwidth(scene: Scene) -> float:
 def _swings(scene: Scene) -> bool:
     """Whether the attraction swings within a period: not that of a square wave where nothing conducts."""
     assert scene.drive is not None
-    square = scene.drive.waveform == "square" and powers(scene.voltage) is None
-    return not square or isinstance(scene.voltage, Carrier) or scene.electrics.conducts
+    square = waveform(scene.drive, scene.voltage) == "square" and powers(scene.voltage) is None
+    return not square or scene.electrics.conducts
 
 
 def slowest_swing(scene: Scene) -> float:

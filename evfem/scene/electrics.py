@@ -17,7 +17,7 @@ from evfem.common.checks import Values
 from evfem.electrostatics.alternating import SINGLE
 from evfem.electrostatics.breakdown import Limited, across_gap
 from evfem.electrostatics.dielectrics import seen_at
-from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum, steady_layers
+from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum, steady_layers, waveform
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import Sandwich
 from evfem.electrostatics.roughness import NONE, distribution_of
@@ -209,7 +209,7 @@ class Electrics:
         """Which harmonics (H,) an amplifier with edges of its own has: of a square wave the first ones."""
         order = self.harmonics[0]
         assert self.drive is not None
-        ideal = self.drive.waveform == "square" and powers(self.given) is None
+        ideal = waveform(self.drive, self.given) == "square" and powers(self.given) is None
         return order < 2.0 * SINGLE if ideal else np.full(order.shape, True)
 
     def layers_at(self, frequency: float) -> Layers:

@@ -118,3 +118,21 @@ def test_a_bias_leaves_a_gap_that_leaks_no_field():
 
 def test_an_averaged_carrier_has_its_peak_without_a_drive_too():
     assert hovering(ev.Carrier(1e4, 40.0, resolved=False)) == pytest.approx(by_hand(40.0), rel=2e-3)
+
+
+def test_an_averaged_carrier_is_a_sine_whatever_the_drive_would_be():
+    """Beside a leak the share of a square wave's gap ended in a TypeError, and the pad was pulled by the
+    harmonics of a square wave.
+    """
+    carrier = ev.Carrier(2000.0, ev.Sine(20.0, 10.0, bias=60.0), resolved=False)
+    pad, motion = ev.FingerPad(resolution="coarse", ridges=False), [ev.Hover(GAP), ev.Wait(0.01, steps=4)]
+    found = []
+    for waveform in ("square", "sine"):
+        drive = ev.Drive(waveform=waveform, skin="gabriel_dry", gap_conductivity=SIGMA)
+        scene = ev.Scene(
+            pad, ev.Display(insulator=ev.TOUCHSCREEN), ev.StrongTroxel(), carrier, motion, drive=drive
+        )
+        found.append(ev.simulate(scene))
+    for name in ("breakdown", "electrostatic_force", "current_rms", "power"):
+        assert found[0][name] == pytest.approx(found[1][name], rel=1e-12)
+        assert (found[0][name] != 0.0).any()
