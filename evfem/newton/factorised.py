@@ -303,6 +303,7 @@ class FactorisedBody:
         if state.bone.size == 3:
             return None
         ahead = self.begin(state, target, start=state)
+        state = state.remembering(self.pressure.first(state.u))  # none is kept between steps
         self.linearisation.factorise(state)
         still = np.zeros(len(self.linearisation.tangent.schur))
         none, found = np.zeros(self.body.reduce(state.u).size), []
