@@ -49,6 +49,8 @@ TIMES = ROOT / "studies" / "seconds.csv"
 #: what a run left, as text between its marks
 BLOCK = re.compile(r"(<!-- measured: ([\w-]+) -->\n\n).*?(\n<!-- end -->)", re.S)
 PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
+#: how many campaigns a page is wide
+SHOWN = 6
 #: rows of the table of campaigns, which are columns of campaigns.csv
 ENDS = ["scenes", "equilibrium", "explained", "not_converged", "invariants_broken", "error", "timeout"]
 
@@ -115,7 +117,8 @@ def robustness(stability: Found, campaigns: list[Found], long: list[Found], mist
 
 
 def campaigns(rows: list[Found]) -> str:
-    """Ends of the campaigns by seeds."""
+    """Ends of the last campaigns, as many as a page is wide, by seeds."""
+    rows = rows[-SHOWN:]
     lines = [[f"`{end}`" if end != "scenes" else end, *(row[end] or "-" for row in rows)] for end in ENDS]
     lines.append(["CPU s of a scene, at most", *(row["limit"] for row in rows)])
     lines.append(["slowest over the median of its size", *(f"{float(row['slowest']):.0f}" for row in rows)])
