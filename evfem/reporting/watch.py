@@ -62,7 +62,6 @@ class StopWhen:
         found = ("", condition) if callable(condition) else _comparison(condition)
         self.column: str = found[0]
         self.true: Callable[[Mapping[str, Any]], Any] = found[1]
-        self.empty = bool(self.column)
         self.words = "a condition is met" if callable(condition) else " ".join(condition.split())
 
     def __repr__(self) -> str:
@@ -72,26 +71,25 @@ class StopWhen:
     def started(self, mesh: Any, scene: Any = None, total_steps: int = 0) -> None:
         """A run begins: raise InputError where its finger has not the column."""
         _there(self.column, mesh.dim)
-        self.empty = bool(self.column)
 
     def step(self, row: Mapping[str, Any], frame: Any = None, checkpoint: Any = None) -> None:
         """A step has converged: raise `StopRun` where the condition is true."""
-        dimension, row = 3 if "position_z" in row else 2, Values(row)
+        dimension = 3 if "position_z" in row else 2
         _there(self.column, dimension)
         try:
-            met = self.motion in (None, row["motion_index"]) and self.true(row)
+            met = self.motion in (None, row["motion_index"]) and self.true(Values(row))
         except KeyError as error:  # of a function
             for name in error.args[:1]:
                 _there(name, dimension)
             raise
-        self.empty = self.empty and not np.isfinite(row[self.column])
         if met:
             raise StopRun(f"{self.words} in step {row['step']}")
 
     def finished(self, result: Any) -> None:
-        """The run has reached its end: a warning if the column had no value in any step."""
-        if self.empty:
-            warn(f"{self!r} could not stop the run: {self.column} was empty in every step of this scene")
+        """The run has reached its end: a warning if the column had no value in any step that counts."""
+        counts = result.motion_index == self.motion if self.motion is not None else result.step > 0
+        if self.column and counts.any() and not np.isfinite(result[self.column][counts]).any():
+            warn(f"{self!r} could not stop the run: {self.column} was empty in every step that counts")
 
 
 def _there(name: Any, dimension: int) -> None:

@@ -169,15 +169,21 @@ def love(x: Floats, a: Floats, b: Floats, of: Callable[..., Floats] | None = Non
     return np.asarray(found) / (a * b) ** 2
 
 
-def _integrals(x: Floats, z: Floats) -> Floats:
-    """Second integrals over x and over z of what `love` takes the means of, but for what its differences
-    cancel.
-    """
+def _terms(x: Floats, z: Floats) -> tuple[Floats, ...]:
+    """|x|, |z|, r, its logarithm, the angle from the axis of z, and arsinh |x/z| and |z/x|, 0 on the axes."""
     u, v, r = np.abs(x), np.abs(z), np.hypot(x, z)
     log, angle = np.log(np.where(r > 0.0, r, 1.0)), np.arctan2(u, v)  # from the axis of z
     by_x, by_z = (
         np.arcsinh(np.divide(p, q, out=np.zeros_like(p), where=q > 0.0)) for p, q in ((u, v), (v, u))
     )
+    return u, v, r, log, angle, by_x, by_z
+
+
+def _integrals(x: Floats, z: Floats) -> Floats:
+    """Second integrals over x and over z of what `love` takes the means of, but for what its differences
+    cancel.
+    """
+    u, v, r, log, angle, by_x, by_z = _terms(x, z)
     over_x, over_z = r**3 / 6.0 + 0.5 * v**2 * (u * by_x - r), r**3 / 6.0 + 0.5 * u**2 * (v * by_z - r)
     mixed = -np.sign(x * z) * (2.0 * u * v * r + u**3 * by_z + v**3 * by_x) / 3.0
     ahead = (v**2 * u / 2.0 - u**3 / 6.0) * log + v**3 / 6.0 * angle + 0.5 * u**2 * v * (0.5 * np.pi - angle)
@@ -187,11 +193,7 @@ def _integrals(x: Floats, z: Floats) -> Floats:
 
 def _slopes(x: Floats, z: Floats) -> Floats:
     """Derivatives (2, 5, m) of `_integrals` by x and by z."""
-    u, v, r = np.abs(x), np.abs(z), np.hypot(x, z)
-    log, angle = np.log(np.where(r > 0.0, r, 1.0)), np.arctan2(u, v)
-    by_x, by_z = (
-        np.arcsinh(np.divide(p, q, out=np.zeros_like(p), where=q > 0.0)) for p, q in ((u, v), (v, u))
-    )
+    u, v, r, log, angle, by_x, by_z = _terms(x, z)
     side, height, both = np.sign(x), np.sign(z), np.sign(x * z)
     steep = np.array([side * 0.5 * (r * u + v**2 * by_x), height * v * (u * by_x - r)])  # of over_x
     flat = np.array([side * u * (v * by_z - r), height * 0.5 * (r * v + u**2 * by_z)])

@@ -49,7 +49,7 @@ class Strips:
     sizes: Floats
 
     @property
-    def shared(self) -> Floats:
+    def distribution(self) -> Floats:
         """Forces on the strips by those on the nodes, T^-T in strips (m, k)."""
         return np.eye(self.sizes.size)
 
@@ -64,7 +64,7 @@ class Spread(Strips):
     means: Any
 
     @property
-    def shared(self) -> Floats:
+    def distribution(self) -> Floats:
         return np.asarray(self.split.T @ self.means.solve(np.eye(self.split.shape[0]), "T"))
 
 
@@ -129,7 +129,7 @@ def _means(sides: Ints, place: Floats, length: Floats) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
+class Distribution:
     """How forces (k, dim) on the finger's nodes lie on m strips, `by_node` (m, k), and what a surface's
     matrices (dim m, dim m) are to them. Those are component by component, into the surface and along
     +x[, +z], of forces F_y, -F_x[, -F_z].

@@ -27,7 +27,7 @@ from evfem.contact.below import RIGID_BELOW, Level, RigidBelow, Tilt
 from evfem.contact.condensed import COMPONENTS
 from evfem.surface.pad import Pad, SurfaceState, surface_state
 from evfem.surface.skin import Skin
-from evfem.surface.spread import Facets, Shared, strips_below
+from evfem.surface.spread import Distribution, Facets, strips_below
 
 #: height of the loaded zone in node distances: nodes above it have no foundation; in space with an attraction
 #: too
@@ -39,28 +39,28 @@ STEP = 1e-5
 @dataclass(frozen=True, eq=False)
 class Yielding:
     """An elastic surface below k of P pad nodes, those in the loaded zone, `over` (k,), at one configuration:
-    the `compliance` (dim m, dim m) of its m strips, from forces on the finger's nodes `shared` among them to
-    their contribution to the relative positions, and its derivatives `slope` (d, dim m, dim m) by the
-    positions of the displaced strips along x[, z]; what is `left` of both from before the step.
+    the `compliance` (dim m, dim m) of its m strips, from forces on them to their contribution to the relative
+    positions, and its derivatives `slope` (d, dim m, dim m) by the positions of the displaced strips along
+    x[, z]; the `distribution` of forces on nodes to strips; what is `left` of both from before the step.
     """
 
     over: Ints
     compliance: Floats
     slope: Floats
-    shared: Shared
+    distribution: Distribution
     left: tuple[Any, Any] = (0.0, 0.0)
 
     def given(self, force: Floats) -> Floats:
         """Contribution C F to the relative positions (P, dim) by forces on the finger (P, dim)."""
         found = np.zeros_like(force) + self.left[0]
-        found[self.over] += self.shared.moved(self.compliance, force[self.over])
+        found[self.over] += self.distribution.moved(self.compliance, force[self.over])
         return found
 
     def change(self, force: Floats) -> Floats:
         """Its derivatives (P, d, dim) along x[, z]: stretch and slope of the displaced surface."""
         found = np.zeros((len(force), len(self.slope), force.shape[1])) + self.left[1]
         for axis, slope in enumerate(self.slope):
-            found[self.over, axis] += self.shared.moved(slope, force[self.over])
+            found[self.over, axis] += self.distribution.moved(slope, force[self.over])
         return found
 
     def among(self, nodes: Ints) -> Floats:
@@ -73,7 +73,7 @@ class Yielding:
         (_, own, there) = np.intersect1d(nodes, self.over, assume_unique=True, return_indices=True)
         found = np.zeros((dim * nodes.size, dim * nodes.size))
         rows = (dim * own[:, None] + np.arange(dim)).ravel()
-        found[np.ix_(rows, rows)] = self.shared.among(matrix, there, dim)
+        found[np.ix_(rows, rows)] = self.distribution.among(matrix, there, dim)
         return found
 
 
@@ -404,7 +404,9 @@ class ElasticFoundation(Rigid):
         below = strips_below(self.pad, position, self.rest, over, self.least)
         x, size = below.places, below.sizes
         compliance = np.asarray(self.elastic.compliance(x, size))
-        return Yielding(over, compliance, slopes(self.elastic, x, size), Shared(below.shared), self._left)
+        return Yielding(
+            over, compliance, slopes(self.elastic, x, size), Distribution(below.distribution), self._left
+        )
 
 
 def in_laboratory(force: Floats, surface: SurfaceState) -> Floats:

@@ -147,4 +147,10 @@ def test_a_column_without_a_value_in_any_step_is_said_at_the_end():
     scene = ev.Scene(finger(block()), ev.Display(), motion=[ev.Hover(0.1, steps=2)])
     with pytest.warns(UserWarning, match="friction was empty in every step"):
         ev.simulate(scene, observers=[ev.StopWhen("friction > 0.3")])
+    pressed = ev.Scene(
+        finger(block()), ev.Display(), motion=[ev.Hover(0.1), ev.Press(indentation=0.05, steps=1)]
+    )
+    with pytest.warns(UserWarning, match="friction was empty in every step"):
+        ev.simulate(pressed, observers=[ev.StopWhen("friction > 0.3", motion=0)])
+    ev.simulate(pressed, observers=[ev.StopWhen("friction > 3"), ev.StopWhen("friction > 3", motion=2)])
     assert len(ev.simulate(scene, observers=[ev.StopWhen("indentation > 0.3")]).step) == 2
