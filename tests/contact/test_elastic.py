@@ -238,8 +238,10 @@ def test_a_fingertip_on_a_soft_display_takes_few_iterations():
     tip = ev.Fingertip(resolution="coarse", ridges="none")
     soft = ev.Display(friction=0.3, elastic=ev.ElasticLayer(0.2, 0.48, 2.0))
     attracted = {"law": ev.Kaczmarek(), "voltage": 1000.0, "breakdown": "off"}
-    result = ev.simulate(ev.Scene(tip, soft, motion=[ev.Press(force=0.1, steps=1)], **attracted))
-    assert result["newton_iterations"][0] <= 12
+    whole = ev.Solver(strategy=ev.Strategy(relaxation=False, smallest_part=0.9))
+    scene = ev.Scene(tip, soft, motion=[ev.Press(force=0.2, steps=2)], solver=whole, **attracted)
+    result = ev.simulate(scene)
+    assert result["newton_iterations"].max() <= 12
 
 
 def test_a_pad_that_slides_steadily_on_a_soft_surface_climbs_no_barrier():
