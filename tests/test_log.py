@@ -1,6 +1,8 @@
 """`evfem run -v`: every step is told and kept with its time, and so is what ended the run."""
 
+import logging
 import re
+from contextlib import ExitStack
 from datetime import datetime, timedelta
 from types import SimpleNamespace
 
@@ -9,9 +11,12 @@ from tools.commands import called
 from tools.fakes import PRESS_AND_SLIDE, SQUARE_SCENE, fake_row
 from tools.meshes import square_mesh
 
+from evfem.common import notices
 from evfem.mesh import file as meshfile
 from evfem.reporting.log import Steps, logged
 from evfem.runfolder import result_in
+from evfem.scene.file import load
+from evfem.simulation.run import simulate
 
 SCENE = f"{SQUARE_SCENE}{PRESS_AND_SLIDE}"
 LINE = re.compile(r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d),\d{3}  (.*)")
@@ -104,3 +109,40 @@ def test_a_disk_that_refuses_the_log_does_not_cost_the_run(tmp_path):
     (tmp_path / "steps.log").mkdir()
     with logged(tmp_path, wanted=True) as (steps,):
         steps.finished(SimpleNamespace(warnings=["lost"]))
+
+
+def test_how_far_a_step_is_gets_a_line_only_where_none_was_for_a_while(place, monkeypatch):
+    assert called(place, "run", "square.toml", "-v", "--out", "quick")[0] == 0
+    assert not any("of the step" in text for _, text in log_of(place / "quick"))
+    monkeypatch.setattr("evfem.reporting.log.SILENCE", 0.0)
+    _, _, err = called(place, "run", "square.toml", "-v", "--out", "slow")
+    within = re.compile(r"([\d.]+) % of the step, iteration (\d+), residual \d\.\de-\d\d")
+    texts = [text for _, text in log_of(place / "slow")]
+    found = [within.fullmatch(text) for text in texts]
+    result = result_in(place / "slow")
+    # each substep has one balance more than it has iterations
+    assert sum(one is not None for one in found) == (result.newton_iterations + result.substeps).sum()
+    assert found[1].groups() == ("0", "1")
+    assert all(f"evfem: {text}" in err for text in texts)
+
+
+def test_a_bar_shows_how_far_the_step_is_and_the_log_of_the_caller_nothing(place, monkeypatch):
+    shown, heard = [], []
+
+    class Caller(logging.Handler):
+        def emit(self, record):
+            heard.append(record.getMessage())
+
+    class Bar(ExitStack):
+        leave = False
+        update = staticmethod(lambda *told: None)
+
+        def set_postfix_str(self, text):
+            shown.append(text)
+
+    monkeypatch.setattr(notices, "GLANCE", 0.0)
+    monkeypatch.setattr(notices, "bar", lambda *told: Bar())
+    with notices.listening(Caller(), logging.DEBUG, logging.getLogger()):
+        simulate(load(place / "square.toml"), progress=True)
+    assert shown[0].startswith("0 % of the step, iteration 1, residual ")
+    assert not any("iteration" in text for text in heard)

@@ -1,7 +1,8 @@
 """What the package tells a person who waits: lines, progress bars, and a status that goes when it is done.
 
 Lines and details are records of the logger `evfem`, so that a caller may show them in another way: INFO is
-worth a line, DEBUG only counts ("step 3 of 60"). Nothing is coloured. Everything goes to standard error.
+worth a line, DEBUG only counts ("step 3 of 60"). What happens within a step goes to `evfem.within`, which
+hands nothing on. Nothing is coloured. Everything goes to standard error.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import logging
 import shutil
 import sys
 import textwrap
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -18,6 +20,11 @@ from typing import Any, TextIO
 from evfem.errors import InputError, StopRun, describe_value
 
 LOG = logging.getLogger("evfem")
+#: iterations of one step
+WITHIN = logging.getLogger("evfem.within")
+WITHIN.propagate = False
+#: seconds after which a bar shows another of these
+GLANCE = 0.5
 
 
 def wrapped(text: str, stream: TextIO) -> str:
@@ -53,18 +60,31 @@ class _Told(logging.Handler):
         self.tell(record.getMessage())
 
 
+class Seldom(_Told):
+    """Tells only what comes `seconds` after the time `last`, that of what it told last."""
+
+    def __init__(self, tell: Callable[[str], None], seconds: float) -> None:
+        super().__init__(tell)
+        self.seconds, self.last = seconds, time.time()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.created - self.last >= self.seconds:
+            self.last = record.created
+            super().emit(record)
+
+
 @contextmanager
-def listening(handler: logging.Handler, level: int) -> Iterator[None]:
-    """Inside, `handler` gets the package's notices from `level` on."""
-    before = LOG.level
+def listening(handler: logging.Handler, level: int, log: logging.Logger = LOG) -> Iterator[None]:
+    """Inside, `handler` gets the notices of `log` from `level` on."""
+    before = log.level
     handler.setLevel(level)
-    LOG.addHandler(handler)
-    LOG.setLevel(min(level, before) if before else level)
+    log.addHandler(handler)
+    log.setLevel(min(level, before) if before else level)
     try:
         yield
     finally:
-        LOG.removeHandler(handler)
-        LOG.setLevel(before)
+        log.removeHandler(handler)
+        log.setLevel(before)
 
 
 @contextmanager
@@ -79,7 +99,7 @@ class _NoBar(ExitStack):
     """A progress bar that shows nothing."""
 
     leave = False
-    update = set_postfix_str = staticmethod(lambda *told, **how: None)
+    update = staticmethod(lambda *told, **how: None)
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
@@ -92,6 +112,16 @@ def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
     # tqdm draws nothing in a terminal that says it is 0 columns wide; a notebook would take them for pixels
     columns = None if "ipykernel" in sys.modules else shutil.get_terminal_size().columns
     return tqdm(total=total, initial=done, unit=unit, ncols=columns, bar_format=form)
+
+
+@contextmanager
+def told_on(bar: Any) -> Iterator[None]:
+    """Inside, a bar that is shown has beside it how far the step is."""
+    if isinstance(bar, _NoBar):
+        yield
+        return
+    with listening(Seldom(bar.set_postfix_str, GLANCE), logging.DEBUG, WITHIN):
+        yield
 
 
 def milestone(unit: str, done: int, total: int) -> None:

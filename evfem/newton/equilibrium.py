@@ -27,6 +27,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
+from evfem.common.notices import WITHIN
 from evfem.common.rooms import begun, ended
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.newton.control import Force, Indentation, Target, Unsupported, VoltageControl
@@ -39,6 +40,8 @@ from evfem.terms.traction import TOUCHING, PadState, PadTraction
 
 #: why an unstable equilibrium is refused
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
+#: how far a step is: its begin of iterations, and these
+FAR = "%.3g %% of the step, iteration %d, residual %.1e"
 #: why an equilibrium is refused whose outline crosses itself; at x in mm
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
 
@@ -181,6 +184,7 @@ class Equilibrium:
             self._iterate = state, balance
             reached = target.reached(state.bone)
             residuals.append(balance.remaining if reached else max(balance.remaining, 1.0))
+            WITHIN.debug(FAR, 100.0 * self.record.begun, iteration + 1, balance.residual)
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", residuals)
             if reached and balance.residual <= self.tolerance:

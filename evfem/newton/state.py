@@ -159,13 +159,16 @@ class Limits:
 
 @dataclass
 class Record:
-    """Numbers of iterations, factorisations and dense contact solves, and the residuals of the last step."""
+    """Numbers of iterations, factorisations and dense contact solves, the residuals of the last step, and the
+    fraction of the requested step that was done when it had `begun`.
+    """
 
     iterations: int = 0
     factorisations: int = 0
     contact_solves: int = 0
     backend: str = "none"
     residuals: list[float] = field(default_factory=list)
+    begun: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""`evfem run -v`: a line for every step, on standard error and with its time in a log in the run's folder.
+"""`evfem run -v`: a line for every step, on standard error and with its time in a log in the run's folder,
+and one of how far a step is where that takes long.
 
 The log is appended to and never removed, so that it also has what happened before an interruption.
 """
@@ -6,20 +7,26 @@ The log is appended to and never removed, so that it also has what happened befo
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from evfem.common.notices import LOG, listening
+from evfem.common.notices import LOG, WITHIN, Seldom, listening, tell
 from evfem.common.views import plus
 
 NAME = "steps.log"
 FORMAT = "%(asctime)s  %(message)s"
+#: seconds without a line after which it is told how far a step is
+SILENCE = 10.0
 
 
 class Steps:
-    """Observer that gives a notice of every step."""
+    """Observer that gives a notice of every step, after which `within` is silent for a while."""
+
+    def __init__(self, within: Seldom) -> None:
+        self.within = within
 
     def started(self, mesh: Any, scene: Any, total_steps: int) -> None:
         """Nodes, cells and steps."""
@@ -31,6 +38,7 @@ class Steps:
         """Where the bone is, the forces, and what the step cost."""
         unit = "N" if "contact_area" in row else "N/mm"
         told = ", ".join(f"{name} {plus(row[column]):.4g} {one}" for name, column, one in _shown(unit))
+        self.within.last = time.time()
         cost = f"{row['newton_iterations']} iterations, {row['substeps']} substeps, {row['seconds']:.2g} s"
         LOG.info("step %d of %d, %s: %s; %s", row["step"], self.total, row["motion"], told, cost)
 
@@ -61,6 +69,15 @@ class _File(logging.Handler):
         with suppress(OSError), self.path.open("a", encoding="utf-8") as file:
             file.write(f"{self.format(record)}\n")
 
+    def keep(self, text: str) -> None:
+        """A line of its own."""
+        self.emit(logging.makeLogRecord({"msg": "%s", "args": (text,)}))
+
+    def tell(self, text: str) -> None:
+        """The same, on standard error too."""
+        self.keep(text)
+        tell(text)
+
 
 @contextmanager
 def logged(folder: Path, wanted: bool) -> Iterator[Sequence[Any]]:
@@ -71,11 +88,12 @@ def logged(folder: Path, wanted: bool) -> Iterator[Sequence[Any]]:
         yield ()
         return
     file = _File(folder / NAME)
-    with listening(file, logging.INFO):
+    within = Seldom(file.tell, SILENCE)
+    with listening(file, logging.INFO), listening(within, logging.DEBUG, WITHIN):
         try:
-            yield (Steps(),)
+            yield (Steps(within),)
         except BaseException as error:
             if file.path.exists():  # else nothing was begun
                 text = f"ended: {error or type(error).__name__}"
-                file.emit(logging.makeLogRecord({"msg": "%s", "args": (text,)}))
+                file.keep(text)
             raise

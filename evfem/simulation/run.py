@@ -147,7 +147,8 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         notices.tell_observers(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
         for request in run.requests():
-            frame = run.advance(request)
+            with notices.told_on(bar):
+                frame = run.advance(request)
             reasons = notices.tell_observers(observers, "step", run.rows[-1], frame, run.checkpoint)
             bar.update(1)
             LOG.debug("step %d of %d", len(run.rows), total)

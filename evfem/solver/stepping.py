@@ -95,7 +95,7 @@ class Stepper:
         while done < 1.0:
             end = next((one for one in turns if one > done + SAME), 1.0)
             fraction = end if self.substep >= end - done - SAME else done + self.substep
-            before = self.equilibrium.record.iterations
+            before, self.equilibrium.record.begun = self.equilibrium.record.iterations, done
             try:
                 solved, error = self.parts.solve(self.solve, state, path, (done, fraction))
             except StepFailed as failed:
