@@ -95,7 +95,7 @@ ROOMS = {
     ),
     "response": (
         {"numpy", "scipy"},
-        "parameters parts tangent differences lines sensitivities file uncertainty design impedance "
+        "parameters parts tangent differences beside lines sensitivities file uncertainty design impedance "
         "electrical",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),

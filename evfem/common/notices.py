@@ -99,7 +99,7 @@ class _NoBar(ExitStack):
     """A progress bar that shows nothing."""
 
     leave = False
-    update = staticmethod(lambda *told, **how: None)
+    update = set_postfix_str = staticmethod(lambda *told, **how: None)
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:

@@ -63,8 +63,8 @@ class Drive:
 
     `frequency` is None where the voltage is a signal over time that has its own, or a direct voltage that is
     resolved in time. `skin` may also be a `Dielectric`, a table or a number. The mean over the cycle is right
-    where the finger is too slow to follow twice the frequency; resolved, the steps follow the voltage of the
-    moment, and charges move.
+    where the finger is too slow to follow twice the frequency and slides too fast to stick within it;
+    resolved, the steps follow the voltage of the moment, and charges move.
 
     >>> Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8).peak(50.0)
     70.71067811865476

@@ -9,25 +9,24 @@ derivative of the states at fixed parameter, in one more model of the scene (`Li
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.errors import InputError
 from evfem.newton.state import State
+from evfem.response.beside import Accepted, Beside, Jumps
 from evfem.response.differences import SAMPLES, Change, added, changes, difference, moved
 from evfem.response.parameters import Parameter
 from evfem.response.parts import BOUND, GIVEN, WISH, ZERO, Equations
 from evfem.scene.scene import Scene
-from evfem.simulation.history import UNITS
-from evfem.simulation.ledger import EnergyAccount
+from evfem.simulation.history import COLUMNS, UNITS
 from evfem.simulation.model import Model
-from evfem.simulation.run import Request, Run
+from evfem.simulation.result import Result
 from evfem.simulation.works import EnergyState
-from evfem.surface.ways import Steps
 from evfem.terms.friction import COEFFICIENTS
 
 #: relative change of a parameter between samples
@@ -41,10 +40,12 @@ PRESSED = 1e-4
 #: largest shifts of nodes of the undeformed finger between samples, as a fraction of the distance of pad
 #: nodes; in mm of pad nodes above an attraction or a profile, and of nodes along a profile
 INSIDE, SHIFT, ALONG = 4e-3, 5e-6, 1e-5
+#: largest change of the height of a surface with relief between samples (mm): edges and nodes near them pass
+HIGHER = 1e-6
 #: relative change of the slope of the height of first touch with one node, the factor of a smaller step with
 #: several, and rounding of that height
 ONE_NODE, NEARER, ROUNDED = 1e-4, 0.1, 1e-14
-#: ratio of the step for smooth functions
+#: ratio of the step for smooth functions, and of one step to the next nearer one
 FAR = 4.0
 #: largest number of refinements; the expected relative change at convergence, that below which it is rounding
 #: if it falls by less than the next factor, and that which is too large; the factor by which it must fall
@@ -61,9 +62,10 @@ TIED = "several nodes touch the surface first, and which one is next depends on 
 LOST = "the linear equations of step {} were not solved"
 #: endings of columns with units that are counts all the same: not differentiable
 DISCRETE = ("contact_width", "contact_area", "mean_contact_pressure", "breakdown_x")
+#: columns that a smooth function may read although they have no derivative
+PLACES = ("step", "motion_index", "motion", "time")
 #: columns without a unit that are smooth
 SMOOTH_RATIOS = (*COEFFICIENTS,)
-Jumps = Sequence[Steps]
 Lengths = Callable[[State], Floats]
 Solve = Callable[[Floats], Floats]
 
@@ -83,74 +85,41 @@ def is_work(column: str) -> bool:
     return column.endswith(("_work", "_energy", "_dissipation"))
 
 
-@dataclass(frozen=True, eq=False)
-class Accepted:
-    """An accepted substep of a run: its states and their margins, its span of the step, pins of nodes at
-    discontinuities of friction (`pins`, (P, d) in mm, else nan), the energy balances before and after it, and
-    what determines its `voltage` (`evfem.response.parts`).
-    """
-
-    old: State
-    new: State
-    margins: Floats
-    span: tuple[float, float]
-    pins: Floats
-    books: tuple[EnergyState | None, EnergyState]
-    sums: tuple[dict[str, float], dict[str, float]]
-    voltage: str = GIVEN
+def smooth_alone(result: Result, columns: Sequence[str]) -> Result:
+    """A result with nan for all but the differentiable ones of these columns, and without its fields."""
+    none = np.full(len(result.step), np.nan)
+    known = {*PLACES, *filter(differentiable, columns)}
+    own: dict[str, Any] = {name: none for name in COLUMNS if name not in known}
+    space, rooms = (
+        {name: value if name in known else none for name, value in some.items()}
+        for some in (result.in_space, result.in_rooms)
+    )
+    fields: Any = {name: _Unread(name) for name in ("frames", "probes")}
+    return replace(result, **own, **fields, in_space=space, in_rooms=rooms)
 
 
-@dataclass
-class Beside:
-    """A perturbed run, which is never solved: of the scene with its parameter changed by `way`."""
+class _Unread:
+    """What a smooth function may not read of a result."""
 
-    run: Run
-    way: float
-    requests: Iterator[Request]
-    request: Request | None = None
+    def __init__(self, name: str) -> None:
+        self._name = name
 
-    @classmethod
-    def of(cls, scene: Scene, parameter: Parameter | None, way: float) -> Beside:
-        """Of a scene, without the warnings that the run itself has given."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            run = Run(scene if parameter is None else parameter.applied(scene, way), None)
-        return cls(run, way, run.requests())
+    def _refuse(self, *read: Any) -> Any:
+        problem = f"one that reads the {self._name} of a result, which have no derivatives"
+        raise InputError("function", problem, "a function of its columns")
 
-    def begin(self, substep: Accepted, jumps: Jumps, old: State) -> Equations:
-        """The equations of a substep from `old`; `jumps`: discontinuities of friction at the centre."""
-        assert self.request is not None
-        pins, own = substep.pins.copy(), self.run.model.equilibrium.interface.jumps.steps
-        for node in np.flatnonzero(np.isfinite(pins[:, 0])):
-            away = [np.abs(pins[node, one.axis] - one.place) for one in jumps]
-            nearest = int(np.argmin([each.min() for each in away]))
-            jump, axis = int(away[nearest].argmin()), jumps[nearest].axis
-            pins[node, axis] += own[nearest].place[jump] - jumps[nearest].place[jump]
-        return Equations.begin(self.run.model, old, self.request.path(*substep.span), pins)
-
-    def booked(
-        self, old: State, new: State, begin: EnergyState | None, sums: dict[str, float]
-    ) -> EnergyAccount:
-        """The energy account after a substep that begins with these."""
-        ledger = EnergyAccount(self.run.model, dict(sums), begin)
-        ledger.add_substep(old, new)
-        return ledger
-
-    def row(self, state: State, books: EnergyState, sums: dict[str, float]) -> dict[str, Any]:
-        """The row at the end of the present step."""
-        assert self.request is not None
-        return self.run.row(EnergyAccount(self.run.model, sums, books), self.request, state)
+    __getattr__ = __getitem__ = __iter__ = __len__ = __bool__ = _refuse
 
 
 @dataclass
 class Line:
-    """Forward sensitivity of one parameter. `beside`: perturbed runs at the `SAMPLES` in steps of `step`;
+    """Forward sensitivity of a `parameter`. `beside`: perturbed runs at the `SAMPLES` in steps of `step`;
     `wide`: the same with a wide stencil for smooth functions, where a shape may change by more; `centre`: a
     run of the scene itself, for samples along the states at most `longest` apart; the derivatives of state,
     energy balance and sums so far, and the results step by step. Energies are differentiated if it `works`.
     """
 
-    name: str
+    parameter: Parameter
     step: float
     longest: float
     beside: list[Beside]
@@ -179,9 +148,14 @@ class Line:
             wide = _neighbours(scene, parameter, longest / inside, centre)
         step = beside[-1].way / SAMPLES[-1]
         state = changes([one.run.state for one in beside], step)
-        line = cls(parameter.name, step, longest, beside, wide, centre, lengths, works, state)
+        line = cls(parameter, step, longest, beside, wide, centre, lengths, works, state)
         line.reason = "" if _one_touches(beside, centre) else TIED
         return line
+
+    @property
+    def name(self) -> str:
+        """Of the parameter."""
+        return self.parameter.name
 
     @property
     def runs(self) -> list[Beside]:
@@ -197,6 +171,7 @@ class Line:
 
     def follow(self, substep: Accepted, solve: Solve, jumps: Jumps, patient: bool) -> bool:
         """Advance the derivatives to the end of a substep; not where `solve` is slow, unless `patient`."""
+        self._come_nearer(substep)
         equations = [one.begin(substep, jumps, substep.old) for one in self.beside]
         fixed = self._surface_by_parameter(substep, equations), *self._partial(substep, equations, jumps)
         rate = {
@@ -213,6 +188,33 @@ class Line:
             return False
         self._accept(substep, equations, jumps, change)
         return True
+
+    def _come_nearer(self, substep: Accepted) -> None:
+        """Perturbed runs so near that no gap closes between them and no edge of a relief passes a node;
+        smooth functions keep those so far.
+        """
+        interfaces = [one.run.model.equilibrium.interface for one in self.beside]
+        gaps = [one.surface_at(substep.new).gap for one in interfaces]
+        rate = np.maximum(np.abs(difference(gaps, self.step)), 1e-300)
+        allowed = float((self.lengths(substep.new) / rate).min())
+        if not self.centre.run.model.surface.is_flat:
+            allowed = min(allowed, HIGHER / float(rate.max()))
+        step = max(allowed / SAMPLES[-1], LEAST * self.longest)
+        if step < self.step:
+            self.step = self.longest * FAR ** np.floor(np.log(step / self.longest) / np.log(FAR))
+            self.beside = [self._besides(one) for one in self.beside]
+
+    def _besides(self, farther: Beside) -> Beside:
+        """The same perturbed run with the parameter changed by less, at the present step."""
+        centre = self.centre.run
+        part = self.step * SAMPLES[-1] / self.beside[-1].way
+        found = Beside.of(centre.scene, self.parameter, part * farther.way)
+        found.run.time = centre.time + part * (farther.run.time - centre.time)
+        less = found.way - farther.way
+        for row, slopes in zip(farther.run.rows, self.rows, strict=True):
+            found.run.rows.append({**row, **{name: row[name] + less * one for name, one in slopes.items()}})
+        found.request = next(found.requests)
+        return found
 
     def _met(
         self, substep: Accepted, equations: list[Equations], jumps: Jumps, ends: tuple[Change, Change]

@@ -61,7 +61,8 @@ from evfem.errors import InputError, describe_value, readable, unknown
 from evfem.newton.condensation import Condensation, Singular, make_condensation
 from evfem.newton.control import Target, Unsupported
 from evfem.newton.state import State
-from evfem.response.lines import NEAR, SMOOTH, STEP, Accepted, Beside, Line, differentiable, is_work
+from evfem.response.beside import Accepted, Beside
+from evfem.response.lines import NEAR, SMOOTH, STEP, Line, differentiable, is_work, smooth_alone
 from evfem.response.parameters import Parameter, parameter_of, scene_of
 from evfem.response.parts import Equations
 from evfem.response.tangent import Tangent
@@ -270,14 +271,16 @@ class Sensitivities:
         return replace(self.result, **own, in_space=space, in_rooms=rooms)
 
     def gradient(self, function: Callable[[Result], float]) -> dict[str, float]:
-        """Derivatives by every parameter of a number that a smooth `function` makes of a run.
+        """Derivatives by every parameter of a number that a smooth `function` makes of the columns of a run;
+        nan where it reads one that has no derivative. InputError where it reads frames or probes.
 
         ``found.gradient(lambda run: run.tangential_force[-1])``
         """
         found = {}
         for key, value in self.parameters.items():
             way = STEP * (abs(value) or 1.0) / 10.0
-            more, less = (float(function(self.moved({key: sign * way}))) for sign in (1.0, -1.0))
+            ends = (smooth_alone(self.moved({key: sign * way}), self.columns) for sign in (1.0, -1.0))
+            more, less = (float(function(one)) for one in ends)
             found[key] = (more - less) / (2.0 * way)
         return found
 
@@ -329,9 +332,10 @@ class Elasticity:
     found: Sensitivities
 
     def __getitem__(self, which: tuple[str, str]) -> Floats:
+        slope = self.found[which]
         value = np.asarray(self.found.result[which[0]], dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = self.found[which] * self.found.parameters[which[1]] / value
+            share = slope * self.found.parameters[which[1]] / value
         return np.where(value == 0.0, np.nan, share)
 
 

@@ -32,6 +32,8 @@ from evfem.simulation.run import simulate
 
 #: by how much the entries of a correlation may be rounded
 ROUNDED = 1e-6
+#: fraction by which a run may be off its derivative before that is told
+BENT = 0.2
 
 
 class Check(NamedTuple):
@@ -49,7 +51,7 @@ class Check(NamedTuple):
 class Uncertainty:
     """Standard deviations `sd[column]` (steps,) of a run, `contribution[column, key]` (steps,) of each
     parameter with its sign, and the `checked` contribution. Squares of contributions add up to those of `sd`
-    where the parameters are independent.
+    where the parameters are independent. Columns `told` are printed.
     """
 
     result: Result
@@ -57,6 +59,7 @@ class Uncertainty:
     contribution: Mapping[tuple[str, str], Floats]
     checked: Check
     found: Sensitivities
+    told: tuple[str, ...] = ("normal_force", "tangential_force", "electrostatic_force")
 
     def effects(self, column: str, step: int = -1) -> tuple[dict[str, float], str]:
         """The contribution of every parameter to a column at a step, counted from 0, and what it is."""
@@ -66,7 +69,7 @@ class Uncertainty:
         return found, f"{column} for one sd ({self.result.units[column]})"
 
     def __repr__(self) -> str:
-        """The check, and the standard deviations of the forces at the end."""
+        """The check, and the standard deviations of the forces, or of what was asked for, at the end."""
         one = self.checked
         derived = "no derivative" if np.isnan(one.by_derivative) else f"{one.by_derivative:.4g} by derivative"
         lines = [
@@ -74,7 +77,9 @@ class Uncertainty:
             f"+1 sd of {one.key} changes {one.column} at the end by {one.by_run:.4g} in a run ({derived})"
         ]
         lines += [f"  {key}: {self.found.reasons[key]}" for key in self.found.missing]
-        for name in ("normal_force", "tangential_force", "electrostatic_force"):
+        if not abs(one.by_run - one.by_derivative) <= BENT * max(abs(one.by_run), abs(one.by_derivative)):
+            lines.append("  not linear over one sd: take samples, as a sweep does")
+        for name in self.told:
             if name in self.sd:
                 found, unit = self.result[name][-1], self.result.units[name]
                 lines.append(f"  {name}: {found:.6g} +- {self.sd[name][-1]:.2g} {unit}")
@@ -113,8 +118,8 @@ def uncertainty(
     Raises
     ------
     InputError
-        A parameter that has no derivative, a standard deviation that is not above 0, or a matrix that is no
-        correlation.
+        A parameter or a column that has no derivative, a standard deviation that is not above 0, or a matrix
+        that is no correlation.
 
     Examples
     --------
@@ -133,11 +138,15 @@ def uncertainty(
     together = _correlation(correlation, len(sd))
     found = sensitivities(scene, list(sd), columns, progress)
     names = [name for name in found.columns if differentiable(name)]
-    if not names:
-        raise InputError("columns", describe_value(columns), "at least one column that has derivatives")
+    if columns is not None and (rough := [name for name in found.columns if name not in names]):
+        raise InputError(
+            "columns", ", ".join(rough), "columns that have derivatives: no width, area or count"
+        )
     parts = {(name, key): found[name, key] * float(sd[key]) for name in names for key in sd}
     total = {name: _total(np.array([parts[name, key] for key in sd]), together) for name in names}
-    return Uncertainty(found.result, total, parts, _checked(scene, sd, parts, found, names), found)
+    checked = _checked(scene, sd, parts, found, names)
+    more = {} if columns is None else {"told": tuple(names)}
+    return Uncertainty(found.result, total, parts, checked, found, **more)
 
 
 def _total(parts: Floats, correlation: Floats) -> Floats:

@@ -95,7 +95,9 @@ class Heights(Importer):
     def cleaned(self, x: Floats, height: Floats) -> tuple[Floats, Floats, list[str]]:
         """x (n,), heights (n,), both mm, and what was done; x then begins at 0."""
         notes: list[str] = []
-        x, height = x[np.isfinite(x)], height[np.isfinite(x)]
+        if lost := int((~np.isfinite(x)).sum()):
+            x, height = x[np.isfinite(x)], height[np.isfinite(x)]
+            notes.append(f"{lost} rows without x left out.")
         inside = np.ones(x.size, bool)
         if self.start is not None or self.stop is not None:
             start, stop = self.start or 0.0, np.inf if self.stop is None else self.stop
@@ -104,8 +106,16 @@ class Heights(Importer):
         if inside.sum() < 4:
             problem = f"{inside.sum()} of {x.size} points"
             raise InputError("start, stop", problem, "at least four points between them")
-        x, height = x[inside] - x[inside][0], height[inside]
+        x, height = x[inside], height[inside]
         known = np.abs(height) < FAR
+        seen = np.flatnonzero(known)
+        some = slice(seen[0], seen[-1] + 1) if seen.size else slice(0)
+        if cut := x.size - x[some].size:
+            x, height, known = x[some], height[some], known[some]
+            notes.append(f"{cut} missing values at the ends cut off.")
+        if x.size < 4:
+            raise InputError("heights", f"{x.size} values", "at least four")
+        x = x - x[0]
         if missing := int((~known).sum()):
             if missing > MOST_GAPS * x.size:
                 problem = f"{missing} of {x.size} missing"

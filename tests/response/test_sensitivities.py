@@ -318,6 +318,10 @@ CASES = {
 }
 
 
+PLACES = np.linspace(-5.0, 5.0, 21)
+FILM = {"friction": 0.3, "insulator": ev.Layer(0.09, 3.35)}
+
+
 @pytest.mark.filterwarnings("ignore:friction falls with the speed", "ignore:5 um of air")
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_are_those_of_differences_of_runs(case):
@@ -336,6 +340,36 @@ def test_derivatives_are_those_of_differences_of_runs(case):
         size = largest(found.result, name)
         scale = max(np.abs(row).max(), size / value)
         assert found[name, key][same] == pytest.approx(row[same], rel=1e-6, abs=1e-6 * scale), name
+
+
+RELIEFS = {
+    "sinusoid": (ev.Sinusoid(terms=[[0.02, 2.0, 30.0]], **FILM), ("surface.terms.0.0", "surface.terms.0.2")),
+    "profile": (ev.Profile(PLACES, 0.02 * np.sin(2.0 * PLACES), **FILM), ("surface.points.11.1",)),
+    "grating": (
+        ev.Grating(period=2.0, groove_depth=0.02, groove_width=0.8, wall_width=0.3, **FILM),
+        ("surface.period",),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", RELIEFS)
+def test_derivatives_by_a_relief_are_those_of_runs_beside_it(kind):
+    """Nodes that nearly touch, and edges near nodes, are closer than a thousandth of amplitude or period: the
+    attraction's derivative had the wrong sign, and the friction's was half as large again.
+    """
+    surface, keys = RELIEFS[kind]
+    pad, motion = ev.FingerPad(ridges=False, resolution="coarse"), [ev.Press(indentation=0.3, steps=2)]
+    motion.append(ev.Slide(0.4, steps=2))
+    scene = ev.Scene(pad, surface, ev.Kaczmarek(), 800.0, motion, solver=ev.Solver(tolerance=1e-11))
+    found = ev.sensitivities(scene, keys)
+    for key in keys:
+        step = 3e-6 * found.parameters[key]
+        runs = differenced(scene, lambda s, v, key=key: changed(s, key, v), found.parameters[key], step)
+        holds = found.valid_to[key] > 2.0 * step
+        assert holds.sum() >= 3
+        for name, row in zip(FORCES, runs, strict=True):
+            scale = 1e-5 * np.abs(row).max()
+            assert found[name, key][holds] == pytest.approx(row[holds], rel=1e-5, abs=scale), (key, name)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """What is made of derivatives: uncertainty, design, pictures, a command."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,11 +46,15 @@ def test_a_bare_name_is_told_its_table(path):
 
 def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
     sd = {"finger.materials.hypodermis.E": 0.004, "surface.friction": 0.03}
-    found = ev.uncertainty(path, sd, ["tangential_force", "substeps"])
+    refuses("columns: given substeps, contact_width", ev.uncertainty, path, sd, ["substeps", "contact_width"])
+    refuses("columns: given substeps", ev.uncertainty, path, sd, ["tangential_force", "substeps"])
+    found = ev.uncertainty(path, sd, ["tangential_force", "position"])
     parts = [found.contribution["tangential_force", key] for key in sd]
     assert found.sd["tangential_force"] == pytest.approx(np.hypot(*parts))
     assert parts[1][-1] == pytest.approx(0.1 * found.result.tangential_force[-1], rel=0.02)
-    assert set(found.sd) == {"tangential_force"}
+    assert set(found.sd) == {"tangential_force", "position"}
+    assert "  position: " in repr(found)
+    assert "not linear" not in repr(found)
     key, column, by_derivative, by_run = found.checked
     assert (key, column) == ("finger.materials.hypodermis.E", "tangential_force") or key == "surface.friction"
     assert by_run == pytest.approx(by_derivative, rel=0.05)
@@ -256,3 +261,78 @@ def test_a_result_that_ended_early_is_not_run_further():
         refuses(said, ask, result, [10.0])
     refuses(said, ev.sensitivities, result, "surface.friction")
     refuses(said, ev.uncertainty, result, {"surface.friction": 0.01})
+
+
+def test_an_uncertainty_that_is_not_linear_says_so():
+    """The voltage to the square: an sd of half of it adds 1.25 of what the derivative says."""
+    pad = ev.FingerPad(ridges=False, resolution="coarse")
+    scene = ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 100.0, ev.Hover(gap=0.3, steps=1))
+    found = ev.uncertainty(scene, {"electrostatics.voltage": 50.0}, ["electrostatic_force"])
+    assert found.checked.by_run == pytest.approx(1.25 * found.checked.by_derivative, rel=0.01)
+    assert "not linear over one sd" in repr(found)
+    found = ev.uncertainty(scene, {"electrostatics.voltage": 30.0}, ["electrostatic_force"])
+    assert "not linear" not in repr(found)
+
+
+@pytest.fixture
+def probed_pad():
+    pad = ev.FingerPad(ridges=False, resolution="coarse")
+    probed = ev.Output(probes={"m": ev.Probe(x=[0.0], at="epidermis")})
+    return ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 500.0, ev.Hover(gap=0.3, steps=1), output=probed)
+
+
+@pytest.mark.parametrize(
+    ("objective", "said"),
+    [
+        ("-contact_width.last", "a column that has derivatives"),
+        (lambda run: run.contact_width[-1] + run.electrostatic_force[-1], "the objective has no derivative"),
+        (lambda run: run.probes["m"].von_mises[-1, 0], "reads the probes"),
+        (lambda run: run.frames[-1].contact_pressure.max(), "reads the frames"),
+        (lambda run: None, "one that gives None; allowed: a number"),
+        (lambda run: run.breakdown[-1], "the objective has no derivative"),
+    ],
+)
+def test_an_objective_without_a_derivative_is_no_design(probed_pad, objective, said):
+    """Its gradient was 0, and the start the best."""
+    with pytest.raises(ev.InputError, match=said):
+        ev.design(probed_pad, objective, ["electrostatics.voltage"], [(100.0, 1000.0)])
+
+
+def test_a_gradient_of_what_has_no_derivative_is_none(probed_pad):
+    found = ev.sensitivities(probed_pad, ["electrostatics.voltage"], ["electrostatic_force"])
+    assert np.isnan(found.gradient(lambda run: run.min_gap[-1])["electrostatics.voltage"])
+    force = found.gradient(lambda run: run.electrostatic_force[-1] / run.step[-1])
+    assert force["electrostatics.voltage"] == pytest.approx(
+        found.result.electrostatic_force[0] / 250.0, rel=1e-2
+    )
+    refuses('derivative: given "normal_force"', found.elasticity.__getitem__, "normal_force")
+
+
+@pytest.mark.parametrize(
+    ("keys", "bounds", "said"),
+    [
+        (["electrostatics.voltage"], [("0.1 kV", "1 kV")], "two numbers around 500"),
+        (["electrostatics.voltage"], [(None, 1000.0)], "two numbers around 500"),
+        (["electrostatics.voltage"], [(10.0, np.inf)], "two numbers around 500"),
+        (["electrostatics.voltage"], {"electrostatics.voltage": (1.0, 1e3), "hand.mass": (1, 2)}, "bounds"),
+        ([], [], "at least one dotted key"),
+    ],
+)
+def test_bounds_that_are_none_are_refused(probed_pad, keys, bounds, said):
+    with pytest.raises(ev.InputError, match=said):
+        ev.design(probed_pad, "electrostatic_force.last", keys, bounds)
+
+
+def test_a_design_comes_near_a_bound_of_zero_and_ends_where_no_scene_is(probed_pad):
+    """The smallest attraction is without voltage; a Poisson's ratio above 0.5 ends the search, which keeps
+    what it had.
+    """
+    low = ev.design(
+        probed_pad, "electrostatic_force.last", ["electrostatics.voltage"], np.array([[0.0, 1e3]])
+    )
+    assert low.parameters["electrostatics.voltage"] == pytest.approx(0.1)
+    key = "finger.materials.dermis.nu"
+    pressed = replace(probed_pad, motion=[ev.Press(force=0.03, steps=1)])
+    found = ev.design(pressed, "-electrostatic_force.last", [key], [(0.3, 0.7)])
+    assert "ended early: nu: given 0.5" in found.told
+    assert 0.3 < found.parameters[key] < 0.5

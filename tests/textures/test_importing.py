@@ -383,6 +383,22 @@ def test_an_image_of_too_many_pixels_is_refused_before_it_is_decoded(tmp_path):
     refuses("10000 x 5000 pixels", Image(**SOURCE, pixel=0.1, depth=0.1), tmp_path / "large.png")
 
 
+def test_missing_values_at_the_ends_of_a_tilted_scan_make_no_relief(tmp_path):
+    """They were held at the first known height, and then levelled: 0.05 mm of relief on a plane."""
+    x = np.arange(0.0, 12.0001, 0.02)
+    height = 0.05 * x
+    height[x < 1.0] = height[-3:] = np.nan
+    height[300:310] = np.nan
+    rows = np.column_stack([np.where(np.arange(x.size) % 100 == 99, np.nan, x), height])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="x,height", comments="")
+    texture = Table(**SOURCE)(tmp_path / "a.csv")
+    assert np.ptp(texture.values) < 1e-12
+    assert texture.x[0] == 0.0
+    assert texture.x[-1] == pytest.approx(x[-4] - 1.0)
+    done = ["6 rows without x left out.", "52 missing values at the ends cut off."]
+    assert [one for one in texture.provenance if one in done] == done
+
+
 def test_without_the_extra_a_scan_is_refused_with_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(importers, "find_spec", lambda name: None)
     refuses(r"evfem\[scans\]", Scan(**SOURCE), tmp_path / "a.x3p")

@@ -147,7 +147,7 @@ def test_a_tmd_may_have_any_comment(tmp_path, comment):
     np.testing.assert_allclose(found, ROWS[1], rtol=1e-6)
     np.testing.assert_allclose(texture.x, 0.02 * np.arange(5), rtol=1e-6)
     path.write_bytes(path.read_bytes()[:-4] + b"\1\0\xa0\x7f")  # a number that signals that it is none
-    assert "1 of 5 values missing" in heights(path, 1.0)[1].provenance[2]
+    assert "1 missing values at the ends cut off." in heights(path, 1.0)[1].provenance
     path.write_bytes(path.read_bytes()[:-4])
     refuses("file: given a.tmd, damaged or of another kind", Scan(**SOURCE), path)
 
