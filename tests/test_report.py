@@ -102,7 +102,8 @@ def test_the_page_needs_no_other_file_and_runs_nothing(slid, tmp_path):
 def test_its_numbers_are_those_of_the_run_over_its_depth(slid, tmp_path):
     found, whole = page_of(slid, tmp_path), slid.total
     for name in ("normal_force", "contact_width", "friction", "stored_energy"):
-        _, value, unit, meaning = found.row(name)
+        # a width over a depth is an area
+        _, value, unit, meaning = found.row(name.replace("width", "area"))
         assert float(value) == pytest.approx(whole[name][-1], rel=1e-4)
         assert unit.replace("mm²", "mm2") == whole.units[name]
         assert meaning == slid.meanings[name]
@@ -173,7 +174,9 @@ def test_errors_of_a_check_are_in_the_page(slid, tmp_path):
     row = {"way": "twice the steps", "source": "steps", "indentation": 0.5, "difference": 2e-5, "why": ""}
     found = page_of(slid, tmp_path, checked=Checked([row | own]))
     assert "twice the steps" in found.text
-    assert "the ends agree" in found.text
+    assert "The ends agree" in found.text
+    assert found.row("twice the steps")[2:] == ["1.25", "1.25", "1.25", "0.5", "2.0e-05"]
+    assert "forces in N/mm" in found.text
     assert "is not said here" not in found.text
 
 

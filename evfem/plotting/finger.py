@@ -94,22 +94,23 @@ def picture(view: Any, near: Near, limits: tuple[float | None, float | None], ax
 
 
 def side_by_side(
-    results: Mapping[str, Result],
+    results: Mapping[str, Result] | Result,
     field: str = "von_mises",
-    frame: int = -1,
+    frame: int | Sequence[int] = -1,
     *,
     near: Near = "contact",
     vmin: float | None = None,
     vmax: float | None = None,
 ) -> figures.Panels:
-    """The deformed fingers of several results by their names: whole above, close-ups below.
+    """The deformed fingers of several results by their names: whole above, close-ups below. With several
+    frames, those of each result beside each other.
 
     All are coloured by one field on one scale, as `deformed` does it; within a row all show the same window,
     with arrows as long for as large a traction. `near=None` leaves out the close-ups. The panels come row by
     row.
     """
     choice("field", field, fields.FIELDS)
-    views = {name: View(one, fields.frame_of(one, frame), field) for name, one in named(results).items()}
+    views = _views(named(results), field, frame)
     levels = [None] if near is None else [None, near]
     rows = [[_joined([view.window(level) for view in views.values()])] * len(views) for level in levels]
     pairs = (pair for row in rows for pair in zip(views.values(), row, strict=True))
@@ -135,6 +136,16 @@ def side_by_side(
     for ax in axes[1:].ravel():
         figures.add_title(ax, ax.get_title(), "x-small")
     return figures.Panels(axes.ravel())
+
+
+def _views(found: Mapping[str, Result], field: str, frame: int | Sequence[int]) -> dict[str, View]:
+    """What each panel shows, by its title."""
+    if isinstance(frame, Sequence):
+        each = [
+            (name, View(one, fields.frame_of(one, k), field)) for name, one in found.items() for k in frame
+        ]
+        return {", ".join(filter(None, (name, f"step {view.frame.step}"))): view for name, view in each}
+    return {name: View(one, fields.frame_of(one, frame), field) for name, one in found.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -182,11 +182,24 @@ def named(results: Results) -> dict[str, Result]:
         check_result(result)
     if not found:
         raise InputError("results", "nothing", "a result, or {name: result, ...}")
-    if any(result.units != units_of(found) for result in found.values()):
-        raise InputError("results", "some per mm of depth, some in total", "all of them alike")
+    if len({result.units["normal_force"] for result in found.values()}) > 1:
+        allowed = "all of them alike: result.total is in N"
+        raise InputError("results", "some per mm of depth, some in total", allowed)
     return found
 
 
 def units_of(found: Mapping[str, Result]) -> Units:
-    """The units that all of these results have."""
-    return next(iter(found.values())).units
+    """The units that all of these results have; InputError for a column where they differ, as the width of a
+    section over its depth, in mm2, and that of a fingertip.
+    """
+    first, *others = (result.units for result in found.values())
+    return _Alike(
+        {name: unit for name, unit in first.items() if all(unit == one.get(name) for one in others)}
+    )
+
+
+class _Alike(dict[str, str]):
+    """Units by column."""
+
+    def __missing__(self, name: str) -> str:
+        raise InputError("column", f"{name}, which these results do not have in one unit", "another column")

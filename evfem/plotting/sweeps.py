@@ -122,22 +122,20 @@ def _numbers(rows: Sequence[dict[str, Any]], key: str) -> list[float]:
 
 
 def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = None) -> Axes:
-    """Column `value` of a sweep of a grid as colours over its columns `x` and `y` of numbers.
+    """Column `value` of a sweep of a grid as colours over its columns `x` and `y`, of numbers or of names.
 
     Points without a number stay white. An axis of few numbers has its ticks there. Where the numbers along
     an axis are far from evenly spaced, as 0.001, 0.01, 0.1, their cells are all of one width, with the
     numbers below them. Raises InputError where two points have the same x and y.
     """
     rows = _done(table, x, y, value)
-    if not all(isinstance(row[key], (int, float)) for row in rows for key in (x, y)):
-        raise InputError("x, y", f"{x}, {y}", "two columns of numbers")
     places = [(row[x], row[y]) for row in rows]
     if len(set(places)) < len(places):
         raise InputError("x, y", f"{x}, {y} with several points at one place", "the two keys of a grid")
-    across, up = (np.unique([row[key] for row in table.rows]) for key in (x, y))
-    cells = np.full((up.size, across.size), np.nan)
+    across, up = (_names(table.rows, key) or sorted({row[key] for row in table.rows}) for key in (x, y))
+    cells = np.full((len(up), len(across)), np.nan)
     for row in rows:
-        cells[np.searchsorted(up, row[y]), np.searchsorted(across, row[x])] = row[value]
+        cells[up.index(row[y]), across.index(row[x])] = row[value]
     ax = figures.axes_or_new(ax)
     mapped = ax.pcolormesh(_sides(across, ax.xaxis), _sides(up, ax.yaxis), cells, cmap=figures.ONE_SIGN)
     ax.set(xlabel=key_label(x, table.units), ylabel=key_label(y, table.units))
@@ -167,18 +165,34 @@ def _value(table: SweepResult, by: str | None, value: Any) -> str:
     if by is None:
         return ""
     text, _, unit = key_label(by, table.units).removesuffix(")").partition(" (")
-    shown = f"{value:g}" if type(value) is float else str(value).replace("_", " ")
+    shown = f"{value:.4g}" if type(value) is float else str(value).replace("_", " ")
     return f"{text} {shown} {unit}".rstrip()
 
 
-def _sides(places: Any, axis: Any) -> Any:
+def _sides(values: list[Any], axis: Any) -> Any:
+    """Borders of the cells of numbers or names along an axis, which gets its ticks."""
+    if any(isinstance(value, str) for value in values):
+        axis.set_ticks(range(len(values)), [str(value).replace("_", " ") for value in values])
+        return _edges(np.arange(len(values)))
+    places = np.array(values, dtype=float)
     steps = np.diff(places)
     if steps.size == 0 or steps.max() <= UNEVEN * steps.min():
         if places.size <= FEW:
-            axis.set_ticks(places, [f"{tick:g}" for tick in places])
+            axis.set_ticks(places, _short(places), fontsize="small" if places.size > 5 else None)
         return _edges(places)
-    axis.set_ticks(range(places.size), [f"{tick:g}" for tick in places])
+    some = range(0, places.size, -(-places.size // FEW))
+    axis.set_ticks(some, [_short(places)[k] for k in some])
     return _edges(np.arange(places.size))
+
+
+def _short(places: Any) -> list[str]:
+    """Numbers with as few digits, from three on, as tell them apart.
+
+    >>> _short(np.array([0.0140845, 0.028169])), _short(np.array([1000.0, 1001.0]))
+    (['0.0141', '0.0282'], ['1000', '1001'])
+    """
+    each = ([f"{place:.{digits}g}" for place in places] for digits in range(3, 17))
+    return next((found for found in each if len(set(found)) == len(found)), [f"{one:g}" for one in places])
 
 
 def _edges(places: Any) -> Any:

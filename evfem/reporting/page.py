@@ -39,6 +39,12 @@ SPENT = (
 COUNTS = ("step", "motion_index", "motion", "substeps", "newton_iterations", "seconds")
 #: further columns of the table of forces, and their heads there
 FRICTION = {"friction": "friction", "apparent_friction": "apparent"}
+#: what no run knows
+UNKNOWN = (
+    "These are errors of the computation. What the model does not know is usually larger: the gap between "
+    "skin and surface, the real area of contact, the coefficient of friction. Vary them too "
+    "(evfem sensitivities, evfem sweep)."
+)
 #: rows of the table of forces; dots per inch of a picture
 ROWS, DPI = 12, 120
 STYLE = """
@@ -114,7 +120,7 @@ def page(result: Result, checked: Checked | None = None) -> str:
         _warnings(result),
         _section("Forces", [_forces(whole), *_curves(whole)]),
         _section("At the end", [_end(whole), *_pictures(whole)]),
-        _section("Accuracy", _accuracy(result, checked)),
+        _section("Numerical error", _accuracy(result, checked)),
         _section("Scene", [_pre(str(result.provenance.get("parameters", "")))]),
         _section("Plan", [_plan(result)]),
         _section("Versions", [_versions(result)]),
@@ -178,12 +184,22 @@ def _end(whole: Result) -> str:
     """The columns of the last step with unit and meaning."""
     meanings, last = whole.meanings, {name: whole[name][-1] for name in whole.columns if name not in COUNTS}
     rows = [
-        [name, _number(value), whole.units[name].replace("mm2", "mm²"), meanings[name]]
+        [
+            _named(name, whole.units[name]),
+            _number(value),
+            whole.units[name].replace("mm2", "mm²"),
+            meanings[name],
+        ]
         for name, value in last.items()
         if np.isfinite(value) and plus(value) != 0.0
     ]
     heads = ["column", "value", "unit", "meaning"]
     return _table("The last step, without columns that are 0", heads, rows, "words")
+
+
+def _named(name: str, unit: str) -> str:
+    """A column's name; a width over a depth is an area."""
+    return name.replace("width", "area") if unit == "mm2" else name
 
 
 def _pictures(result: Result) -> Iterator[str]:
@@ -215,19 +231,30 @@ def _accuracy(result: Result, checked: Checked | None) -> Iterator[str]:
     rows = [
         ["residual of every step, relative to the largest reaction", f"below {solver.get('tolerance', '?')}"],
         ["energy that the balance leaves over, of the largest work", f"{_left_over(result):.1e}"],
-        ["dissipation by the finite steps, of the largest work", f"{_by_steps(result):.1e}"],
+        ["energy that finite steps dissipate, of the largest work", f"{_by_steps(result):.1e}"],
         ["drift of the load at a held indentation", f"{result.load_drift:.1e}"],
         ["releases and snaps", str(int(np.sum(result.jumps)))],
         ["linear solver", str(solver.get("backend", "?"))],
     ]
     yield _table("What the run itself says", [], rows, "facts")
+    yield _p(UNKNOWN)
     if checked is None:
         yield _p(
             "How far mesh, steps and solution path change the numbers is not said here: a check runs the "
             "scene with others (evfem report FOLDER --check)."
         )
         return
-    yield _pre(f"{checked}")
+    from evfem.sweeps.accuracy import accuracy_rows
+
+    unit = result.units["normal_force"]
+    heads, *ends = checked.ends()
+    yield _table(
+        f"Ends of the scene run in other ways, forces in {unit}, lengths in mm", heads, ends, "words"
+    )
+    yield _p(_sentence(checked.verdict))
+    if checked.outputs:
+        heads, *errors = accuracy_rows(checked.outputs)
+        yield _table(f"Errors of the numbers at the end, forces in {unit}", heads, errors, "words")
 
 
 def _works(result: Result) -> Mapping[str, Any]:

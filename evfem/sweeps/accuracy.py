@@ -167,12 +167,17 @@ def least_force(own: Result) -> float:
     return LEAST * max(float(np.abs(getattr(own, name)).max()) for name in FORCES)
 
 
-def accuracy_table(found: Sequence[Accuracy]) -> str:
-    """Outputs, their values and errors by source, and the sums, as text."""
+def accuracy_rows(found: Sequence[Accuracy]) -> list[list[str]]:
+    """Heads, and a row per output: its value, errors by source, and their sum."""
     lines = [["output", "value", *SOURCES, "sum"]]
     for one in found:
         errors = [getattr(one, source) for source in SOURCES]
         shown = [f"{100.0 * error:.2g} %" if np.isfinite(error) else "not known" for error in errors]
         total = f"{'' if one.known else '> '}{100.0 * one.sum:.2g} %"
         lines.append([one.output, f"{one.value:.6g}", *shown, total])
-    return aligned(lines)
+    return lines
+
+
+def accuracy_table(found: Sequence[Accuracy]) -> str:
+    """The same as text."""
+    return aligned(accuracy_rows(found))

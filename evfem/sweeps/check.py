@@ -96,13 +96,18 @@ class Checked:
         """The stated error of each output, as a share of it: the sum of what is known."""
         return {one.output: one.sum for one in self.outputs}
 
-    def table(self) -> str:
-        """All ends side by side, as text."""
+    def ends(self) -> list[list[str]]:
+        """Heads, and a row per variant: forces (N/mm), indentation (mm) and difference."""
         names = ["way", *FORCES, "indentation", "difference"]
         lines = [[name.replace("_", " ") for name in names]]
         for row in self.rows:
             shown = [f"{row[name]:.6g}" if name in row else "-" for name in names[1:-1]]
             lines.append([row["way"], *shown, row["why"] or f"{row['difference']:.1e}"])
+        return lines
+
+    def table(self) -> str:
+        """All ends side by side, as text."""
+        lines = self.ends()
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return "\n".join(
             "  ".join([line[0].ljust(widths[0]), *map(str.rjust, line[1:-1], widths[1:-1]), line[-1]])
@@ -114,11 +119,16 @@ class Checked:
         unknown = "" if all(one.known for one in self.outputs) else "\na sum is without what is not known"
         return f"{accuracy_table(self.outputs)}{unknown}"
 
+    @property
+    def verdict(self) -> str:
+        """Whether the ends agree, in words."""
+        said = "the ends agree" if self.agrees else "the ends differ: the result depends on the solution path"
+        return f"{said} (allowed: {AGREE:g})"
+
     def __str__(self) -> str:
         """Both tables, and in the last line whether the ends agree."""
-        said = "the ends agree" if self.agrees else "the ends differ: the result depends on the solution path"
         told = f"\n\nerrors\n{self.error_table()}\n" if self.outputs else ""
-        return f"{self.table()}{told}\n{said} (allowed: {AGREE:g})"
+        return f"{self.table()}{told}\n{self.verdict}"
 
 
 def check(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import product
@@ -81,6 +81,13 @@ OUTPUTS = (
     "electrostatic_force.last",
     "contact_width.last",
 )
+#: keys that stand for each other: a scene has one of them
+ALTERNATIVES = {
+    "voltage": ("amplitude",),
+    "amplitude": ("voltage",),
+    "force": ("indentation",),
+    "indentation": ("force",),
+}
 #: columns of the table that every sweep has, before and after its own
 FIRST, LAST = ("point",), ("status", "seconds", "message")
 TABLES = tuple(name for name in names(SceneTable) if name != "version")
@@ -179,6 +186,7 @@ class Sweep:
                 labels |= label
                 parameters |= row
             scene = deepcopy(tables)
+            make_way(scene, parameters)
             for key, value in parameters.items():
                 put_in(scene, key, value)
             points.append(Point(index, labels, parameters, tomli_w.dumps(scene)))
@@ -237,6 +245,21 @@ def plain_value(where: str, value: Any) -> Any:
     if not isinstance(value, (bool, int, float, str)):
         raise InputError(where, describe_value(value), "numbers, text, true or false, and lists of them")
     return value
+
+
+def make_way(tables: Any, keys: Collection[str]) -> None:
+    """Remove from the tables of a scene what these dotted keys are given instead of."""
+    for key in keys:
+        *names, last = key.split(".")
+        here = tables
+        for name in names:
+            if isinstance(here, list):
+                here = here[int(name)] if name.isdecimal() and int(name) < len(here) else None
+            else:
+                here = here.get(name) if isinstance(here, dict) else None
+        for other in ALTERNATIVES.get(last, ()):
+            if isinstance(here, dict) and ".".join((*names, other)) not in keys:
+                here.pop(other, None)
 
 
 def put_in(tables: Any, key: str, value: Any) -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from tools.domes import dome_scene
 from tools.fakes import fake_result, fake_row, lines_of
 from tools.meshes import square_mesh
 from tools.refusals import refuses
@@ -26,8 +27,10 @@ from evfem.plotting import (
 )
 from evfem.plotting.curves import ENERGIES, abscissa
 from evfem.plotting.labels import kind_of
+from evfem.scene.motion import Press
 from evfem.scene.probes import Probe, columns, histories
 from evfem.simulation.result import COLUMNS, Result
+from evfem.simulation.run import simulate
 
 
 def assert_line(line, x, y):
@@ -247,6 +250,12 @@ def test_totals_and_others_are_not_compared():
     result = whole()
     with pytest.raises(InputError, match="some per mm of depth, some in total; allowed: all of them"):
         compare({"a": result, "b": result.total}, "normal_force")
+    # a fingertip is a total, and has other units for widths
+    tip = simulate(dome_scene(Press(indentation=0.1, steps=1)))
+    beside = compare({"a": result.total, "b": tip}, "normal_force")
+    assert beside.get_ylabel() == "normal force (N)"
+    with pytest.raises(InputError, match="contact_width, which these results do not have in one unit"):
+        compare({"a": result.total, "b": tip}, "contact_width")
     both = compare({"a": result.total, "b": result.total}, "normal_force")
     assert both.get_ylabel() == "normal force (N)"
 

@@ -290,6 +290,17 @@ def test_results_beside_each_other_have_one_scale():
     assert len(side_by_side({"soft": soft, "hard": hard}, near=None)) == 2
 
 
+def test_frames_of_a_result_stand_beside_each_other_on_one_scale():
+    result = fake_result()
+    first, last = result.frames[0].step, result.frames[-1].step
+    result.frames[0].von_mises[:] *= 3.0
+    panels = side_by_side(result, "von_mises", [0, -1])
+    assert [ax.get_title() for ax in panels[:2]] == [f"step {first}", f"step {last}"]
+    assert {ax.collections[0].get_clim() for ax in panels} == {(0.0, result.frames[0].von_mises.max())}
+    both = side_by_side({"one": result, "two": result}, "von_mises", [0, -1], near=None)
+    assert [ax.get_title().split(",")[0] for ax in both] == ["one", "one", "two", "two"]
+
+
 @pytest.mark.parametrize("field", ["contact_pressure", "shear_traction", "electrostatic_traction"])
 def test_arrows_of_panels_side_by_side_are_as_long_for_as_large_a_traction(field):
     """A finger with twice the tractions and less room below its surface has arrows twice as long."""

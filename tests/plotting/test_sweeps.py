@@ -113,8 +113,31 @@ def test_a_map_of_decades_has_cells_of_one_width_and_says_the_numbers():
     assert [text.get_text() for text in ax.get_xticklabels()] == ["0.001", "0.01", "0.1"]
 
 
+def test_a_map_over_names_has_one_row_for_each():
+    ax = sweep_map(table(GRID), GAP, LAW, OUT)
+    np.testing.assert_allclose(ax.collections[0].get_array(), [[1.0, 3.0, 5.0], [2.0, 4.0, 6.0]])
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["a", "b"]
+
+
+def test_ticks_of_a_map_are_short_and_do_not_overlap():
+    rows = [(load / 7.1, "a", load) for load in (0.1, 0.2, 0.3, 0.5, 0.75, 1.0)]
+    ax = sweep_map(table(rows), GAP, LAW, OUT)
+    assert [text.get_text() for text in ax.get_xticklabels()][:2] == ["0.0141", "0.0282"]
+    decades = [(10.0**k, "a", 1.0) for k in range(20)]
+    ax = sweep_map(table(decades), GAP, LAW, OUT)
+    assert [text.get_text() for text in ax.get_xticklabels()] == [
+        "1",
+        "1e+03",
+        "1e+06",
+        "1e+09",
+        "1e+12",
+        "1e+15",
+        "1e+18",
+    ]
+    assert ax.get_xticks().tolist() == [0, 3, 6, 9, 12, 15, 18]
+
+
 def test_what_is_no_map_gets_a_sentence():
-    refuses("two columns of numbers", sweep_map, table(GRID), GAP, LAW, OUT)
     refuses("several points at one place", sweep_map, table(GRID), GAP, GAP, OUT)
     refuses(r'given "motion.1.gap"; allowed: motion.0.gap. .point, ', sweep, table(GRID), "motion.1.gap", OUT)
 

@@ -225,3 +225,18 @@ def test_a_key_that_leads_nowhere(key, sentence):
 def test_a_file_that_is_no_sweep(text):
     with pytest.raises(InputError):
         sweepfile.loads(text)
+
+
+def test_a_key_that_varies_takes_the_place_of_what_it_is_given_instead_of():
+    """A scene of Python has a voltage, and one of a file an amplitude, whatever the sweep asks for."""
+    pad, screen = ev.FingerPad(ridges=False, resolution="coarse"), ev.Display(insulator=ev.TOUCHSCREEN)
+    drive, press = ev.Drive(frequency=100.0), ev.Press(indentation=0.2, steps=1)
+    scene = ev.Scene(pad, screen, ev.StrongTroxel(), 100.0, press, roughness_gap=0.005, drive=drive)
+    grid = {"electrostatics.amplitude": [20.0], "motion.0.force": [0.07]}
+    found = tomllib.loads(ev.Sweep(scene, grid=grid).points()[0].text)
+    assert found["electrostatics"]["amplitude"] == 20.0
+    assert "voltage" not in found["electrostatics"]
+    assert found["motion"][0] == {"kind": "press", "steps": 1, "force": 0.07}
+    both = ev.Sweep(scene, grid=grid | {"electrostatics.voltage": [10.0]})
+    with pytest.raises(InputError, match="given voltage and amplitude"):
+        ev.sweep(both, workers=1)
