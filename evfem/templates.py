@@ -12,6 +12,7 @@ from evfem.errors import InputError, describe_value
 #: template -> the file that its scene needs beside it, and the ready-made mesh that this is
 TEMPLATES: dict[str, dict[str, str]] = {
     "display": {},
+    "touchscreen": {},
     "texture": {},
     "mesh": {"pad.vtu": "benchmark-L0.vtu"},
     "hover": {},

@@ -315,4 +315,4 @@ def test_a_template_makes_a_scene_and_overwrites_nothing(tmp_path):
             assert all(not one.exists() for one in others)
             for one in others:
                 one.write_bytes(before[one])
-    refuses(r'--template: given "none"; allowed: display \| texture', templates.text, "none")
+    refuses(r'--template: given "none"; allowed: display \| touchscreen', templates.text, "none")
