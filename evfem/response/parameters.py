@@ -9,6 +9,7 @@ laws of one's own, have the same keys, and attributes of laws of one's own are k
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
@@ -133,7 +134,7 @@ class Keyed:
         """Attributes, names and numbers from the scene to it."""
         table, *rest = self.name.split(".")
         if table not in TABLES or not rest:
-            meant = f"{dotted(self.name)}? " if dotted(self.name) else ""
+            meant = f"{dotted(self.name)}? " if self._has(dotted(self.name)) else ""
             allowed = f"{meant}TABLE.KEY, TABLE one of {', '.join(TABLES)}"
             raise InputError("parameters", describe_value(self.name), allowed)
         if table == "electrostatics":
@@ -143,6 +144,12 @@ class Keyed:
         if (table, rest[0], len(rest)) == ("surface", "points", 3):
             return (table, {"0": "x", "1": "samples"}.get(rest[2], rest[2]), rest[1])
         return (table, *rest)
+
+    def _has(self, other: str) -> bool:
+        """Whether another key is a parameter of the scene."""
+        with suppress(InputError):
+            return other not in ("", self.name) and Keyed(self.scene, other).value != 0.0
+        return False
 
     def _electric(self, name: str, *rest: str) -> tuple[str, ...]:
         """The same of a key of [electrostatics]."""
@@ -241,7 +248,11 @@ def _part(owner: Any, step: str, key: str) -> Any:
         raise InputError(f"parameters.{key}", ABSENT, NUMBER)
     if attribute is None:
         names = [spec.name for spec in fields(owner)] if is_dataclass(owner) else sorted(vars(owner))
-        raise unknown(f"parameters.{key}", step, tuple(names))
+        raise (
+            unknown(f"parameters.{key}", step, tuple(names))
+            if names
+            else InputError(f"parameters.{key}", ABSENT, NUMBER)
+        )
     return getattr(owner, attribute)
 
 

@@ -44,6 +44,20 @@ def test_a_bare_name_is_told_its_table(path):
     refuses("allowed: materials[?]", ev.sensitivities, path, "finger.dermis.E")
 
 
+@pytest.mark.parametrize("name", ["depth", "solver.tolerance", "output.every"])
+def test_a_key_that_has_no_derivative_is_not_meant(path, name):
+    refuses(f'parameters: given "{name}"; allowed: TABLE.KEY', ev.sensitivities, path, name)
+
+
+def test_a_name_that_leads_nowhere_says_so():
+    scene = ev.Scene(
+        ev.FingerPad(resolution="coarse", ridges=False),
+        ev.Profile([-9.0, 9.0], [0.0, 0.1]),
+        motion=ev.Press(indentation=0.1, steps=1),
+    )
+    refuses("surface.height.20: missing; allowed: a number", ev.sensitivities, scene, "surface.height.20")
+
+
 def test_uncertainty_is_the_root_of_the_sum_of_squares_and_is_checked(path):
     sd = {"finger.materials.hypodermis.E": 0.004, "surface.friction": 0.03}
     refuses("columns: given substeps, contact_width", ev.uncertainty, path, sd, ["substeps", "contact_width"])
