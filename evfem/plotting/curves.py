@@ -154,7 +154,7 @@ def _drawn(result: Result, over: str) -> Any:
 
 def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
     """The axes with their abscissa, and over the steps with the motions, if all have the same."""
-    ax.set_xlabel(labels.column_label(over, first.units))
+    ax.set_xlabel(labels.effective(over, (first, *others)) + labels.column_label(over, first.units))
     if over == "step" and all(np.array_equal(first.motion, other.motion) for other in others):
         _mark_motions(ax, first)
     return ax
@@ -407,6 +407,7 @@ def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str
         (along(one, over, over), factor * y, look)
         for one, y, look in zip(found.values(), drawn, looks, strict=True)
     ]
+    text = labels.effective(column, found.values()) + text
     ax = figures.curves(ax, lines, "", labels.with_unit(text, unit), legend=False)
     largest = max(float(np.abs(labels.values_of(one, "normal_force")).max()) for one in found.values())
     if column.endswith("force") and all(np.abs(y).max() <= ZERO * largest for _, y, _ in lines):

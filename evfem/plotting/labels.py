@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -196,6 +196,12 @@ def units_of(found: Mapping[str, Result]) -> Units:
     return _Alike(
         {name: unit for name, unit in first.items() if all(unit == one.get(name) for one in others)}
     )
+
+
+def effective(name: str, results: Iterable[Result]) -> str:
+    """What stands before a voltage that acts by its mean over the cycle: it is no peak."""
+    scenes = (result.simulated for result in results if name == "voltage")
+    return "effective " if any(scene is not None and scene.electrics.alternates for scene in scenes) else ""
 
 
 class _Alike(dict[str, str]):

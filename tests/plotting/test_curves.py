@@ -10,6 +10,7 @@ from tools.fakes import fake_result, fake_row, lines_of
 from tools.meshes import square_mesh
 from tools.refusals import refuses
 
+from evfem import TOUCHSCREEN, Display, Drive, FingerPad, Hover, Scene, Sine, StrongTroxel
 from evfem.errors import InputError
 from evfem.plotting import (
     compare,
@@ -354,3 +355,16 @@ def test_no_label_of_a_panel_is_cut_or_reaches_into_the_next():
             label, axes = ax.yaxis.label.get_window_extent(), ax.get_window_extent()
             assert label.x0 >= 0.0, name
             assert axes.y0 - 2.0 <= label.y0 < label.y1 <= axes.y1 + 2.0, name
+
+
+def test_a_voltage_that_acts_by_its_mean_is_the_effective_one():
+    """150 V of a sine's peak are 106 V in the history."""
+    pad, screen = FingerPad(resolution="coarse", ridges=False), Display(insulator=TOUCHSCREEN)
+    scene = Scene(pad, screen, StrongTroxel(), Sine(100.0, 150.0), Hover(gap=0.5, steps=1), drive=Drive())
+    result = simulate(scene)
+    assert result.voltage[0] == pytest.approx(150.0 / np.sqrt(2.0))
+    assert signal(result)[0].get_ylabel() == "effective voltage (V)"
+    ax = compare({"a": result}, "electrostatic_force", over="voltage")
+    assert ax.get_xlabel() == "effective voltage (V)"
+    direct = simulate(replace(scene, voltage=100.0, drive=None))
+    assert signal(direct)[0].get_ylabel() == "voltage (V)"
