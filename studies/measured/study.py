@@ -66,7 +66,7 @@ def draw(found: list[Experiment]) -> Figure:
         ax.axhline(place, color="0.9", lw=6.0, zorder=0)
         for row in one.rows:
             place += 1
-            ticks[place] = row.name
+            ticks[place] = _words(row)
             _point(ax, place, row)
         place += 1
     ax.axvline(1.0, color="black", lw=0.8, zorder=0)
@@ -81,6 +81,11 @@ def draw(found: list[Experiment]) -> Figure:
     ax.tick_params(axis="y", length=0)
     _legend(ax)
     return figure
+
+
+def _words(row: Row) -> str:
+    """The name of a row without its law, which is its colour."""
+    return row.name.replace(f".{row.law}" if row.law else "", "").replace("_", " ").replace(".", ", ")
 
 
 def _point(ax: Axes, place: float, row: Row) -> None:
