@@ -22,6 +22,8 @@ SAID = {
 }
 #: the row of a threshold's level
 LEVEL = "threshold.half_mil"
+#: the same over the area of the package's own pad
+OWN = "threshold_by_fingertip.half_mil"
 
 
 def rows_of(found: Found) -> list[dict[str, Any]]:
@@ -80,10 +82,13 @@ def readme(found: Found) -> str:
     return filled(
         f"{met(ratios)}; the page says which are predictions.",
         f"With fingers held as they were, Strong and Troxel's law has {forces['strong_troxel']} of the "
-        f"measured hovering forces (medians) and Kaczmarek's {forces['kaczmarek']}; thresholds agree within "
-        f"the prediction's own error of {100.0 * error:.0f}\xa0%, if the published voltages are effective.",
+        f"measured hovering forces (medians) and Kaczmarek's {forces['kaczmarek']}; thresholds, with "
+        f"a gap fitted to their ratio and a measured area, agree within the prediction's own error of "
+        f"{100.0 * error:.0f}\xa0% if the published voltages are effective; over the package's own pad they "
+        f"are {ratios[OWN]:.1f} times as large.",
         f"What misses is said too: the default ellipsoid touches {between(ratios, r'gross_area[.]')} of the "
-        "measured area, and forces on a touchscreen are known to a factor of four.",
+        "measured area, and the attraction on a touchscreen is known from three times more to six times "
+        "less, as the gap is.",
         width=88,
     ).replace("\xa0", " ")
 

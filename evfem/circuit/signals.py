@@ -222,7 +222,8 @@ def carrier_amplitude(effective: Values) -> Values:
 
 @dataclass(frozen=True)
 class Amplifier:
-    """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
+    """What a display's amplifier can do: `voltage_max` in V, effective (200 V of peak are 141 under a sine),
+    and, if given, `slew` in V/s (of the profile).
 
     Under an alternating voltage it also has a `largest_current` (effective, A) and a `slew_rate` (V/s, of the
     voltage of the moment) at the frequencies of its `load`, as `evfem.electrical_impedance` finds it.

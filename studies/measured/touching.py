@@ -147,13 +147,13 @@ STRONG = Experiment(
     "effective ones (were they peaks, 0.71 of each would be).",
     fitted="what is in series with the films, as much as 2.75 um of air, to the ratio of the two thresholds: "
     "their level is predicted, their ratio is not. The rows without a gap have nothing fitted.",
-    reason="2.6 um of air between rough faces, and skin that counts as 0.1 um of it, explain both voltages; "
+    reason="2.6 um of air between rough faces, and skin that counts as 0.2 um of it, explain both voltages; "
     "5.5 mm of skin, as the paper has it, are not needed. Skin alone attracts so strongly that half to two "
     "thirds of the voltage would do.",
     sceptic="Three publications of three laboratories and an assumed load: agreement by chance is easy.",
-    answer="The load enters weakly: five times the load raises the threshold by a half, which is the error "
-    "given, a fifth to either side. The Weber fraction enters by its root. What would count against it is a "
-    "gap measured far from 2 to 3 um.",
+    answer="The load enters weakly: five times the load raises the threshold by a half; from the assumed one "
+    "that is a fifth to either side, the error given. The Weber fraction enters by its root. What would "
+    "count against it is a gap measured far from 2 to 3 um.",
 )
 MEYERS = Experiment(
     title="Attraction on a touchscreen",
@@ -161,7 +161,8 @@ MEYERS = Experiment(
     doi="10.1109/WHC.2013.6548382",
     read="the abstract, and the numbers that the paper quotes",
     conditions="140 V effective at 10 kHz, insulator of 1 um; friction 0.3; one subject 0.25 N, all 0.05 to "
-    "0.35 N; the force goes with the square of the voltage.",
+    "0.35 N; the force goes with the square of the voltage. Their model's "
+    "cut-off below 500 Hz is at odds with what they measured.",
     assumed="An area of 100 mm2 and 0.2 mm of skin / 1650, as the paper does; a film of permittivity 3.9.",
     fitted="nothing to Meyer; the gap of one row to the ratio of Strong and Troxel's thresholds.",
     reason="Without a gap Strong and Troxel's law is two orders too large; Kaczmarek's is in the range as it "
@@ -207,7 +208,8 @@ ALIABBASI = Experiment(
     assumed="A gap of 1 um with a leak of 1e-8 S/m, which nobody has measured: ten times more and less in "
     "the error.",
     fitted="nothing.",
-    reason="The corner is proportional to a conductivity that is not known; 7e-8 S/m would give 250 Hz.",
+    reason="The corner is proportional to a conductivity that is not known; 7e-8 S/m would give 250 Hz, at a "
+    "gap of 5 um 2.9e-7. Meyer et al. expected a cut-off below 500 Hz and measured none.",
     sceptic="A prediction that is good to a factor of ten predicts nothing.",
     answer="It says which conductivity to measure. The row stands for that.",
 )
