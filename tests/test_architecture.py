@@ -83,7 +83,8 @@ ROOMS = {
     ),
     "planning": (
         {"numpy"},
-        "rooms resolution loaddrift parts attracted plausibility fieldchoice core timescales cost plan",
+        "rooms resolution loaddrift parts attracted plausibility fieldchoice core timescales cost plan "
+        "swings",
     ),
     "simulation": (
         {"numpy", "scipy"},

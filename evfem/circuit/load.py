@@ -161,7 +161,7 @@ class Air(Room):
         law, layers = electrics.attraction
         rough = roughness_below(law, layers, scene.roughness_gap)
         peaks = np.array([electrics.crest * abs(row["voltage"]) for row in rows])
-        gaps = [_smallest_gap(row, rough) for row in rows]
+        gaps = [smallest_gap(row, rough) for row in rows]
         for name, film in electrics.films.items():
             over = peaks * [electrics.field_in(film, gap) for gap in gaps] / film.strength
             worst = int(over.argmax())
@@ -182,7 +182,7 @@ class Air(Room):
         return f" in gaps of {1e3 * float(first):.3g} to {1e3 * float(last):.3g} um"
 
 
-def _smallest_gap(row: Mapping[str, Any], rough: Any) -> float:
+def smallest_gap(row: Mapping[str, Any], rough: Any) -> float:
     """The smallest gap (mm) of a row, with the air that rough faces keep under the largest pressure."""
     apart = 0.0 if rough is None else float(rough.separation(row["peak_contact_pressure"]))
     return max(float(row["min_gap"]), 0.0) + apart

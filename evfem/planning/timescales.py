@@ -1,47 +1,26 @@
-r"""The time scales of a scene with a drive: voltage, charge and mechanics, in words for its plan.
+"""The time scales of a scene with a drive: voltage, charge and mechanics, in words for its plan.
 
 Twice the frequency of the voltage is that of the attraction. The gap discharges below its corner
 frequency, and the skin is a conductor below its own (`evfem.electrostatics.alternating`); both are
 told for touching skin. Kelvin-Voigt tissue with the relaxation time tau follows up to 1 / (2 pi tau);
 without time in the mechanics it follows at once. A swing slower than `FOLLOWS` times that moves the
 tissue, and its mean over the cycle leaves that out.
-
-A mean over the cycle takes friction as that of the mean attraction. A pad that slides by :math:`v` and
-has no inertia is a spring of the stiffness k under the bound :math:`b(t)`, which the swing raises and
-lowers: friction falls with the bound, but rises by no more than the pad is stretched,
-
-.. math:: F(t) = \min(b(t), F(t - dt) + k\,v\,dt).
-
-Its mean is that of `b` where k v exceeds the steepest rise of the bound, and less elsewhere
-(`stuck_within_swings`). Inertia holds the pad, which then sticks less: the mean lies between the two.
-Under a `SlipMemory` the bound itself follows at the rate :math:`r = v/L + 1/T`, and keeps
-:math:`1/(1 + i\,\omega/r)` of what swings at :math:`\omega`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
-
 import numpy as np
 
-from evfem.common.arrays import Floats
 from evfem.electrostatics.dielectrics import Dielectric, seen_at
 from evfem.electrostatics.drive import powers, waveform
 from evfem.electrostatics.laws import Layer
 from evfem.electrostatics.relaxation import Sandwich
-from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit, Sine
-from evfem.newton.state import FORCES
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
-from evfem.surface.friction import SlipMemory
 
 #: a swing up to so many times the highest frequency that the tissue follows still moves it
 FOLLOWS = 5.0
-#: moments of a cycle at which its swing is followed
-MOMENTS = 400
-#: fraction of the friction by the attraction that may be missing without a sentence
-MISSING = 0.1
 
 
 def time_scales(scene: Scene) -> str:
@@ -136,88 +115,3 @@ def left_out(scene: Scene) -> str | None:
     much = f"the attraction swings at {swing:g} Hz, and the tissue follows up to {highest:.3g} Hz"
     other = f'drive = "resolved" with steps of at most {1.0 / (20.0 * at):.2g} s does not'
     return f"{much}: the mean over the cycle leaves that out, {other}"
-
-
-def stuck_within_swings(scene: Scene, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """A sentence if friction took the mean of a swing within which a pad without inertia sticks, for the
-    slide where most is missing.
-    """
-    at, bound = _averaged(scene)
-    if at is None or bandwidth(scene) * FOLLOWS <= at:
-        return
-    most, worst = MISSING, ""
-    for i, course in enumerate(scene.courses):
-        some = [k for k, row in enumerate(rows) if row["motion_index"] == i]
-        if not (some and course.distance and course.speed):
-            continue
-        end, stiffness = rows[some[-1]], _stiffness(rows[max(some[0] - 1, 0) : some[-1] + 1])
-        friction, normal = _size(end, "tangential_force"), float(end["normal_force"])
-        added = friction * float(end["electrostatic_force"]) / normal if normal > 0.0 else 0.0
-        kept = _remembered(bound, scene.friction_law, course.speed, at)
-        found = spring_mean(friction + added * (kept - 1.0), stiffness * course.speed / (at * MOMENTS))
-        if added > 0.0 and (friction - found) / added > most:
-            most, unit = (friction - found) / added, FORCES[3 if "contact_area" in end else 2]
-            worst = (
-                f"motion {i}: the friction of {friction:.4g} {unit} is that of the mean attraction, which "
-                f"swings; without inertia the pad sticks within each swing, at a mean of {found:.4g} {unit}: "
-                'drive = "resolved" with dynamics = "inertial" says where between (slip_memory swings less)'
-            )
-    yield from [worst] if worst else []
-
-
-def spring_mean(bound: Floats, rise: float) -> float:
-    """Mean over a cycle of the friction of a spring, from its bounds (k,) at equal times and what stretching
-    adds from one to the next.
-
-    >>> spring_mean(np.array([1.0, 2.0, 3.0, 2.0]), 1.0), spring_mean(np.array([1.0, 2.0, 3.0, 2.0]), 0.0)
-    (2.0, 1.0)
-    """
-    total = force = float(bound.min())
-    for most in np.roll(bound, -int(bound.argmin()))[1:]:
-        force = min(float(most), force + rise)
-        total += force
-    return total / len(bound)
-
-
-def _remembered(bound: Floats, law: Any, speed: float, at: float) -> Floats:
-    """What the memory of a friction law leaves of a bound (k,) over a cycle of `at` Hz."""
-    if not isinstance(law, SlipMemory):
-        return bound
-    rate = speed / law.length + 1.0 / law.time
-    swung = np.fft.rfft(bound)
-    turns = 2.0 * np.pi * at * np.arange(swung.size)
-    return np.fft.irfft(swung / (1.0 + 1j * turns / rate), bound.size)
-
-
-def _averaged(scene: Scene) -> tuple[float | None, Floats]:
-    """Frequency (Hz) of the voltage that a scene takes by its mean, None without one, and its square over a
-    cycle, relative to the mean.
-    """
-    own: Any = scene.voltage
-    seen = scene.electrics
-    carried = isinstance(own, Carrier) and not own.resolved
-    at = own.frequency if isinstance(own, Carrier) else seen.frequency
-    if at is None or not (carried or (seen.alternates and _swings(scene))):
-        return None, np.ones(1)
-    signal = Sine(at, 1.0) if carried or powers(own) is None else own
-    squared = np.asarray(signal(np.arange(MOMENTS) / (MOMENTS * at))) ** 2
-    return at, squared / squared.mean()
-
-
-def _along(row: Mapping[str, Any], name: str) -> tuple[float, float]:
-    """Components of a column along the surface."""
-    return float(row.get(f"{name}_x", row[name])), float(row.get(f"{name}_z", 0.0))
-
-
-def _size(row: Mapping[str, Any], name: str) -> float:
-    """Size of a column along the surface."""
-    return float(np.hypot(*_along(row, name)))
-
-
-def _stiffness(rows: Sequence[Mapping[str, Any]]) -> float:
-    """The steepest rise of the friction force of a pad over its way in these rows, per mm."""
-    force, place = (
-        np.diff([_along(row, name) for row in rows], axis=0) for name in ("tangential_force", "position")
-    )
-    moved = np.hypot(*place.T)
-    return float((np.hypot(*force.T)[moved > 0.0] / moved[moved > 0.0]).max(initial=0.0))

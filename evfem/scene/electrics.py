@@ -176,9 +176,15 @@ class Electrics:
         several = self.alternates and spectrum(self.drive, self.given)[0].size > 1  # type: ignore[arg-type]
         if not (several and self.conducts):
             return np.asarray(self.crest * across_gap(gap, layers, self.gap_eps_r))
+        return np.abs(self.period_across(gap)).max(axis=0)
+
+    def period_across(self, gap: Floats) -> Floats:
+        """Voltages (SAMPLES, P) of gaps (P,) in mm over a cycle of an alternating voltage, over its effective
+        value.
+        """
         amplitudes, stacks = self._period
         fractions = [0.0 * gap if one is None else gap / (gap + self.gap_eps_r * one) for one in stacks]
-        return np.abs(np.fft.irfft(amplitudes[:, None] * fractions, SAMPLES, axis=0)).max(axis=0)
+        return np.asarray(np.fft.irfft(amplitudes[:, None] * fractions, SAMPLES, axis=0))
 
     @cached_property
     def _period(self) -> tuple[Any, list[Any]]:

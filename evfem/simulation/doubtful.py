@@ -17,7 +17,7 @@ from evfem.newton.state import FORCES, Collapsed, Folded, LiftedOff, State, Step
 from evfem.planning.parts import COMPLEX_SAFE, lost_derivatives
 from evfem.planning.plausibility import weakens
 from evfem.planning.rooms import rooms_of
-from evfem.planning.timescales import stuck_within_swings
+from evfem.planning.swings import swings
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 from evfem.simulation.model import Model
@@ -123,7 +123,7 @@ def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
         _climbed(rows),
         _missed(rows),
         _strained(scene, rows),
-        stuck_within_swings(scene, rows),
+        swings(scene, rows),
         *(kind.books.doubts(scene, rows) for kind in rooms_of(scene)),
     )
     return [sentence for one in told for sentence in one] if rows else []
