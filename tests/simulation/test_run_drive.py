@@ -226,8 +226,24 @@ def test_a_soft_hand_lets_the_pad_stick_longer():
 
 def test_friction_that_the_attraction_hardly_changes_misses_hardly_anything():
     """Of complete contact the strength counts, whatever presses."""
-    law = ev.AdhesiveFriction(0.01, full=0.003)
-    assert not swung(ev.Drive(frequency=100.0, **RATE), [slide(100.0)], friction_law=law)
+    law, drive = ev.AdhesiveFriction(0.01, full=0.003), ev.Drive(frequency=100.0, **RATE)
+    made = scene(drive, [PRESS, slide(100.0)], 106.0, roughness_gap=0.005, friction_law=law)
+    found = ev.simulate(replace(made, surface=replace(SCREEN, friction=0.0)))
+    assert not any("which swings" in one for one in found.warnings)
+
+
+def test_a_carrier_that_is_averaged_swings_as_a_sine():
+    """Of the same frequency, with and without a drive that conducts nothing."""
+    carried = swung(None, [slide(100.0)], ev.Carrier(100.0, 150.0, resolved=False))
+    assert swung(ev.Drive(frequency=100.0), [slide(100.0)], 150.0 / np.sqrt(2.0)) == carried
+    assert carried
+
+
+def test_a_wave_on_and_off_lets_friction_rise_in_its_pauses():
+    """The run that resolves it has 0.02112 N/mm (32 steps in a cycle)."""
+    voltage = ev.Square(100.0, amplitude=50.0, bias=50.0)
+    _, alone = swung(ev.Drive(), [slide(50.0)], voltage)
+    assert alone == pytest.approx(0.02112, rel=3e-3)
 
 
 def test_a_loop_tells_it_too():
