@@ -9,7 +9,7 @@ the bound, but rises by no more than the pad is stretched,
 Its mean is that of b where k v exceeds the steepest rise of the bound, and less elsewhere. Under a
 `SlipMemory` the bound follows what it would be over the length of slip, of which there is none while the pad
 sticks. Inertia holds the pad, which then sticks less: the mean lies between the two. k is the steepest rise
-of friction over the way in the rows of a run: in long steps it is too small, and so is the mean.
+of friction over the distance slid in the rows of a run: in long steps it is too small, and so is the mean.
 """
 
 from __future__ import annotations
@@ -53,14 +53,16 @@ def swings(scene: Scene, rows: Rows) -> Iterator[str]:
     for k, added in _highest(scene, rows, speeds).items():
         row, friction = rows[k], _size(rows[k])
         bound = friction + added * (_swing(scene, row, carried) - 1.0)
-        way = float(speeds[k]) / (at * MOMENTS)
-        found = spring_mean(bound, stiffness * way, _memory(scene.friction_law, way, 1.0 / (at * MOMENTS)))
+        travel = float(speeds[k]) / (at * MOMENTS)
+        found = spring_mean(
+            bound, stiffness * travel, _memory(scene.friction_law, travel, 1.0 / (at * MOMENTS))
+        )
         if (friction - found) / added > most:
             most, unit = (friction - found) / added, FORCES[3 if "contact_area" in row else 2]
             told = (
                 f"step {row['step']}: the friction of {friction:.4g} {unit} is that of the mean attraction, "
-                f"which swings; a pad without inertia sticks within each swing, and has down to {found:.4g} "
-                f'{unit} in the mean: drive = "resolved" with dynamics = "inertial" says where between'
+                f"which swings; a pad without inertia sticks within each swing, with a mean as low as "
+                f'{found:.4g} {unit}: drive = "resolved" with dynamics = "inertial" says where between'
             )
     yield from [told] if told else []
 
@@ -106,20 +108,20 @@ def _renewed(limit: float, level: float, over: float, rise: float, memory: tuple
 
 
 def _course(scene: Scene, rows: Rows) -> tuple[Floats, float]:
-    """Speeds (rows,) in mm/s, 0 without time, and the steepest rise of friction over the way, per mm."""
-    place, force = (
+    """Speeds (rows,) in mm/s, 0 without time, and the steepest rise of friction over the distance, per mm."""
+    position, force = (
         np.array([_along(row, name) for row in rows]) for name in ("position", "tangential_force")
     )
-    moved, time = np.diff(place, axis=0), np.diff([float(row["time"]) for row in rows], prepend=0.0)
-    way = np.append(np.hypot(*place[0]), np.hypot(*moved.T))
+    moved, time = np.diff(position, axis=0), np.diff([float(row["time"]) for row in rows], prepend=0.0)
+    travel = np.append(np.hypot(*position[0]), np.hypot(*moved.T))
     if scene.hand is not None:  # its own position lags behind the one that is prescribed
         courses = [(abs(one.course.distance), one.steps) for one in scene.motion]
-        way = np.array([courses[row["motion_index"]] for row in rows]) @ [1.0, 0.0]
-        way = way / [courses[row["motion_index"]][1] for row in rows]
-    speeds = np.where(time > 0.0, way / np.where(time > 0.0, time, 1.0), 0.0)
-    there = (np.hypot(*moved.T) > 0.0) & (way[1:] > 0.0)
+        travel = np.array([courses[row["motion_index"]] for row in rows]) @ [1.0, 0.0]
+        travel = travel / [courses[row["motion_index"]][1] for row in rows]
+    speeds = np.where(time > 0.0, travel / np.where(time > 0.0, time, 1.0), 0.0)
+    there = (np.hypot(*moved.T) > 0.0) & (travel[1:] > 0.0)
     heading = moved[there] / np.hypot(*moved[there].T)[:, None]
-    rises = np.sum(np.diff(force, axis=0)[there] * heading, axis=1) / way[1:][there]
+    rises = np.sum(np.diff(force, axis=0)[there] * heading, axis=1) / travel[1:][there]
     return speeds, float(rises.max(initial=0.0))
 
 
@@ -137,14 +139,14 @@ def _added(scene: Scene, row: Mapping[str, Any], speed: float) -> float:
     """What the attraction adds to the friction of a row, by the law at the mean pressure."""
     law: Any = scene.friction_law
     law = law.friction if isinstance(law, SlipMemory) else law
-    part = float(row["electrostatic_force"]) / float(row["normal_force"])
-    if not (isinstance(law, (Coulomb, float)) or part >= 1.0):
-        pressure = float(row["mean_contact_pressure"]) * np.array([1.0 - part, 1.0])
-        place = np.array([_along(row, "position")])
-        mu = scene.ground.friction_at(place if "contact_area" in row else place[:, :1])
+    fraction = float(row["electrostatic_force"]) / float(row["normal_force"])
+    if not (isinstance(law, (Coulomb, float)) or fraction >= 1.0):
+        pressure = float(row["mean_contact_pressure"]) * np.array([1.0 - fraction, 1.0])
+        position = np.array([_along(row, "position")])
+        mu = scene.ground.friction_at(position if "contact_area" in row else position[:, :1])
         least, bound = (float(one) for one in law.bound(pressure, float(np.ravel(mu)[0]), speed, 0.0))
-        part = 1.0 - least / bound if bound > 0.0 else 0.0
-    return _size(row) * part
+        fraction = 1.0 - least / bound if bound > 0.0 else 0.0
+    return _size(row) * fraction
 
 
 def _swing(scene: Scene, row: Mapping[str, Any], carried: bool) -> Floats:
@@ -158,8 +160,8 @@ def _swing(scene: Scene, row: Mapping[str, Any], carried: bool) -> Floats:
     return squared / squared.mean() if squared.any() else np.ones(MOMENTS)
 
 
-def _memory(law: Any, way: float, seconds: float) -> tuple[float, float] | None:
-    return (way / law.length, seconds / law.time) if isinstance(law, SlipMemory) else None
+def _memory(law: Any, travel: float, seconds: float) -> tuple[float, float] | None:
+    return (travel / law.length, seconds / law.time) if isinstance(law, SlipMemory) else None
 
 
 def _along(row: Mapping[str, Any], name: str) -> tuple[float, float]:

@@ -186,7 +186,7 @@ class Sweep:
                 labels |= label
                 parameters |= row
             scene = deepcopy(tables)
-            make_way(scene, parameters)
+            drop_alternatives(scene, parameters)
             for key, value in parameters.items():
                 put_in(scene, key, value)
             points.append(Point(index, labels, parameters, tomli_w.dumps(scene)))
@@ -247,8 +247,8 @@ def plain_value(where: str, value: Any) -> Any:
     return value
 
 
-def make_way(tables: Any, keys: Collection[str]) -> None:
-    """Remove from the tables of a scene what these dotted keys are given instead of."""
+def drop_alternatives(tables: Any, keys: Collection[str]) -> None:
+    """Remove from the tables of a scene the keys that these dotted ones stand for."""
     for key in keys:
         *names, last = key.split(".")
         here = tables

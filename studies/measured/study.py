@@ -66,7 +66,7 @@ def draw(found: list[Experiment]) -> Figure:
         ax.axhline(place, color="0.9", lw=6.0, zorder=0)
         for row in one.rows:
             place += 1
-            ticks[place] = _words(row)
+            ticks[place] = words(row)
             _point(ax, place, row)
         place += 1
     ax.axvline(1.0, color="black", lw=0.8, zorder=0)
@@ -83,9 +83,9 @@ def draw(found: list[Experiment]) -> Figure:
     return figure
 
 
-def _words(row: Row) -> str:
+def words(row: Row) -> str:
     """The name of a row without its law, which is its colour."""
-    return row.name.replace(f".{row.law}" if row.law else "", "").replace("_", " ").replace(".", ", ")
+    return row.name.replace(f".{row.law}" if row.law else "", "").replace("_", " ").replace(".", ", ", 1)
 
 
 def _point(ax: Axes, place: float, row: Row) -> None:

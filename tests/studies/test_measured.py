@@ -15,7 +15,7 @@ from evfem import data
 from evfem.studies import common, frequency
 from evfem.studies.fingertip import force_on
 from evfem.studies.measured import hovering, moving, pressed, touching
-from evfem.studies.measured.study import LEFT_OUT
+from evfem.studies.measured.study import LEFT_OUT, words
 from evfem.studies.measured.table import Experiment, Row, numbers_of
 from evfem.surface.skin import make_skin
 
@@ -171,3 +171,14 @@ def test_the_quick_study_has_the_rows_of_the_file(numbers_of):
         assert quick[key] == pytest.approx(NUMBERS[key], rel=0.1)
     areas = [NUMBERS[f"gross_area.{load:g}N.predicted"] for load in pressed.LOADS]
     assert areas == sorted(areas)
+
+
+def test_the_picture_has_words_for_its_rows():
+    """Without the law, which is a colour; a load of 0.1 N keeps its point."""
+    names = {
+        "hover_30deg.strong_troxel.HVHD": ("strong_troxel", "hover 30deg, HVHD"),
+        "gross_area.0.1N": ("", "gross area, 0.1N"),
+        "meyer.kaczmarek": ("kaczmarek", "meyer"),
+    }
+    for name, (law, shown) in names.items():
+        assert words(Row(name, "", "", 1.0, 0.1, 1.0, law=law)) == shown
