@@ -362,10 +362,10 @@ def test_the_laws_load_neither_scikit_fem_nor_matplotlib():
 
 
 def test_a_press_loads_no_package_that_it_has_no_use_for(tmp_path):
-    """Of scipy a press needs the BLAS, where nothing is compiled SuperLU; a mesh's file takes meshio."""
+    """Of scipy a press needs BLAS alone, where nothing is compiled SuperLU; a mesh's file takes meshio."""
     heavy = ["skfem", "tqdm", "matplotlib", "evfem.common.pools", "evfem.response", "evfem.field"]
     heavy += ["scipy.spatial", "scipy.optimize", "pypardiso"]
-    heavy += ["scipy.sparse"] if find_spec("evfem.tissue.kernels.cholesky") else []
+    heavy += ["scipy.sparse", "scipy.linalg"] if find_spec("evfem.tissue.kernels.cholesky") else []
     code = (
         "import evfem as ev\n"
         "def press(finger):\n"

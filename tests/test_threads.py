@@ -72,19 +72,30 @@ def test_a_process_of_a_pool_has_one_thread_whatever_it_loads(tmp_path):
     assert fresh(code, tmp_path) == "[[1, 1]]"
 
 
-def test_scipy_comes_under_the_limits_that_hold_when_it_is_loaded(tmp_path):
+@pytest.mark.parametrize("load", ["linalg()", "compiled_algebra('blas')", "compiled_algebra('lapack')"])
+def test_scipy_comes_under_the_limits_that_hold_when_it_is_loaded(load, tmp_path):
     code = (
-        "from evfem.common.arrays import blas_limits, linalg\n"
+        "from evfem.common.arrays import blas_limits, compiled_algebra, linalg\n"
         "from tools.workers import blas_threads\n"
-        "with blas_limits(2):\n"
+        "with blas_limits(3):\n"
         "    with blas_limits(1):\n"
-        "        linalg()\n"
+        f"        {load}\n"
         "        inner = blas_threads(None)\n"
         "    print(inner, blas_threads(None))\n"
         "import os\n"
         "print({*blas_threads(None)} == {os.cpu_count()})"
     )
-    assert fresh(code, tmp_path).splitlines() == ["[1, 1] [2, 2]", "True"]
+    assert fresh(code, tmp_path).splitlines() == ["[1, 1] [3, 3]", "True"]
+
+
+def test_the_algebra_without_its_package_is_found_in_it_later(tmp_path):
+    code = (
+        "from evfem.common.arrays import compiled_algebra\n"
+        "alone = compiled_algebra('lapack')\n"
+        "import scipy.linalg.cython_lapack\n"
+        "print(alone is scipy.linalg.cython_lapack.__pyx_capi__, 'dpotrf' in alone)"
+    )
+    assert fresh(code, tmp_path) == "True True"
 
 
 @pytest.mark.pardiso

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import ctypes
 import os
+import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import cache
-from importlib import metadata
-from importlib.util import find_spec
+from importlib import import_module, metadata
+from importlib.machinery import PathFinder
+from importlib.util import find_spec, module_from_spec
 from pathlib import Path
 from typing import Any, Self
 
@@ -137,7 +139,6 @@ class DenseSolver:
         return np.linalg.solve(np.asarray(matrix), right) if found is None else found
 
     def _factorise(self, matrix: Any) -> bool:
-        lapack = linalg().lapack
         self._unknowns = self._factors = None
         own, n = matrix.diagonal(), len(matrix)
         largest = np.abs(own).max() or 1.0
@@ -148,22 +149,22 @@ class DenseSolver:
             rows = np.multiply(matrix[some], by, out=single[some], casting="same_kind")
             rows *= by[some, None]
         single[np.diag_indices(n)] = own * scale**2
-        # the transposed is in LAPACK's order: nothing is copied
-        factors, pivots, failed = lapack.sgetrf(single.T, overwrite_a=True)
-        self._factors = scale, factors, pivots
-        return not failed
+        pivots = np.empty(n, np.intc)
+        self._factors = scale, single, pivots
+        return not lapack("sgetrf", n, n, single, n, pivots)
 
     def _refined(self, matrix: Any, right: Floats, slowest: float) -> Floats | None:
         """The solution by the factors at hand, None where the residual falls by less than `slowest`."""
-        lapack = linalg().lapack
         assert self._factors is not None
         scale, factors, pivots = self._factors
+        n, q = right.shape
         scale = scale[:, None]
         whole = np.maximum(np.abs(scale * right).max(axis=0), np.finfo(float).tiny)
         x, rest, size = np.zeros_like(right), right, 1.0
         for _ in range(REFINEMENTS):
-            step = lapack.sgetrs(factors, pivots, (scale * rest / whole).astype(np.float32), trans=True)[0]
-            x = x + scale * step * whole
+            step = np.asarray((scale * rest / whole).T, np.float32, order="C")
+            lapack("sgetrs", b"T", n, q, factors, n, pivots, step, n)
+            x = x + scale * step.T * whole
             rest = right - matrix @ x
             before, size = size, float((np.abs(scale * rest).max(axis=0) / whole).max())
             if size < REFINED:
@@ -202,23 +203,23 @@ def inverse(matrix: Any, symmetric: bool) -> Any:
     """
     if len(matrix) < LARGE_SYSTEM:
         return np.linalg.inv(matrix.astype(float))
-    lapack = linalg().lapack
+    n, kind = len(matrix), "s" if matrix.dtype == np.float32 else "d"
     if symmetric:
-        factorise, invert = lapack.get_lapack_funcs(("potrf", "potri"), (matrix,))
-        factor, failed = factorise(np.array(matrix, order="F"), lower=True, overwrite_a=True)
-        if not failed:
-            whole = invert(factor, lower=True, overwrite_c=True)[0].T
+        whole = np.array(matrix, order="C")
+        if not lapack(kind + "potrf", b"L", n, whole, n):
+            lapack(kind + "potri", b"L", n, whole, n)  # leaves the upper triangle, in the order of rows
             for begin in range(0, len(whole), BLOCK):  # without a second matrix as large
                 rows, end = whole[begin : begin + BLOCK], begin + BLOCK
                 whole[end:, begin:end] = rows[:, end:].T
                 square = rows[:, begin:end]
-                square += np.triu(square, 1).T
+                square[:] = np.triu(square) + np.triu(square, 1).T
             return whole
-    factor, pivots, failed = lapack.dgetrf(matrix)
-    if failed:
+    whole, pivots, work = np.array(matrix, float, order="C"), np.empty(n, np.intc), np.empty(64 * n)
+    if lapack("dgetrf", n, n, whole, n, pivots):
         raise np.linalg.LinAlgError("singular compliance")
     # solving with the unit matrix, as numpy does, takes 1.6 times as long
-    return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])
+    lapack("dgetri", n, whole, n, pivots, work, work.size)
+    return whole
 
 
 #: environment variable that says where MKL is, here and to pypardiso
@@ -229,7 +230,7 @@ _LIMITS: list[tuple[ExitStack, int]] = []
 
 @contextmanager
 def blas_limits(threads: int = 1) -> Iterator[None]:
-    """Limits numpy's BLAS, and scipy's as soon as `linalg` loads it, to so many threads; MKL has its own."""
+    """Limits numpy's BLAS, and scipy's as soon as it is loaded here, to so many threads; MKL has its own."""
     with ExitStack() as stack:
         stack.enter_context(threadpool_limits(threads))
         _LIMITS.append((stack, threads))
@@ -239,16 +240,74 @@ def blas_limits(threads: int = 1) -> Iterator[None]:
             _LIMITS.remove((stack, threads))
 
 
-@cache
-def linalg() -> Any:
-    """scipy.linalg, a tenth of a second; a limit is that of what is loaded, so those that hold begin anew."""
+@contextmanager
+def _limits_begin_anew() -> Iterator[None]:
+    """A limit is that of what is loaded when it begins: those that hold pause while more is loaded."""
     for stack, _ in reversed(_LIMITS):
         stack.close()
-    import scipy.linalg
+    try:
+        yield
+    finally:
+        for stack, threads in _LIMITS:
+            stack.enter_context(threadpool_limits(threads))
 
-    for stack, threads in _LIMITS:
-        stack.enter_context(threadpool_limits(threads))
+
+@cache
+def linalg() -> Any:
+    """scipy.linalg, a seventh of a second; BLAS and LAPACK alone are in `compiled_algebra`."""
+    with _limits_begin_anew():
+        import scipy.linalg
     return scipy.linalg
+
+
+@cache
+def compiled_algebra(library: str) -> Mapping[str, Any]:
+    """The functions of scipy's `blas` or `lapack` for compiled code, as capsules by name; in a hundredth of a
+    second, as the package scipy.linalg around them is not run.
+    """
+    import scipy
+
+    name = f"scipy.linalg.cython_{library}"
+    spec = PathFinder.find_spec(name, [str(Path(path) / "linalg") for path in scipy.__path__])
+    with _limits_begin_anew():
+        if name in sys.modules or spec is None or spec.loader is None:
+            module = import_module(name)
+        else:
+            module = module_from_spec(spec)
+            spec.loader.exec_module(module)
+            sys.modules.pop(name, None)  # or a later import would not find it in its package
+    functions: Mapping[str, Any] = module.__pyx_capi__
+    return functions
+
+
+@cache
+def address(library: str, name: str) -> int:
+    """Where a function of scipy's `blas` or `lapack` is in memory."""
+    capsule = compiled_algebra(library)[name]
+    python, own = ctypes.pythonapi, ctypes.py_object(capsule)
+    python.PyCapsule_GetName.restype, python.PyCapsule_GetPointer.restype = ctypes.c_char_p, ctypes.c_void_p
+    found: int = python.PyCapsule_GetPointer(own, python.PyCapsule_GetName(own))
+    return found
+
+
+def lapack(name: str, *given: Any) -> int:
+    """LAPACK's function of this name: words are bytes, whole numbers int, arrays contiguous and changed in
+    place, matrices by columns: what numpy has by rows is their transposed. Returns its last argument, `info`.
+
+    >>> matrix, pivots = np.array([[0.0, 2.0], [4.0, 0.0]]), np.empty(2, np.intc)
+    >>> lapack("dgetrf", 2, 2, matrix, 2, pivots), pivots.tolist(), matrix.tolist()
+    (0, [2, 2], [[2.0, 0.0], [0.0, 4.0]])
+    """
+    info = ctypes.c_int()
+    pointers = [_pointer(one) for one in given] + [ctypes.byref(info)]
+    ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(pointers))(address("lapack", name))(*pointers)
+    return info.value
+
+
+def _pointer(given: Any) -> Any:
+    if isinstance(given, np.ndarray):
+        return given.ctypes.data_as(ctypes.c_void_p)
+    return ctypes.c_char_p(given) if isinstance(given, bytes) else ctypes.byref(ctypes.c_int(given))
 
 
 def loaded_blas() -> ThreadpoolController:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evfem.common.arrays import Floats, linalg, mkl
+from evfem.common.arrays import Floats, address, mkl
 
 LANES = 8
 
@@ -62,7 +62,7 @@ def contact_loop() -> Any:
         return None
     if (library := mkl()) is not None:
         return partial(settle, ctypes.cast(library.dgesv, ctypes.c_void_p).value)
-    return partial(settle, _address("lapack", "dgesv"))
+    return partial(settle, address("lapack", "dgesv"))
 
 
 @cache
@@ -75,18 +75,8 @@ def sparse_cholesky() -> Any:
     except ImportError:
         return None
     names = (("lapack", "potrf"), *(("blas", name) for name in ("trsm", "syrk", "gemv", "trsv")))
-    algebra = {kind: tuple(_address(library, kind + name) for library, name in names) for kind in "sd"}
+    algebra = {kind: tuple(address(library, kind + name) for library, name in names) for kind in "sd"}
     return kernel, algebra
-
-
-def _address(library: str, name: str) -> int:
-    """Where a function of scipy's BLAS or LAPACK is in memory."""
-    linalg()
-    capsule = import_module(f"scipy.linalg.cython_{library}").__pyx_capi__[name]
-    python, own = ctypes.pythonapi, ctypes.py_object(capsule)
-    python.PyCapsule_GetName.restype, python.PyCapsule_GetPointer.restype = ctypes.c_char_p, ctypes.c_void_p
-    found: int = python.PyCapsule_GetPointer(own, python.PyCapsule_GetName(own))
-    return found
 
 
 def blocked(values: Any) -> Any:
