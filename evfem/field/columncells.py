@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints, linalg
+from evfem.common.arrays import Floats, Ints, lapack, linalg
 
 #: nodes and weights of Gauss quadrature on (0, 1)
 AT, WEIGHTS = np.array([0.5 - np.sqrt(1.0 / 12.0), 0.5 + np.sqrt(1.0 / 12.0)]), np.array([0.5, 0.5])
@@ -205,10 +205,13 @@ class Cells:
 
 def _solved(band: Any, load: Any) -> Any:
     """Solution of a lower band, positive definite, or complex and symmetric."""
-    if not np.iscomplexobj(band):
-        factor = linalg().cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-        return linalg().cho_solve_banded((factor, True), load, check_finite=False)
     width, size = band.shape
+    if not np.iscomplexobj(band):
+        factor, found = np.array(band.T, order="C"), np.array(load.T, order="C")
+        if lapack("dpbtrf", b"L", size, width - 1, factor, width):
+            raise np.linalg.LinAlgError("the field's matrix is not positive definite")
+        lapack("dpbtrs", b"L", size, width - 1, len(found), factor, width, found, size)
+        return found.T
     whole = np.zeros((2 * width - 1, size), dtype=complex)
     whole[width - 1 :] = band
     for k in range(1, width):
