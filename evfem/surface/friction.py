@@ -277,6 +277,10 @@ class Slipping:
         """The same in the mean over the slip of a step, (k,)."""
         return self.bound(law)
 
+    def capped(self, law: FrictionLaw) -> Any:
+        """Whether nodes (k,) are at a bound that is proportional to the pressure instead of the law's."""
+        return np.zeros(self.normal.shape, dtype=bool)
+
     def linearised(self, law: FrictionLaw) -> Linearised:
         """Derivatives by contact force, speed and coefficient."""
         normal = np.maximum(self.normal, 0.0)
@@ -344,6 +348,9 @@ class Renewing(Slipping):
     def bound(self, law: Any) -> Floats:
         return self._borne(self.renewed(law))
 
+    def capped(self, law: Any) -> Any:
+        return self.renewed(law) >= STEEPEST * self.pressure
+
     def resistance(self, law: Any) -> Floats:
         there, passed = law.bound(**self._at), self._passed(law)
         some = passed > 0.0
@@ -356,8 +363,7 @@ class Renewing(Slipping):
         if by == "speed":
             follows = (law.bound(**self._at) - self.before) * kept * self.unit / law.length
             found = found * (self.seconds > 0.0) + follows
-        less = self.renewed(law) < STEEPEST * self.pressure
-        return np.asarray(np.where(less, found, STEEPEST if by == "pressure" else 0.0))
+        return np.asarray(np.where(self.capped(law), STEEPEST if by == "pressure" else 0.0, found))
 
 
 @dataclass(frozen=True)

@@ -174,6 +174,8 @@ class LawFriction(ProportionalFriction):
         size = sizes(known.slip + give[:, None] * known.force[:, 1:])
         slip = np.where(known.status >= FORWARD, size, 0.0)
         moving = self.slipping(interface, old, state, c, known.friction, slip)
+        wedges = self._oscillating.wedges(self.law, moving, c, known.status)
+        known = replace(known, status=np.where(wedges, OPEN, known.status))
         found = self._oscillating.linearised(self.law, moving, c, known.status, shear)
         if (
             interface.follows

@@ -7,11 +7,16 @@ bracketed with the values of the law found so far (`OscillatingNodes`).
 At no force a law may be far steeper than under the next one: the bound of a `SlipMemory` is S, but no more
 than 20 p. With the tangent there a node that closes again would wedge, lift its neighbour off, and so on from
 node to node: it begins with the tangent from before it opened.
+
+A node that its own friction T presses, N = N_0 + k T with 20 k > 1 and N_0 < 0, has the solutions T = S,
+the unstable T = 20 N and open. Beyond :math:`S (k - 1/20) = |N_0|` only open is left, while the iterates go
+to and fro between both tangents: a node that comes from one to the other a second time begins open.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +43,7 @@ class OscillatingNodes:
         self._slipped = np.zeros(size, dtype=bool)
         self._speed, self._change = np.full(size, np.nan), np.zeros(size)
         self._slope, self._slip = np.zeros(size), np.full(size, np.nan)
-        self._fastest = np.zeros(size)
+        self._fastest, self._capped = np.zeros(size), np.zeros((2, size), dtype=bool)
         self._tangent = np.full((2, size), np.nan)
 
     def linearised(
@@ -49,6 +54,13 @@ class OscillatingNodes:
         was, now = self._tangent[:, c], np.array([found.slope, found.offset])
         self._tangent[:, c] = now = np.where((status == OPEN) & ~np.isnan(was), was, now)
         return replace(found, slope=now[0], offset=now[1])
+
+    def wedges(self, law: FrictionLaw, moving: Slipping, c: Ints, status: Ints) -> Any:
+        """Which nodes c (k,) come a second time from their bound to the most that their pressure bears."""
+        now = moving.capped(law) & (status >= FORWARD)
+        came, returned = self._capped[1, c], now & ~self._capped[0, c]
+        self._capped[:, c] = now, came ^ returned
+        return came & returned
 
     def _bracketed(
         self, law: FrictionLaw, moving: Slipping, c: Ints, status: Ints, force: Floats

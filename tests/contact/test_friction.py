@@ -13,7 +13,7 @@ from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.planning.plan import plan
 from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
-from evfem.surface.friction import KINDS, Slipping
+from evfem.surface.friction import KINDS, Renewing, Slipping
 from evfem.terms.slipping import OscillatingNodes, speed_under
 
 LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)
@@ -235,6 +235,30 @@ def test_a_node_that_has_returned_finds_its_speed_around_the_kink_of_a_law(stiff
         force = given - stiffness * v
     assert misfits[-1] < 1e-12
     assert v == pytest.approx(beyond * kink, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("lifted", "solution"), [(-0.3, "slips"), (0.5, "slips"), (0.99, "slips"), (1.001, "open"), (1.3, "open")]
+)
+def test_a_node_that_its_own_friction_presses_opens_where_that_holds_it_no_longer(lifted, solution):
+    """N = k T - N0 under a remembered bound S: T = S is a solution up to N0 = S (k - 1/20), and open one from
+    N0 = 0 on. The iterate of the contact problem is the root of the tangent; open, where that is none.
+    """
+    S, k, law = 3e-4, 0.07, ev.SlipMemory(0.5, length=1.0)
+    away = lifted * S * (k - 1.0 / 20.0)
+    oscillating, one = OscillatingNodes(1), np.array([0])
+    T, N, status = S, k * S - min(away, 0.0), FORWARD
+    for _ in range(12):
+        plain = nodes([N / 0.25], speed=1e-9)
+        node, at = Renewing(**vars(plain), before=np.array([S / 0.25])), np.array([status])
+        at = np.where(oscillating.wedges(law, node, one, at), OPEN, at)
+        seen = oscillating.linearised(law, node, one, at, np.array([T]))
+        slope, offset = float(seen.slope[0]), float(seen.offset[0])
+        begins_open = at[0] == OPEN and away >= 0.0
+        N = 0.0 if begins_open else max((k * offset - away) / (1.0 - k * slope), 0.0)
+        status, T = (FORWARD, slope * N + offset) if N > 0.0 else (OPEN, 0.0)
+    assert (status == FORWARD) == (solution == "slips")
+    assert pytest.approx(S if status == FORWARD else 0.0, rel=1e-6) == T
 
 
 def test_the_speed_under_a_force_is_that_of_the_law_or_none():
