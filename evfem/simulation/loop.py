@@ -37,6 +37,7 @@ FORCES, FAINT = ("normal_force", "tangential_force", "electrostatic_force"), 1e-
 
 _PLACE = number("a position in mm between -1000 and 1000", Within(-1000.0, 1000.0), "mm")
 _SECONDS = number("a time in s, not negative, up to 1e6", Within(0.0, 1e6), "s")
+_LARGEST = number("the largest magnitude in V of the steps to come, from 0 to 1e6", Within(0.0, 1e6), "V")
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,8 @@ class Loop:
 
     def __init__(self, scene: Scene, observers: Sequence[Observer], largest_voltage: float | None) -> None:
         notices.check_observers(observers)
+        if largest_voltage is not None:
+            largest_voltage = _LARGEST["check"]("largest_voltage", largest_voltage)
         self.scene, self._observers = scene, observers
         self._own, self._interactive = scene.motion, InteractiveMotion(did=Course(voltage=largest_voltage))
         self._check(StepRequest(voltage=largest_voltage, duration=0.0))
@@ -387,9 +390,9 @@ def loop(
         Told as in `simulate`: `started` at once, `step` after every step, `finished` with every
         `Loop.result()`.
     largest_voltage
-        Of the steps to come (V), where it is more than the scene's: the model is made for it. One
-        beyond the largest so far may change what the model needs (a core, `Solver.core`); it is then
-        made again, which takes as long as at the beginning.
+        Largest magnitude of the steps to come (V, not negative), where it is more than the scene's: the
+        model is made for it. A voltage beyond the largest so far may change what the model needs (a core,
+        `Solver.core`); it is then made again, which takes as long as at the beginning.
 
     Returns
     -------

@@ -156,6 +156,12 @@ def test_observers_are_told_and_may_stop():
     refuses(r"observers\[0\]", ev.loop, plane(), observers=[3])
 
 
+@pytest.mark.parametrize("largest", [-1, "-2 kV", 1.1e6, float("nan"), "high"])
+def test_a_largest_voltage_is_a_magnitude(largest):
+    sentence = r"^largest_voltage: given .*; allowed: .*the largest magnitude in V .*, from 0 to 1e6$"
+    refuses(sentence, ev.loop, plane(), largest_voltage=largest)
+
+
 SPEEDED = ev.Scene(replace(PAD, viscosity=1e-3), ev.Flat(friction=0.3), solver=VISCOUS)
 MISTAKES = [
     (plane(), {"indentation": 0.1, "force": 0.1}, "force: given indentation and force; allowed: one of"),
