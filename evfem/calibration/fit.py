@@ -16,6 +16,7 @@ shorter; one beside an accepted point is tried on the other side.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -34,7 +35,7 @@ from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.pools import open_pool
 from evfem.common.storage import alone_in
-from evfem.errors import InputError, describe_value
+from evfem.errors import InputError, describe_value, readable
 from evfem.response.parameters import parameter_of
 from evfem.scene.file import loads, read_text, tables_of
 from evfem.scene.keys import VERSION
@@ -179,8 +180,7 @@ class _Problem:
                 try:
                     loads(self.text(self.runs[0][0], {**start, key: end}), self.paths)
                 except InputError as error:
-                    reason = f"the bound {end:g}: {error}"
-                    raise InputError(f"parameters.{key}", reason, "other bounds") from error
+                    raise _of_a_bound(key, end, error) from error
             with suppress(InputError):
                 parameter_of(scenes[0], key)
                 self.exact.append(key)
@@ -208,6 +208,19 @@ class _Problem:
             "scene": self.tables,
             "parameters": {key: vars(one) for key, one in self.parameters.free.items()},
         }
+
+
+def _of_a_bound(key: str, end: float, error: InputError) -> InputError:
+    """The mistake of a scene with a parameter at its bound `end`, as one of that bound."""
+    own = re.sub(r"\[(\d+)\]", r".\1", error.key) == key
+    said = error.given if isinstance(error.given, str) else readable(error.given)
+    if own and said == readable(end):
+        given = f"the bound {end:g}"
+    elif own:  # of a factor or an offset
+        given = f"the bound {end:g}, at which it is {said}"
+    else:
+        given = f"the bound {end:g}, with which {error.key} is refused (given {said})"
+    return InputError(f"parameters.{key}", given, error.allowed)
 
 
 def _scale(one: Measured) -> Floats:
@@ -327,7 +340,8 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
     residuals, parameters = _Residuals(problem, runs, progress), problem.parameters
     start, bounds = np.zeros(len(parameters.free)), parameters.bounds
     if not np.isfinite(residuals(start)).all():
-        raise InputError("scene", f"one that cannot be run at the start: {residuals.failed}", "one that can")
+        reason, _, allowed = residuals.failed.partition("; allowed: ")  # of a sentence of `InputError`
+        raise InputError("scene", f"one that cannot be run at the start: {reason}", allowed or "one that can")
     ends = {"xtol": UNKNOWNS, "ftol": SQUARES, "gtol": 1e-12, "max_nfev": MOST_STEPS}
     found = least_squares(residuals, start, residuals.jacobian, bounds, **ends)
     known = confidence(found.jac, found.fun, parameters.names)
