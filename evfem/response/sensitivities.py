@@ -78,6 +78,8 @@ COUNTED = "it counts, or is measured by, whole nodes, steps or seconds"
 SNAPPED = "the finger snapped or was released in step {}: no derivative goes through that"
 SOUGHT = "the voltage that is sought in step {} obeys no equation: its force jumps there, or ends"
 LIFTED = "a finger without a load that is touched is not differentiated (step {})"
+#: what is smaller than the largest of its kind by so much is a rounded 0; error of a relative derivative
+ZERO, ERROR = 1e-9, 1e-7
 
 
 class _Followed(EnergyAccount):
@@ -256,7 +258,9 @@ class Sensitivities:
 
     @property
     def elasticity(self) -> Elasticity:
-        """Per cent of a column for 1 % of a parameter, d ln / d ln (steps,), by both; nan where it is 0."""
+        """Per cent of a column for 1 % of a parameter, d ln / d ln (steps,), by both; nan where the column
+        is 0 but for rounding: 1e-9 of its largest value in the run, of a force of that of all forces.
+        """
         return Elasticity(self)
 
     def moved(self, changes: Mapping[str, float]) -> Result:
@@ -316,13 +320,27 @@ class Sensitivities:
         lines = [f"Sensitivities of {len(self.result.step)} steps, {each}"]
         known = [name for name in self.columns if name not in self.reasons]
         names = [name for name in known if name in ("normal_force", "tangential_force")] or known
+        zero = [name for name in names if self._is_zero(name)[-1]]
+        if zero == names:
+            names = [name for name in known if name == "electrostatic_force"] or names
         for key in self.parameters:
             if key in self.missing:
                 lines.append(f"  {key}: {self.reasons[key]}")
                 continue
-            shares = [f"{name} {self.elasticity[name, key][-1]:.4g}" for name in names]
-            lines.append(f"  {key}: {', '.join(shares)}")
+            shares = {name: self.elasticity[name, key][-1] for name in names if name not in zero}
+            told = [f"{name} {0.0 if abs(one) < ERROR else one:.4g}" for name, one in shares.items()]
+            lines.append(f"  {key}: {', '.join(told) or 'none'}")
+        if zero:
+            lines.append(f"  {' and '.join(zero)}: 0 at the end, which has no per cent")
         return "\n".join(lines)
+
+    def _is_zero(self, column: str) -> Any:
+        """Where a column is 0 but for rounding, (steps,) of bool."""
+        units, alike = self.result.units, [column]
+        if units.get(column) == units["normal_force"]:
+            alike += [name for name in self.result.columns if units.get(name) == units["normal_force"]]
+        sizes = [np.abs(np.asarray(self.result[name], dtype=float)) for name in alike]
+        return sizes[0] <= ZERO * np.nanmax(sizes, initial=0.0)
 
 
 @dataclass(frozen=True)
@@ -336,7 +354,7 @@ class Elasticity:
         value = np.asarray(self.found.result[which[0]], dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = slope * self.found.parameters[which[1]] / value
-        return np.where(value == 0.0, np.nan, share)
+        return np.where(self.found._is_zero(which[0]), np.nan, share)
 
 
 def sensitivities(

@@ -49,6 +49,30 @@ def test_a_key_that_has_no_derivative_is_not_meant(path, name):
     refuses(f'parameters: given "{name}"; allowed: TABLE.KEY', ev.sensitivities, path, name)
 
 
+def test_shares_that_are_rounding_are_told_as_0(path):
+    """At constant indentation, once all slips, the forces do not depend on how far the pad slid; of a pad
+    that is pressed alone the tangential force is 0 but for rounding (1e-15), and so are its own shares.
+    """
+    found = ev.sensitivities(path, "motion.1.distance", ["normal_force", "tangential_force"])
+    assert "  motion.1.distance: normal_force 0, tangential_force 0" in str(found).splitlines()
+    path.write_text(SCENE[: SCENE.rindex("[[motion]]")])
+    pressed = ev.sensitivities(path, ["motion.0.indentation", "surface.friction"])
+    _, first, second, last = str(pressed).splitlines()
+    assert first.startswith("  motion.0.indentation: normal_force 1.")
+    assert "tangential" not in first + second
+    assert last == "  tangential_force: 0 at the end, which has no per cent"
+    assert np.isnan(pressed.elasticity["tangential_force", "surface.friction"][-1])
+
+
+def test_a_finger_that_hovers_is_told_by_its_attraction():
+    """The attraction grows as the square of the voltage: 2 % for 1 %."""
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    scene = ev.Scene(pad, ev.Display(), ev.Kaczmarek(), 100.0, ev.Hover(gap=0.3, steps=1))
+    told = str(ev.sensitivities(scene, "electrostatics.voltage")).splitlines()
+    assert told[1] == "  electrostatics.voltage: electrostatic_force 2"
+    assert told[2] == "  normal_force and tangential_force: 0 at the end, which has no per cent"
+
+
 def test_a_name_that_leads_nowhere_says_so():
     scene = ev.Scene(
         ev.FingerPad(resolution="coarse", ridges=False),
