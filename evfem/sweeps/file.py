@@ -275,10 +275,21 @@ def put_in(tables: Any, key: str, value: Any) -> None:
             where = int(name)
         elif not isinstance(here, dict):
             raise InputError(so_far, "a key inside a value that is no table", "a key of a table")
+        else:
+            _refuse_dots(here, names[depth - 1 :], key)
         if depth == len(names):
             here[where] = value
         else:
             here = here.setdefault(where, {}) if isinstance(here, dict) else here[where]
+
+
+def _refuse_dots(table: Mapping[str, Any], names: Sequence[str], key: str) -> None:
+    """InputError for a key that goes through an entry of the table whose own name has a dot."""
+    rest = ".".join(names)
+    for name in table:
+        if "." in name and rest.startswith(f"{name}."):
+            allowed = "another name of that region, without dots: dots part the names of a key"
+            raise InputError(key, f"{describe_value(name)}, a name with a dot, within a dotted key", allowed)
 
 
 def check_output(output: Any, motions: int) -> None:

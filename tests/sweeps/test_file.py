@@ -219,6 +219,15 @@ def test_a_key_that_leads_nowhere(key, sentence):
     refuses(sentence, read(f'[grid]\n"{key}" = [1.0]').points)
 
 
+def test_a_region_with_a_dot_in_its_name_is_told_so():
+    """It was "finger.materials.pad: missing", of a region that the mesh does not have."""
+    body = '[scene.finger.materials."pad.1"]\nE = 0.1\n[grid]\n"finger.materials.pad.1.E" = [0.1, 0.2]'
+    sentence = (
+        'finger.materials.pad.1.E: given "pad.1", a name with a dot, within a dotted key; allowed: anot'
+    )
+    refuses(f"^{sentence}", read(body).points)
+
+
 @pytest.mark.parametrize(
     "text", ["version = 2", "scene = 3\nversion = 1", "version = 1", "[", "version = 1.0"]
 )
