@@ -85,6 +85,11 @@ def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
         ("report", "write one page about a run: scene, forces, pictures, accuracy", _report_options),
         ("sensitivities", "derivatives of forces, works and energies by keys of a scene", _response_options),
         ("impedance", "dynamic stiffness of the finger versus frequency", _impedance_options),
+        (
+            "electrical-impedance",
+            "what an amplifier sees of the finger versus frequency",
+            _electrical_options,
+        ),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
         ("sweep", "run many scenes in parallel and write one table", _sweep_options),
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
@@ -136,11 +141,15 @@ def _response_options(command: argparse.ArgumentParser) -> None:
 
 
 def _impedance_options(command: argparse.ArgumentParser) -> None:
+    _electrical_options(command)
+    said = "direction of the bone's vibration; default: normal"
+    command.add_argument("--axis", choices=("normal", "tangential"), default="normal", help=said)
+
+
+def _electrical_options(command: argparse.ArgumentParser) -> None:
     _path(command, "scene", "SCENE.toml", help="the scene")
     said = "frequencies in Hz"
     command.add_argument("--frequencies", nargs="+", type=float, metavar="HZ", required=True, help=said)
-    said = "direction of the bone's vibration; default: normal"
-    command.add_argument("--axis", choices=("normal", "tangential"), default="normal", help=said)
     _results(command)
 
 

@@ -158,6 +158,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int | None]:
         "report": _page,
         "sensitivities": _sensitivities,
         "impedance": _impedance,
+        "electrical-impedance": _impedance,
         "study": _study,
         "sweep": _sweep,
         "mesh": _mesh,
@@ -211,12 +212,13 @@ def _run(options: argparse.Namespace) -> int:
 
 def _simulate(folder: RunFolder, telling: Sequence[Observer]) -> int:
     """Run the scene of a folder, which keeps whatever has converged."""
+    from evfem.reporting.log import Milestones
     from evfem.simulation.run import simulate
 
     scene, path, progress = folder.scene, folder.path, sys.stderr.isatty()
     observers: list[Observer] = [folder, *telling, _Interruption()]
     if not progress:
-        observers.append(_Milestones())
+        observers.append(Milestones())
     try:
         result = simulate(scene, progress=progress, observers=observers, resume=folder.resume)
     except NotConverged as error:
@@ -275,16 +277,6 @@ class _Interruption:
             raise KeyboardInterrupt
 
 
-class _Milestones:
-    """Progress without a terminal: a line for every tenth of the steps."""
-
-    def started(self, mesh: object, scene: object, total_steps: int) -> None:
-        self.total = total_steps
-
-    def step(self, row: dict[str, object], frame: object, checkpoint: object) -> None:
-        notices.milestone("step", int(str(row["step"])), self.total)
-
-
 def _plan(options: argparse.Namespace) -> None:
     from evfem.export import FieldFiles
     from evfem.planning.plan import plan_on, scene_mesh
@@ -330,14 +322,19 @@ def _sensitivities(options: argparse.Namespace) -> None:
 
 
 def _impedance(options: argparse.Namespace) -> None:
+    """The mechanical one, or what an amplifier sees."""
     from evfem.common.storage import alone_in
-    from evfem.response.impedance import impedance
+    from evfem.response import electrical, impedance
     from evfem.runfolder import write_impedance
 
     scene, folder = _scene(options.scene), options.out or Path(f"{options.scene.stem}-out")
     with alone_in(folder):
-        found = impedance(scene, options.frequencies, options.axis)
-        print(f"{found}\ntable in {write_impedance(found, folder)}", flush=True)
+        found: Any
+        if options.command == "impedance":
+            found = impedance.impedance(scene, options.frequencies, options.axis)
+        else:
+            found = electrical.electrical_impedance(scene, options.frequencies)
+        print(f"{found}\ntable in {write_impedance(found, folder, options.command)}", flush=True)
 
 
 def _study(options: argparse.Namespace) -> None:

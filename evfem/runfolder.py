@@ -45,6 +45,7 @@ from evfem.simulation.result import Frame, Result, Row, Saved, provenance
 from evfem.sweeps.manifest import Manifest
 
 if TYPE_CHECKING:
+    from evfem.response.electrical import ElectricalImpedance
     from evfem.response.impedance import Impedance
     from evfem.response.sensitivities import Sensitivities
 
@@ -435,12 +436,12 @@ def write_sensitivities(found: Sensitivities, folder: Path) -> Path:
     return table
 
 
-def write_impedance(found: Impedance, folder: Path) -> Path:
-    """Write `impedance.csv` and its picture into a folder; returns the table's path."""
+def write_impedance(found: Impedance | ElectricalImpedance, folder: Path, name: str) -> Path:
+    """Write a table, NAME.csv, and its picture into a folder; returns the table's path."""
     from evfem.plotting.response import impedance
 
-    found.to_csv(table := folder / "impedance.csv")
-    _save(impedance(found).figure, folder / "impedance.png")
+    found.to_csv(table := folder / f"{name}.csv")
+    _save(impedance(found).figure, folder / f"{name}.png")
     return table
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from evfem.common.notices import LOG, WITHIN, Seldom, listening, tell
+from evfem.common.notices import LOG, WITHIN, Seldom, listening, milestone, tell
 from evfem.common.views import plus
 
 NAME = "steps.log"
@@ -46,6 +46,18 @@ class Steps:
         """What is to doubt in the result."""
         for warning in result.warnings:
             LOG.info("warning: %s", warning)
+
+
+class Milestones:
+    """Observer that tells of progress without a terminal: a line for every tenth of the steps."""
+
+    def started(self, mesh: Any, scene: Any, total_steps: int) -> None:
+        """How many there will be."""
+        self.total = total_steps
+
+    def step(self, row: Mapping[str, Any], frame: Any, checkpoint: Any) -> None:
+        """One is done."""
+        milestone("step", row["step"], self.total)
 
 
 def _shown(unit: str) -> tuple[tuple[str, str, str], ...]:

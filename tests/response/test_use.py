@@ -240,10 +240,36 @@ def test_the_command_of_an_impedance_writes_a_table_and_a_picture(path, capsys):
     assert main([*asked, "-1"]) == 2
 
 
+def test_the_command_of_an_electrical_impedance_writes_a_table_and_a_picture(path, capsys):
+    """Without losses that of a capacitor: ten times the frequency has a tenth of it, by -90 degrees."""
+    asked = ["electrical-impedance", str(path), "--out", str(path.parent / "out"), "--frequencies"]
+    assert main([*asked, "100"]) == 2
+    assert "scene: given no electrostatic law; allowed: a scene with a law" in capsys.readouterr().err
+    law = '[electrostatics]\nlaw = "strong_troxel"\nvoltage = 50.0\ninsulator = "touchscreen"\n'
+    path.write_text(SCENE.replace("[[motion]]", f"{law}roughness_gap = 0.003\n[[motion]]", 1))
+    assert main([*asked, "100", "1000"]) == 0
+    out, table = capsys.readouterr().out, path.parent / "out" / "electrical-impedance.csv"
+    assert out.startswith("Electrical impedance: ")
+    assert out.endswith(f"table in {table}\n")
+    with open(table, encoding="utf-8") as file:
+        low, high = csv.DictReader(file)
+    assert float(low["impedance real (ohm mm)"]) == pytest.approx(0.0, abs=1e-6)
+    least, most = (float(row["impedance imaginary (ohm mm)"]) for row in (low, high))
+    assert least == pytest.approx(10.0 * most, rel=1e-12)
+    assert most < 0.0
+    assert table.with_suffix(".png").stat().st_size > 5000
+    assert main([*asked, "-1"]) == 2
+
+
 def test_a_folder_that_cannot_be_is_told_before_anything_is_computed(path, capsys, monkeypatch):
     monkeypatch.setattr("evfem.response.sensitivities.sensitivities", None)
     monkeypatch.setattr("evfem.response.impedance.impedance", None)
-    for asked in (["impedance", "--frequencies", "1"], ["sensitivities", "--by", "surface.friction"]):
+    monkeypatch.setattr("evfem.response.electrical.electrical_impedance", None)
+    for asked in (
+        ["impedance", "--frequencies", "1"],
+        ["electrical-impedance", "--frequencies", "1"],
+        ["sensitivities", "--by", "surface.friction"],
+    ):
         assert main([asked[0], str(path), "--out", str(path / "out"), *asked[1:]]) == 4
         assert "cannot use" in capsys.readouterr().err
 
