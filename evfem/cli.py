@@ -243,11 +243,13 @@ def _finish(folder: RunFolder, result: object) -> int:
 
 def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
     """Print the table of a run, what its result warns of, how far it came, and where its results are."""
-    from evfem.runfolder import SUMMARY
-    from evfem.simulation.history import DRIFT, load_drift, table
+    from evfem.runfolder import HISTORY, SUMMARY
+    from evfem.simulation.history import DRIFT, MOST, chosen, load_drift, table
 
     if rows:
         print(table(rows, depth=scene.depth))
+    if (shown := len(chosen(rows, MOST))) < len(rows):
+        print(f"{len(rows) - shown} of {len(rows)} steps are left out here; all are in {path / HISTORY}")
     if (drift := load_drift(rows)) > DRIFT:
         print(f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it')
     for warning in json.loads((path / SUMMARY).read_text(encoding="utf-8")).get("warnings", []):

@@ -83,6 +83,17 @@ def test_a_run_leaves_all_its_files_and_a_table(finished):
     assert "step 5 of 5" in err
 
 
+def test_a_table_says_how_many_steps_it_leaves_out_and_where_they_are(place, finished):
+    assert "left out" not in finished[2]
+    (place / "square.toml").write_text(SCENE.replace("steps = 3", "steps = 20"))
+    status, out, _ = called(place, "run", "square.toml", "--no-fields", "--no-plots")
+    *table, left, last = out.splitlines()
+    assert (status, len(table)) == (0, 2 + 2 + 6)
+    assert left == "14 of 22 steps are left out here; all are in square-out/history.csv"
+    assert last.startswith("22 of 22 steps in")
+    assert len(history(place / "square-out")) == 22
+
+
 def test_over_a_depth_a_run_is_told_in_newtons(place):
     text = SCENE.replace("[finger]", "[finger]\ndepth = 8.0")
     (place / "square.toml").write_text(text)

@@ -338,7 +338,11 @@ HEADS = {
 }
 
 
-def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
+#: rows in the table of forces, about
+MOST = 12
+
+
+def table(rows: Sequence[Row], most: int = MOST, depth: float | None = None) -> str:
     """At most about `most` rows of a history, always the last of each motion, in 80 columns; over
     a whole `depth` (mm), and of a finger in three dimensions, forces are in N.
 
