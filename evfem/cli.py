@@ -392,14 +392,13 @@ def _sweep(options: argparse.Namespace) -> int:
         return _say(
             f"interrupted; finished points are in {path}, the same command goes on there", INTERRUPTED
         )
-    wrong = [row for row in result.rows if row["status"] != "done"]
-    for row in wrong[:3]:
-        notices.tell(f"point {row['point']}: {row['message']}")
+    for remark in result.remarks():
+        notices.tell(remark)
     points = result.provenance["points"]
     print(f"{points['requested']} points: {told(points)}; table in {path / TABLE}", flush=True)
     for name, over in result.provenance.get("means", {}).items():
         print(f"{name}: the mean over {' or '.join(over)}", flush=True)
-    return NOT_CONVERGED if wrong else DONE
+    return NOT_CONVERGED if any(row["status"] != "done" for row in result.rows) else DONE
 
 
 def _mesh(options: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +32,8 @@ from evfem.sweeps.table import SweepResult, Units, table_units, units_of
 
 #: the table is written anew after so many seconds
 EVERY = 5.0
+#: columns of friction, and the share of the contact that sticks from which on they are not those of sliding
+OF_FRICTION, STICKS = ("tangential_force", "friction", "apparent_friction"), 0.01
 Job = tuple[str, str, tuple[str, ...]]  # scene as text, folder of its paths, outputs
 
 
@@ -253,13 +255,34 @@ def evaluate(job: Job) -> Answer:
     text, folder, names = job
 
     over: dict[str, str] = {}
+    sticks: list[str] = []
 
     def ask(result: Result) -> dict[str, float | None]:
         result = result if result.depth is None else result.total
+        sticks.extend(sticking(result, names))
         over.update({name: mean(result, *_asked(name))[1] for name in names if ".mean" in name})
         return {name: output(result, name) for name in names}
 
-    return replace(answered(text, folder, ask, simulate), over=over)
+    answer = answered(text, folder, ask, simulate)
+    return replace(answer, over=over, message="; ".join([one for one in (answer.message, *sticks) if one]))
+
+
+def sticking(result: Result, outputs: Sequence[str]) -> list[str]:
+    """A sentence for each slide with an output of friction at its end, where part of the contact sticks:
+    friction is below that of a pad that slides.
+    """
+    asked = [_asked(name) for name in outputs if name.split(".")[1] in ("last", "max")]
+    motions = {motion for column, motion in asked if column in OF_FRICTION}
+    found = {}
+    for motion in motions if "stick_share" in result.columns else ():
+        for last in np.flatnonzero(chosen(result, motion))[-1:]:
+            if result.motion[last] == "slide" and result.stick_share[last] >= STICKS:
+                found[int(result.motion_index[last])] = float(result.stick_share[last])
+    return [
+        f"{100.0 * share:.0f} % of the contact still sticks at the end of motion {motion}, so its friction "
+        "is not that of sliding; a longer distance slides"
+        for motion, share in sorted(found.items())
+    ]
 
 
 def answered(

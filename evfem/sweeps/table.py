@@ -220,6 +220,25 @@ class SweepResult:
         own = [name for name in self.columns if name not in (*FIRST, *LAST)]
         return [name for name in own if not isinstance(self[name], list)]
 
+    def remarks(self, most: int = 3) -> list[str]:
+        """What to know of points, by number and parameters: why they have no result and what to do, then what
+        those that have one warn of; of either at most so many, and how many more there are.
+        """
+        wrong = [row for row in self.rows if row["status"] != "done"]
+        doubtful = [row for row in self.rows if row["status"] == "done" and row["message"]]
+        lines = []
+        for rows, what in ((wrong, "without a result"), (doubtful, "with a warning")):
+            lines += [f"point {row['point']}{self._varied_in(row)}: {_advised(row)}" for row in rows[:most]]
+            if len(rows) > most:
+                lines.append(f"{len(rows) - most} more {what}: column `message` of the table")
+        return lines
+
+    def _varied_in(self, row: Mapping[str, Any]) -> str:
+        """The parameters of a row with their units, in brackets."""
+        given = [(name, row[name], self.units.get(name, "")) for name in self._varied if name in row]
+        told = ", ".join(f"{name} = {cell_of(value)} {unit}".rstrip() for name, value, unit in given)
+        return f" ({told})" if told else ""
+
     def to_csv(self, path: str | Path) -> None:
         """Write the table as `evfem sweep` does (`sweep.csv`), whole or not at all."""
         write_text(path, sweep_csv(self.columns, self.rows, self.units))
@@ -227,6 +246,12 @@ class SweepResult:
     def __repr__(self) -> str:
         """Numbers of points by status."""
         return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
+
+
+def _advised(row: Mapping[str, Any]) -> str:
+    """The message of a row; a run that did not end keeps its steps where it is alone."""
+    alone = "; the scene with these values, run alone (evfem run), keeps the steps before"
+    return f"{row['message']}{alone if row['status'] == 'not_converged' else ''}"
 
 
 def short_names(keys: Sequence[str]) -> dict[str, str]:

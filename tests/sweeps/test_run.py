@@ -27,6 +27,7 @@ from evfem.mesh import file as meshfile
 from evfem.scene import file as scenefile
 from evfem.sweeps import file as sweepfile
 from evfem.sweeps import folder as sweepfolder
+from evfem.sweeps import table as sweeptable
 from evfem.sweeps.run import compute
 from evfem.sweeps.table import table_units, units_of
 
@@ -198,6 +199,43 @@ def test_equal_points_are_computed_once(plan, monkeypatch):
     result = ev.sweep(plan, workers=1)
     assert len(computed) == 2
     assert result.rows[0]["normal_force.last"] == result.rows[2]["normal_force.last"]
+
+
+def test_remarks_say_which_point_its_parameters_and_what_to_do(plan, tmp_path, monkeypatch, capsys):
+    run = ev.sweep.__globals__["simulate"]
+
+    def failing(scene):
+        if scene.surface.friction == 0.2:
+            raise ev.NotConverged(3, [1.0], "try smaller steps")
+        return run(scene)
+
+    monkeypatch.setitem(ev.sweep.__globals__, "simulate", failing)
+    assert cli.main(["sweep", str(plan), "--out", str(tmp_path / "out"), "--workers", "1"]) == 3
+    told = [one for one in capsys.readouterr().err.splitlines() if "point 0" in one or "more" in one]
+    assert told == [
+        "evfem: point 0 (surface.friction = 0.2, motion.0.indentation = 0.1 mm): step 3 did not converge "
+        "(last residuals: 1.0e+00); try smaller steps; the scene with these values, run alone (evfem run), "
+        "keeps the steps before",
+        "evfem: 1 more without a result: column `message` of the table",
+    ]
+    found = sweeptable.read(tmp_path / "out")
+    assert [len(found.remarks(most)) for most in (1, 4)] == [2, 4]
+
+
+def test_a_slide_that_ends_before_all_slips_is_told_in_its_row(plan):
+    """A block of 0.1 MPa with friction of 40 sticks throughout a slide of 0.02 mm, with 0.01 it slips."""
+    text = SWEEP.replace("[0.2, 0.4, -1.0]", "[40.0, 0.01]").replace("distance = 0.2", "distance = 0.02")
+    plan.write_text(text.replace("tangential_force.min.1", "tangential_force.last.1"))
+    result = ev.sweep(plan, workers=1)
+    stuck = (
+        "100 % of the contact still sticks at the end of motion 1, so its friction is not that of sliding; "
+    )
+    assert result["message"] == [f"{stuck}a longer distance slides"] * 2 + [""] * 2
+    assert result["status"] == ["done"] * 4
+    which = "point 0 (surface.friction = 40.0, motion.0.indentation = 0.1 mm)"
+    assert result.remarks()[0] == f"{which}: {result['message'][0]}"
+    plan.write_text(text)  # the least friction of a slide is at its beginning
+    assert ev.sweep(plan, workers=1)["message"] == [""] * 4
 
 
 def test_points_that_fail_are_rows_with_their_message(plan, tmp_path, monkeypatch):
@@ -457,7 +495,9 @@ def test_the_command_says_what_became_of_the_points(plan, tmp_path, monkeypatch,
     lines = shown.err.splitlines()
     assert lines[0] == "evfem: 2 of 6 points are no valid scene"
     assert lines[1:-2] == ["point 3 of 6", "point 4 of 6", "point 5 of 6", "point 6 of 6"]
-    assert lines[-1].startswith("evfem: point 5: surface.friction: given -1.0")
+    assert lines[-1].startswith(
+        "evfem: point 5 (surface.friction = -1.0, motion.0.indentation = 0.2 mm): surf"
+    )
     plan.write_text(SWEEP.replace(", -1.0]", "]"))
     assert cli.main(["sweep", str(plan), "--workers", "1", "--resume"]) == 0
     assert capsys.readouterr().out.startswith("4 points: 4 done; table in many-out/sweep.csv\n")
