@@ -110,7 +110,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "labels figures fields meshes solid finger footprint curves sweeps movie response",
+        "labels figures fields meshes solid finger footprint waveform curves sweeps movie response",
     ),
     "reporting": ({"numpy"}, "log watch page"),
     "studio": ({"numpy"}, "state page runs server"),

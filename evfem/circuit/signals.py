@@ -61,6 +61,19 @@ class VoltageProfile:
         """Voltage in V at `position` in mm."""
         return to_python(piecewise_linear(self.position, self.voltage, position))
 
+    def jumps(self, begin: float, end: float) -> tuple[Floats, Floats, Floats]:
+        """Positions (mm) at which it jumps on the way from `begin` to `end`, in their order, and the voltages
+        (V) before and after, (k,) each; at the smaller of the two it has the later row's, either way.
+
+        >>> profile = VoltageProfile([0.0, 5.0, 5.0], [0.0, 100.0, 400.0])
+        >>> [one.tolist() for one in profile.jumps(6.0, 4.0)]
+        [[5.0], [400.0], [100.0]]
+        """
+        x, low, high = self.position, min(begin, end), max(begin, end)
+        row = np.flatnonzero((np.diff(x) == 0.0) & (x[1:] > low) & (x[1:] <= high))
+        before, after = self.voltage[row], self.voltage[row + 1]
+        return (x[row], before, after) if end >= begin else (x[row][::-1], after[::-1], before[::-1])
+
     @classmethod
     def from_csv(cls, path: str | Path) -> VoltageProfile:
         """Read a file with the header ``position,voltage`` and a row of numbers per point, in mm and V

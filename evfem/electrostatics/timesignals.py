@@ -171,6 +171,17 @@ class Square(_Periodic):
         half = np.floor(2.0 * self.frequency * np.asarray(time) + FLIP)
         return to_python(self.bias + self.amplitude * (1.0 - 2.0 * np.mod(half, 2.0)))
 
+    def jumps(self, begin: float, end: float) -> tuple[Floats, Floats, Floats]:
+        """Times (s) in begin < t <= end at which it flips, and the voltages (V) before and after, (k,) each.
+
+        >>> [one.tolist() for one in Square(frequency=50.0, amplitude=100.0).jumps(0.0, 0.025)]
+        [[0.01, 0.02], [100.0, -100.0], [-100.0, 100.0]]
+        """
+        first, last = np.floor(2.0 * self.frequency * np.array([begin, end]) + FLIP)
+        half = np.arange(first, last) + 1.0
+        rise = 2.0 * self.amplitude * (1.0 - 2.0 * np.mod(half, 2.0))
+        return half / (2.0 * self.frequency), self.bias - 0.5 * rise, self.bias + 0.5 * rise
+
 
 @dataclass(frozen=True)
 class OpenCircuit(Checked):

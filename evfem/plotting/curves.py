@@ -19,6 +19,7 @@ from evfem.errors import InputError, describe_value
 from evfem.plotting import figures, labels
 from evfem.plotting.fields import frame_of
 from evfem.plotting.finger import check_plane, told
+from evfem.plotting.waveform import with_edges
 from evfem.simulation import spectrum as spectra
 from evfem.simulation.result import Result
 
@@ -146,6 +147,12 @@ def along(result: Result, name: str, over: str) -> Any:
     return labels.values_of(result, name)[_drawn(result, over)]
 
 
+def curve(result: Result, name: str, over: str) -> tuple[Any, Any]:
+    """A column as it is drawn over another one, x and y; a voltage with the edges of its waveform."""
+    x, y = along(result, over, over), along(result, name, over)
+    return with_edges(result, name, _drawn(result, over), np.asarray(x, dtype=float), np.asarray(y))
+
+
 def _drawn(result: Result, over: str) -> Any:
     if over != "time" or not len(result.time):
         return slice(None)
@@ -213,16 +220,15 @@ def history(
     over = checked_over(over, result)
     kinds: dict[tuple[str, str], dict[str, Any]] = {}
     for name in columns:
-        y = along(result, name, over)
-        kinds.setdefault(labels.kind_of(name, result.units), {})[name] = y
-    x, drawn = along(result, over, over), [y for kind in kinds.values() for y in kind.values()]
-    figures.check_log(log, x=x, y=np.concatenate(drawn))
+        kinds.setdefault(labels.kind_of(name, result.units), {})[name] = curve(result, name, over)
+    drawn = [y for kind in kinds.values() for _, y in kind.values()]
+    figures.check_log(log, x=along(result, over, over), y=np.concatenate(drawn))
     panels = figures.panels_or_new(ax, len(kinds), 1.0 + 1.9 * len(kinds))
     for panel, ((text, unit), lines) in zip(panels, kinds.items(), strict=True):
-        unit, factor = labels.shown_in(unit, *lines.values())
-        texts = {labels.column_text(name, result.units[name]): factor * y for name, y in lines.items()}
+        unit, factor = labels.shown_in(unit, *(y for _, y in lines.values()))
+        texts = {labels.column_text(name, result.units[name]): line for name, line in lines.items()}
         text = next(iter(texts)) if len(texts) == 1 else text
-        looks = [(x, y, look) for y, look in figures.styled(texts)]
+        looks = [(x, factor * y, look) for (x, y), look in figures.styled(texts)]
         figures.curves(panel, looks, "", labels.on_lines(labels.with_unit(text, unit)))
         panel.set(**{f"{axis}scale": "log" for axis in log})
     _marked(panels[0], over, result).set_xlabel("")
@@ -303,7 +309,9 @@ def friction(
 
 
 def signal(results: labels.Results, over: str | None = None) -> figures.Panels:
-    """Voltage above, friction force on the bone below, over `over` (see `forces`)."""
+    """Voltage above, with vertical edges where its waveform jumps, friction force on the bone below, over
+    `over` (see `forces`).
+    """
     found, over = _over(results, over)
     panels = figures.new_panels(2, 4.8)
     _column(panels[0], found, "voltage", over, "voltage").set_xlabel("")
@@ -400,13 +408,10 @@ def _over(results: labels.Results, over: str | None) -> tuple[dict[str, Result],
 
 def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, text: str) -> Axes:
     """A line for each result, beside the text, or without one the name of the column."""
-    drawn = [along(one, column, over) for one in found.values()]
-    unit, factor = labels.shown_in(labels.units_of(found)[column], *drawn)
+    drawn = [curve(one, column, over) for one in found.values()]
+    unit, factor = labels.shown_in(labels.units_of(found)[column], *(y for _, y in drawn))
     looks, text = (look for _, look in figures.styled(found)), text or labels.column_text(column, unit)
-    lines = [
-        (along(one, over, over), factor * y, look)
-        for one, y, look in zip(found.values(), drawn, looks, strict=True)
-    ]
+    lines = [(x, factor * y, look) for (x, y), look in zip(drawn, looks, strict=True)]
     text = labels.effective(column, found.values()) + text
     ax = figures.curves(ax, lines, "", labels.with_unit(text, unit), legend=False)
     largest = max(float(np.abs(labels.values_of(one, "normal_force")).max()) for one in found.values())

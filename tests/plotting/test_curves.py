@@ -10,7 +10,21 @@ from tools.fakes import fake_result, fake_row, lines_of
 from tools.meshes import square_mesh
 from tools.refusals import refuses
 
-from evfem import TOUCHSCREEN, Display, Drive, FingerPad, Hover, Scene, Sine, StrongTroxel
+from evfem import (
+    TOUCHSCREEN,
+    Carrier,
+    Display,
+    Drive,
+    FingerPad,
+    Hover,
+    Scene,
+    Sine,
+    Slide,
+    Square,
+    StrongTroxel,
+    VoltageProfile,
+    Wait,
+)
 from evfem.errors import InputError
 from evfem.plotting import (
     compare,
@@ -188,6 +202,55 @@ def test_friction_is_the_ratio_on_the_bone_where_there_is_a_load():
     assert_line(
         friction(result, "position", start=start).get_lines()[0], result.position[1:][rows], ratio[rows]
     )
+
+
+def ran(voltage, *motion):
+    pad = FingerPad(ridges=False, resolution="coarse")
+    return simulate(Scene(pad, Display(friction=0.3), StrongTroxel(), voltage, motion, roughness_gap=0.005))
+
+
+def edges(line):
+    """Abscissae of vertical edges of a line, and their ends."""
+    x, y = line.get_data()
+    at = np.flatnonzero((np.diff(x) == 0.0) & (np.diff(y) != 0.0))
+    return np.round(x[at], 12).tolist(), [(float(y[i]), float(y[i + 1])) for i in at]
+
+
+@pytest.mark.filterwarnings("ignore:motion 1 has . steps in a period")
+def test_a_square_wave_has_vertical_edges_where_it_flips():
+    """0 to 80 V at 50 Hz, flips every 10 ms; steps of 4 ms: the second edge is at the end of a step, the
+    others within one.
+    """
+    wait = Wait(0.04, steps=10)
+    result = ran(Square(50.0, amplitude=40.0, bias=40.0), Hover(0.3, steps=1), wait)
+    flips = [(80.0, 0.0), (0.0, 80.0), (80.0, 0.0), (0.0, 80.0)]
+    for panels in (history(result, ["voltage"], "time"), signal(result, "time")):
+        (line,) = panels[0].lines
+        assert edges(line) == ([0.01, 0.02, 0.03, 0.04], flips)
+    # over the steps an edge is as far within its step as in time
+    (line,) = (one for one in history(result, ["voltage"], "step")[0].lines if len(one.get_xdata()) > 2)
+    assert edges(line) == ([3.5, 6.0, 8.5, 11.0], flips)
+    (force,) = history(result, ["electrostatic_force"], "time")[0].lines
+    assert_line(force, result.time, result.electrostatic_force)
+
+
+@pytest.mark.filterwarnings("ignore:motion 1 has . steps in a period")
+def test_a_sine_has_no_edges_and_the_mean_of_a_modulated_carrier_has_those_of_its_envelope():
+    wait = Wait(0.02, steps=5)
+    result = ran(Sine(50.0, 100.0), Hover(0.3, steps=1), wait)
+    assert_line(compare({"a": result}, "voltage", "time").lines[0], result.time, result.voltage)
+    carried = Carrier(10e3, Square(50.0, amplitude=50.0, bias=50.0), resolved=False)
+    at, ends = edges(signal(ran(carried, Hover(0.3, steps=1), wait), "time")[0].lines[0])
+    assert at == [0.01, 0.02]
+    assert ends[0] == (pytest.approx(100.0 / 2**0.5), 0.0)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_profile_that_jumps_has_a_vertical_edge(way):
+    profile = VoltageProfile(*np.array([(-0.25, 30.0), (-0.25, 60.0), (0.25, 60.0), (0.25, 90.0)]).T)
+    result = ran(profile, Press(indentation=0.1, steps=1), Slide(way * 0.6, steps=6))
+    expected = (60.0, 90.0) if way > 0 else (60.0, 30.0)
+    assert edges(signal(result, "position")[0].lines[0]) == ([0.25 * way], [expected])
 
 
 def test_a_signal_stands_above_the_friction_that_it_makes():
