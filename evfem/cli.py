@@ -243,6 +243,7 @@ def _finish(folder: RunFolder, result: object) -> int:
 
 def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
     """Print the table of a run, what its result warns of, how far it came, and where its results are."""
+    from evfem.reporting.page import per_depth
     from evfem.runfolder import HISTORY, SUMMARY
     from evfem.simulation.history import DRIFT, MOST, chosen, load_drift, table
 
@@ -252,7 +253,8 @@ def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
         print(f"{len(rows) - shown} of {len(rows)} steps are left out here; all are in {path / HISTORY}")
     if (drift := load_drift(rows)) > DRIFT:
         print(f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it')
-    for warning in json.loads((path / SUMMARY).read_text(encoding="utf-8")).get("warnings", []):
+    found = json.loads((path / SUMMARY).read_text(encoding="utf-8")).get("warnings", [])
+    for warning in (*found, *per_depth(found, scene.depth)):
         print(f"warning: {warning}")
     cost = f"{len(rows)} of {scene.total_steps} steps in {sum(float(row['seconds']) for row in rows):.1f} s"
     print(f"{cost}; results of every step in {path}", flush=True)

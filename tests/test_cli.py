@@ -105,6 +105,22 @@ def test_over_a_depth_a_run_is_told_in_newtons(place):
     assert float(end[6]) == pytest.approx(8.0 * force, abs=5e-6)
 
 
+def test_over_a_depth_a_warning_per_mm_of_it_says_so(place):
+    law = (
+        '[electrostatics]\nlaw = "kaczmarek"\ninsulator_thickness = 0.1\ninsulator_eps_r = 3.0\n'
+        'voltage = {kind = "follow_force", position = [0, 1], tangential_force = [9, 9]'
+        ", largest_voltage = 9}\n"
+    )
+    skin = "[finger.electrical]\nstratum_corneum_thickness = 0.3\n"
+    text = SCENE.replace("[finger]", "[finger]\ndepth = 8.0").replace("[surface]", f"{skin}{law}[surface]")
+    (place / "square.toml").write_text(text)
+    _, out, _ = called(place, "run", "square.toml", "--no-fields", "--no-plots")
+    *_, missed, unit, _ = out.splitlines()
+    assert missed.startswith("warning: step")
+    assert "N/mm" in missed
+    assert unit == "warning: these warnings are per mm of depth: 0.01 N/mm are 0.08 N over the depth of 8 mm"
+
+
 def test_a_load_that_drifts_is_told_after_the_run(place):
     (place / "square.toml").write_text(SCENE.replace("friction = 0.2", "friction = 1.2"))
     _, out, _ = called(place, "run", "square.toml", "--no-fields", "--no-plots")

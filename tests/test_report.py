@@ -121,6 +121,16 @@ def test_its_numbers_are_those_of_the_run_over_its_depth(slid, tmp_path):
     assert 0.0 < left < 1e-7
 
 
+def test_warnings_per_mm_of_depth_say_so_beside_forces_in_newtons(slid, tmp_path):
+    """A page in N said "0.0202 N/mm" without a word."""
+    assert "0.01 N/mm are" not in page_of(slid, tmp_path).text
+    said = ["the attraction, 0.0202 N/mm in step 1, is 2 times the load, which is 0.01 N/mm at most"]
+    warned = replace(slid, provenance={**slid.provenance, "warnings": said})
+    found = page_of(warned, tmp_path)
+    assert "These warnings are per mm of depth: 0.01 N/mm are 0.1 N over the depth of 10 mm." in found.text
+    assert "what is in N/mm (warnings, checks, scene, plan) is per mm of it" in found.text
+
+
 def test_an_unbalanced_history_is_told(slid, tmp_path):
     """A tenth of the work of the bone is lost."""
     broken = replace(slid, external_work=0.9 * slid.external_work)

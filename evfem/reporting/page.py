@@ -45,6 +45,11 @@ UNKNOWN = (
     "skin and surface, the real area of contact, the coefficient of friction. Vary them too "
     "(evfem sensitivities, evfem sweep)."
 )
+#: of a section with a depth
+OVER = (
+    " Forces (N) and areas are over a depth of {:g} mm; what is in N/mm (warnings, checks, scene, plan) is "
+    "per mm of it."
+)
 #: rows of the table of forces; dots per inch of a picture
 ROWS, DPI = 12, 120
 STYLE = """
@@ -144,7 +149,7 @@ def _head(result: Result, title: str) -> str:
     seconds = float(np.sum(result.seconds))
     text = f"evfem {version}, {about.get('date', '')}: {steps} steps, {done}; {size}; "
     text += f"computed in {seconds:.3g} s."
-    over = "" if result.depth is None else f" Forces and areas are over a depth of {result.depth:g} mm."
+    over = "" if result.depth is None else OVER.format(result.depth)
     return f"<h1>{html.escape(title)}</h1>\n{_p(text + over)}"
 
 
@@ -154,8 +159,23 @@ def _warnings(result: Result) -> str:
         found.append(f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it')
     if not found:
         return _section("Warnings", [_p("None.")])
-    told = (f'<p class="warning">{html.escape(_sentence(one))}</p>' for one in found)
+    told = [f'<p class="warning">{html.escape(_sentence(one))}</p>' for one in found]
+    told += [_p(_sentence(one)) for one in per_depth(found, result.depth)]
     return _section("Warnings", told)
+
+
+def per_depth(warnings: Sequence[str], depth: float | None) -> list[str]:
+    """A sentence that says what N/mm in warnings is in N, where other forces are over a whole `depth` (mm).
+
+    >>> per_depth(["step 3: reached 0.02 N/mm at 400 V"], 10.0)
+    ['these warnings are per mm of depth: 0.01 N/mm are 0.1 N over the depth of 10 mm']
+    >>> per_depth(["motion 1, a slide, never touched"], 10.0), per_depth(["reached 0.02 N/mm"], None)
+    ([], [])
+    """
+    if depth is None or not any(unit in one for one in warnings for unit in ("N/mm", "N mm/mm")):
+        return []
+    over = f"0.01 N/mm are {0.01 * depth:.4g} N over the depth of {depth:g} mm"
+    return [f"these warnings are per mm of depth: {over}"]
 
 
 def _forces(whole: Result) -> str:
