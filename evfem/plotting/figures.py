@@ -202,6 +202,19 @@ def shaded(ax: Axes, points: Floats, triangles: Ints, values: Floats) -> Any:
     return ax.tripcolor(Triangulation(x, y, own.reshape(-1, 3)), value, shading="gouraud")
 
 
+def contour_of_contact(ax: Axes, points: Floats, triangles: Ints, touching: Any) -> None:
+    """A line halfway between nodes at points (P, 2) of triangles (T, 3) that are `touching` (P,) and those
+    that are not; nothing where all are, or none.
+    """
+    from matplotlib.tri import Triangulation
+
+    inside = np.asarray(touching, dtype=float)
+    if len(triangles) and np.ptp(inside[triangles]):
+        where = Triangulation(points[:, 0], points[:, 1], triangles)
+        lines = ax.tricontour(where, inside, levels=[0.5], colors=BLACK, linewidths=0.8)
+        lines.set_label("contour of contact")
+
+
 def whole_figure(ax: Axes) -> Figure:
     """The figure of axes, the outermost one where it has parts."""
     return ax.figure.figure

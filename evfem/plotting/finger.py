@@ -61,7 +61,8 @@ def deformed(
         "contact": a close-up of the contact, or of the smallest gap. A window (left, right, bottom,
         top) in mm. None: the whole finger.
     vmin, vmax
-        Range of the colours; None: that of the values shown.
+        Range of the colours, the same for panels beside each other, in MPa or mm; None: that of the values
+        shown.
     smooth
         Nodal averages in each region, or one colour per cell. Thin lines are borders of regions.
 

@@ -18,7 +18,7 @@ from evfem.common.checks import choice
 from evfem.errors import InputError
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.plotting.fields import TRACTIONS, Scale, Window, frame_of, values_of, within
-from evfem.plotting.figures import TISSUE, shaded
+from evfem.plotting.figures import TISSUE, contour_of_contact, shaded
 from evfem.plotting.finger import Near, checked_window, picture
 from evfem.plotting.labels import check_result
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
@@ -48,7 +48,8 @@ def footprint(
     vmin: float | None = None,
     vmax: float | None = None,
 ) -> Axes:
-    """The skin of a finger in three dimensions from below, coloured by a field, in true proportions.
+    """The skin of a finger in three dimensions from below, coloured by a field, in true proportions; a line
+    is the contour of contact, between nodes that touch and others.
 
     Parameters
     ----------
@@ -60,8 +61,11 @@ def footprint(
     near
         "contact": a close-up of the contact, or of the smallest gap. A window (left, right, lower,
         upper) of x and z in mm. None: the whole skin.
-    frame, ax, vmin, vmax
+    frame, ax
         As in `deformed`.
+    vmin, vmax
+        Range of the colours, the same for panels beside each other, in MPa or mm; None: that of the values
+        shown.
 
     Returns
     -------
@@ -132,12 +136,15 @@ class SkinView:
         mapped = self._draw_shares(ax, faces) if self.field == "contact_status" else self._draw(ax, faces)
         scale.apply(mapped)
         mapped.set_rasterized(True)
+        if self.field != "contact_status":  # whose colours end there
+            touching = self.frame.contact_status[self.skin.nodes] > 0
+            contour_of_contact(ax, self.position[:, ::2], fans(faces), touching)
         ax.set(xlim=window[:2], ylim=window[2:], aspect="equal", xlabel="x (mm)", ylabel="z (mm)")
         return mapped
 
     def _draw(self, ax: Axes, faces: Ints) -> Any:
         """Smooth colours in triangles through all nodes."""
-        triangles, values = np.concatenate([faces[:, fan] for fan in FANS[faces.shape[1]]]), self.values
+        triangles, values = fans(faces), self.values
         if self.field in TRACTIONS:
             triangles = triangles[(values[triangles] != 0.0).any(axis=1)]
         if not len(triangles):
@@ -156,6 +163,11 @@ class SkinView:
         array = np.concatenate(values).astype(float)
         mapped = PolyCollection(list(np.concatenate(shares)), array=array, edgecolors="face", linewidths=0.5)
         return ax.add_collection(mapped)
+
+
+def fans(faces: Ints) -> Ints:
+    """Triangles (T, 3) through all nodes of faces (K, 4 or 9)."""
+    return np.concatenate([faces[:, fan] for fan in FANS[faces.shape[1]]])
 
 
 def _around(plane: Floats, margin: float) -> Window:

@@ -1,7 +1,8 @@
 """A finger in three dimensions as it is deformed: the half behind its middle, seen from below and in front.
 
 Stress and displacement have smooth colours on all faces, averaged at the nodes within each region; fields of
-the pad colour the skin, and what is not touched by a traction is skin without a colour.
+the pad colour the skin, and what is not touched by a traction is skin without a colour. A line is the
+contour of contact.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, describe_value
 from evfem.mesh.split import nodal_means, split
 from evfem.plotting.fields import CELL_FIELDS, TRACTIONS, Scale, Window, values_of
-from evfem.plotting.figures import EDGE, TISSUE, shaded
+from evfem.plotting.figures import EDGE, TISSUE, contour_of_contact, shaded
 from evfem.plotting.meshes import cut_open, seen
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
@@ -71,6 +72,13 @@ class SolidView:
         corners = (mesh.cells[cells][:, :, None] == faces[:, None]).argmax(axis=1)
         return nodal_means(apart, values)[np.take_along_axis(apart.cells[cells], corners, axis=1)]
 
+    @property
+    def _contact(self) -> tuple[Ints, Any]:
+        """Triangles (T, 3) of the pad's faces that are seen, and which of all nodes (N,) touch."""
+        faces = self._faces[0]
+        pad = faces[np.isin(faces, self.result.mesh.node_sets["pad"]).all(axis=1)]
+        return np.concatenate([pad[:, [0, 1, 2]], pad[:, [0, 2, 3]]]), self.frame.contact_status > 0
+
     def window(self, near: str | Window | None) -> Window:
         """What is shown: left, right, lower and upper end in the picture; InputError for a close-up."""
         if near is not None:
@@ -103,6 +111,7 @@ class SolidView:
             list(places[faces[:, [0, 1, 2, 3, 0]]]), colors=EDGE, linewidths=0.1, alpha=0.4
         )
         ax.add_collection(outline)
+        contour_of_contact(ax, places, *self._contact)
         ax.set(xlim=window[:2], ylim=window[2:], aspect="equal")
         ax.set_axis_off()
         return mapped

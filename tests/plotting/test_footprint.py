@@ -1,6 +1,7 @@
 """The footprint shows what the result says of the skin, where it says it."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from tools.refusals import refuses
 import evfem as ev
 from evfem.plotting import animate, contact_area, contact_pressure, deformed, figures, footprint, forces
 from evfem.plotting.fields import values_of
+from evfem.plotting.footprint import fans
 from evfem.simulation.run import simulate
 from evfem.surface.skin import make_skin
 
@@ -61,6 +63,34 @@ def test_statuses_fill_the_shares_of_the_nodes_with_their_colour(result):
     touching = skin.tributary(place)[status > 0].sum()
     assert_allclose(area[shares.get_array() > 0].sum(), touching, rtol=0.02)
     assert_allclose(area.sum(), skin.tributary(place).sum(), rtol=1e-6)
+
+
+def contour_of(ax):
+    """Vertices (n, 2) of the contour of contact, if there is one."""
+    found = [one for one in ax.collections if one.get_label() == "contour of contact"]
+    return np.concatenate([path.vertices for one in found for path in one.get_paths()] or [np.zeros((0, 2))])
+
+
+def test_a_line_is_the_contour_of_contact(result):
+    """Each of its vertices is halfway between a node that touches and one that does not; one colour scale
+    of a caller's serves panels side by side, with the field and its unit beside it.
+    """
+    skin, place = place_of(result)
+    triangles = fans(skin.faces)
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    touching = result.frames[-1].contact_status[skin.nodes] > 0
+    pairs = pairs[touching[pairs[:, 0]] != touching[pairs[:, 1]]]
+    halfway = place[pairs].mean(axis=1)[:, ::2]
+    ax = footprint(result, vmin=0.0, vmax=0.5)
+    for drawn in (contour_of(ax), contour_of(footprint(result, "gap"))):
+        assert len(drawn) > 8
+        assert_allclose(cKDTree(halfway).query(drawn)[0], 0.0, atol=1e-9)
+    mesh = next(one for one in ax.collections if type(one).__name__ == "TriMesh")
+    assert mesh.get_clim() == (0.0, 0.5)
+    assert bar_of(ax).get_ylabel() == "contact pressure (kPa)"
+    assert not len(contour_of(footprint(result, "contact_status")))
+    frame = replace(result.frames[-1], contact_status=0 * result.frames[-1].contact_status)
+    assert not len(contour_of(footprint(replace(result, frames=[frame]))))
 
 
 def test_shear_is_a_magnitude_and_has_colours_from_zero(result):

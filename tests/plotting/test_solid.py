@@ -76,6 +76,18 @@ def test_every_field_has_its_picture_and_labels_stay_in_it(result, field):
     assert label.endswith((" (kPa)", " (MPa)", " (mm)")) or field in ("J", "contact_status")
 
 
+def test_the_contour_of_contact_is_between_nodes_that_touch_and_others(result):
+    frame = result.frames[-1]
+    (line,) = (c for c in deformed(result).collections if c.get_label() == "contour of contact")
+    faces = cut_open(result.mesh)[0][:, :4]
+    pairs = np.concatenate([faces[:, [i, j]] for i in range(4) for j in range(i)])
+    pairs = pairs[(frame.contact_status[pairs] > 0).sum(axis=1) == 1]
+    halfway = projected(result.mesh.points + frame.displacement)[pairs].mean(axis=1)
+    drawn = np.concatenate([path.vertices for path in line.get_paths()])
+    assert len(drawn) > 2
+    assert_allclose(cKDTree(halfway).query(drawn)[0], 0.0, atol=1e-9)
+
+
 def test_skin_that_nothing_touches_has_no_colour(result, monkeypatch):
     monkeypatch.setattr(figures, "FINEST", 1)
     _, values = drawn(result, "contact_pressure")
