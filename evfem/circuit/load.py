@@ -23,6 +23,7 @@ from evfem.electrostatics.alternating import admittance, voltage_fraction
 from evfem.electrostatics.breakdown import Limited, breakdown_voltage
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.localgaps import roughness_below
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 
 #: of lengths in mm: C/mm2 per V/mm, and W per N mm/s
 PER_MM, MILLI = 1e-3 * eps_0, 1e-3
@@ -31,6 +32,8 @@ COLUMNS = (
     Column("current_rms", "A/mm", "into the electrode, effective, from the amplifier"),
     Column("power", "W/mm", "mean, from the amplifier"),
 )
+#: relative rounding of times and charges; work of a source without current that is told, over the energy
+SAME, OF_NO_CURRENT = 1e-9, 0.01
 #: those that are means over each step where the voltage is resolved in time
 STEP_MEANS = ("current_rms", "power")
 
@@ -99,6 +102,35 @@ class Supply(Room):
             "current_rms": PER_MM * _root(square / time),
             "power": MILLI * work / time,
         }
+
+    def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+        times = np.array([row["time"] for row in rows])
+        after = getattr(scene.voltage, "after", 0.0)
+        late = np.flatnonzero((times[1:] > after * (1.0 + SAME)) & (times[:-1] < after * (1.0 - SAME)))
+        for k in late[:1] + 1:
+            yield (
+                f"step {rows[k]['step']}: the electrode is disconnected at the end of this step, "
+                f"{times[k]:g} s, not at {after:g} s within it: let a step end there"
+            )
+        if isinstance(scene.voltage, (ChargeControl, OpenCircuit)):
+            yield from _of_no_current(rows, times >= after * (1.0 - SAME))
+
+
+def _of_no_current(rows: Sequence[Mapping[str, Any]], kept: Any) -> Iterator[str]:
+    """A sentence if the source works while the charge stays: the works of a step are those of the voltage
+    that it began with.
+    """
+    charge, work, energy = (
+        np.array([row.get(name, 0.0) for row in rows]) for name in ("charge", "source_work", "field_energy")
+    )
+    stays = np.abs(np.diff(charge)) <= SAME * np.abs(charge[1:])
+    found = float(np.abs(np.diff(work)[stays & kept[:-1]]).sum())
+    if found > OF_NO_CURRENT * float(energy.max()):
+        unit = "N mm" if "contact_area" in rows[0] else "N mm/mm"
+        yield (
+            f"source_work changes by {found:.2g} {unit} although no charge flows, and electrostatic_work is "
+            "wrong by as much: it falls with the length of the steps in which the kept charge moves"
+        )
 
 
 def _root(mean_square: float) -> float:

@@ -56,6 +56,17 @@ from evfem.electrostatics.laws import Layer, eps_0
 POINTS, SCALE, TURN, SHIFT, RISE = 26, 0.5017, 0.6407, 0.6122, 0.2645
 
 
+def straight(s: Any) -> float:
+    """The transform of nothing."""
+    return 0.0
+
+
+def at_times(transform: Any, time: Any) -> Any:
+    """Values (T, 1) at times (T, 1) above 0 of a function with this transform."""
+    z, weight = (one.reshape(-1, 1, 1) for one in _contour())
+    return 2.0 * np.real(np.sum(weight / time * transform(z / time), axis=0))
+
+
 def _contour() -> tuple[Any, Any]:
     """Points z and weights of the upper half of Talbot's contour."""
     theta = np.pi * np.arange(1, POINTS, 2) / POINTS
@@ -189,8 +200,12 @@ class Sandwich:
         first, third = self._polarisations(charges)
         return self.skin.loss(E_1, first) + gap * self.leak * E_2**2 + self.insulator.loss(E_3, third)
 
-    def after(self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values) -> Any:
-        """State (M, ...) of `charges` after `seconds` at `gap` (mm), voltage from `before` to `after` (V)."""
+    def after(
+        self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values, bent: Any = straight
+    ) -> Any:
+        """State (M, ...) of `charges` after `seconds` at `gap` (mm), voltage from `before` to `after` (V) on
+        a straight line, and beyond that of the transform `bent` at complex rates (S, ...).
+        """
         charges = np.asarray(charges, dtype=float)
         axes, lasts = np.broadcast(gap, before, after, seconds, charges[0]).ndim, np.asarray(seconds) > 0.0
         if not lasts.any():
@@ -199,7 +214,7 @@ class Sandwich:
         charges = np.stack([_lifted(one, axes) for one in charges])
         z, weight = (one.reshape((-1,) + (1,) * axes) for one in _contour())
         s = z / time
-        volts = (before + (np.asarray(after) - before) / z) / s
+        volts = (before + (np.asarray(after) - before) / z) / s + bent(s)
         fields, slopes = self._fields(np.real(gap), charges, volts, s)
         value = self._moved(s, weight / time, fields)
         value = value + self._kept(charges, time)
@@ -215,16 +230,29 @@ class Sandwich:
 
     def _fields(self, gap: Any, start: Any, volts: Any, s: Any) -> tuple[Any, Any]:
         """Transforms (S, ...) at s of the three fields under the voltage's, and derivatives by the gap."""
+        (left, right), (Y_1, Y_2, Y_3), total, own = self._series(gap, start, s)
+        through = (volts + own) / total
+        steeper = -through / (Y_2 * total)
+        fields = (through - left) / Y_1, through / Y_2, (through - right) / Y_3
+        return fields, (steeper / Y_1, steeper / Y_2, steeper / Y_3)
+
+    def _series(self, gap: Any, start: Any, s: Any) -> tuple[Any, Any, Any, Any]:
+        """What a state leaves in skin and insulator, the three admittances, the reduced thickness of all, and
+        the voltage of what is left, at s.
+        """
         first, third = self._polarisations(start)
         left, right = self.skin.left(s, first) + start[0] / s, self.insulator.left(s, third) - start[1] / s
         Y_1, Y_3 = self.skin.admittance(s), self.insulator.admittance(s)
         Y_2 = self.gap_eps_r + self.leak / s
         z_1, z_3 = self.skin.thickness / Y_1, self.insulator.thickness / Y_3
-        total = z_1 + gap / Y_2 + z_3
-        through = (volts + z_1 * left + z_3 * right) / total
-        steeper = -through / (Y_2 * total)
-        fields = (through - left) / Y_1, through / Y_2, (through - right) / Y_3
-        return fields, (steeper / Y_1, steeper / Y_2, steeper / Y_3)
+        return (left, right), (Y_1, Y_2, Y_3), z_1 + gap / Y_2 + z_3, z_1 * left + z_3 * right
+
+    def on_electrode(self, gap: Any, start: Any, s: Any) -> tuple[Any, Any]:
+        """Transforms (S, ...) at s of the electrode's charge density over eps_0 below an insulator that does
+        not conduct: per voltage, and without one.
+        """
+        _, _, total, own = self._series(gap, start, s)
+        return 1.0 / total, own / total + start[1] / s
 
     def _moved(self, s: Any, weight: Any, fields: tuple[Any, Any, Any]) -> Any:
         """What transforms (S, ...) of the fields add to the state (M, ...), summed by `weight`."""

@@ -112,7 +112,7 @@ class VoltageControl:
         """The control during pseudo-transient continuation (`evfem.solver.relaxation`)."""
         return self
 
-    def begin(self, old: State) -> None:
+    def begin(self, old: State, attraction: Any) -> None:
         """A step from `old` begins."""
 
     def guess(self, voltage: float) -> float:
@@ -213,11 +213,15 @@ class KeptCharge(ConstrainedVoltage):
 
     charge: float | None = None
 
+    def begin(self, old: State, attraction: Any) -> None:
+        attraction.parts[0].charging.keep(self._kept(attraction.parts[0].charging))
+
+    def _kept(self, charging: Any) -> float:
+        return float(charging.electrode_charge(charging.old)) if self.charge is None else self.charge
+
     def read(self, attraction: Any, pad: PadState) -> tuple[Reading, float]:
         electrode = attraction.parts[0]
-        charging = electrode.charging
-        kept = charging.electrode_charge(charging.old) if self.charge is None else self.charge
-        return electrode.electrode_charge(pad), kept
+        return electrode.electrode_charge(pad), self._kept(electrode.charging)
 
     def unit(self, attraction: Any, pad: PadState) -> Floats:
         """It is quadratic in the voltage."""
@@ -296,7 +300,7 @@ class FollowFriction(VoltageControl):
         """Whether the voltage is between its bounds."""
         return self._mode == UNKNOWN
 
-    def begin(self, old: State) -> None:
+    def begin(self, old: State, attraction: Any) -> None:
         self._mode = AT_ZERO if old.voltage == 0.0 else UNKNOWN
 
     def missing(self, reaction: Floats) -> float:

@@ -97,7 +97,7 @@ class Equilibrium:
             room.begin(old, target.duration)
         for traction in self.attraction.keeping:
             traction.begin(self.pad_state(old), target.duration)
-        target.voltage.begin(old)
+        target.voltage.begin(old, self.attraction)
         return target.begun(old)
 
     def accept(self, old: State, state: State, target: Target) -> State:

@@ -59,6 +59,7 @@ UNKNOWN, SURFACE_FIELDS = (
 #: fields of a state with the kinks of the attraction
 NONSMOOTH_FIELDS = ("attraction", "memory.charges", "memory.forces.")
 TIED = "several nodes touch the surface first, and which one is next depends on the sign of the change"
+SWITCHED = "in step {} the electrode is connected on one side of the parameter, and no longer on the other"
 LOST = "the linear equations of step {} were not solved"
 #: endings of columns with units that are counts all the same: not differentiable
 DISCRETE = ("contact_width", "contact_area", "mean_contact_pressure", "breakdown_x")
@@ -173,6 +174,9 @@ class Line:
         """Advance the derivatives to the end of a substep; not where `solve` is slow, unless `patient`."""
         self._come_nearer(substep)
         equations = [one.begin(substep, jumps, substep.old) for one in self.beside]
+        if len({one.target.voltage.sought for one in equations}) > 1:
+            self.reason = SWITCHED
+            return True
         fixed = self._surface_by_parameter(substep, equations), *self._partial(substep, equations, jumps)
         rate = {
             GIVEN: lambda: float(difference([one.target.voltage.voltage for one in equations], self.step)),

@@ -2,8 +2,9 @@
 
 Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.relaxation`) on its
 tributary length A: M = 2 charges, with their polarisations where dielectrics relax. In a step first the pad
-moves with its charges and voltage, then charge flows while the voltage changes linearly to its new value. The
-charges at the end are a function of gap and voltage. Each term of the balance has its own integral::
+moves with its charges and voltage, then charge flows while the voltage goes straight to its new value, or as
+a kept charge of the electrode has it (`KeptCourse`). The charges at the end are a function of gap and
+voltage. Each term of the balance has its own integral::
 
     source work = change of the field energy + leakage + work of the attraction while the pad moves
                   + work of the field on the tributary lengths, which a vertical traction leaves out
@@ -14,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,7 @@ from evfem.common.arrays import NODES, WEIGHTS, Floats
 from evfem.common.constants import KILOVOLT
 from evfem.common.rooms import Column, Room
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.relaxation import Sandwich
+from evfem.electrostatics.relaxation import Sandwich, at_times
 from evfem.tensor import STEP
 from evfem.terms.traction import PadPath
 
@@ -62,6 +64,55 @@ class Flow:
         return np.array([self.source_work, self.leakage, square, self.seconds])
 
 
+class Straight:
+    """Within a step the voltage goes straight from its begin to its end."""
+
+    def bent(self, s: Any) -> Any:
+        """Transform (S, ...) at the rates s of what the voltage (V) has beyond the straight line."""
+        return 0.0
+
+    def beyond(self, time: Floats) -> tuple[Any, Any]:
+        """That voltage and its rate (T, 1) at times (T, 1) in s."""
+        return 0.0, 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class KeptCourse(Straight):
+    """In a step of so many `seconds` from `old` the charge of the electrode over eps_0 goes straight between
+    the two of `charge`: the sum of all nodes and of what is in `parallel` has one voltage with the transform
+
+    .. math:: U(s) = \\frac{Q(s) - \\sum_i L_i b_i(s)}{C_p + \\sum_i L_i a_i(s)},
+
+    with the charge density of a node a U + b (`Sandwich.on_electrode`), at the gaps of `old`. What these
+    change in the step comes on a straight line.
+    """
+
+    stack: Sandwich
+    old: Charged
+    parallel: float
+    charge: tuple[float, float]
+    seconds: float
+
+    def _voltage(self, s: Any) -> Any:
+        old, (first, last) = self.old, self.charge
+        slope, own = self.stack.on_electrode(old.gap, old.charges, s)
+        prescribed = first / s + (last - first) / (self.seconds * s**2)
+        left = np.sum(old.length * own, axis=-1, keepdims=True)
+        return (prescribed - left) / (self.parallel + np.sum(old.length * slope, axis=-1, keepdims=True))
+
+    @cached_property
+    def _rise(self) -> float:
+        """Mean rate of the voltage (V/s)."""
+        end = at_times(self._voltage, np.full((1, 1), self.seconds))
+        return (float(end[0, 0]) - self.old.voltage) / self.seconds
+
+    def bent(self, s: Any) -> Any:
+        return self._voltage(s) - self.old.voltage / s - self._rise / s**2
+
+    def beyond(self, time: Floats) -> tuple[Any, Any]:
+        return at_times(self.bent, time), at_times(lambda s: s * self.bent(s), time)
+
+
 class NoCharges:
     """Charges follow at once: the voltage of the display is that of every node."""
 
@@ -96,6 +147,7 @@ class Charging(NoCharges):
     """
 
     flows = True
+    _course: Straight
 
     def __init__(self, stack: Sandwich, nodes: int, parallel: float = 0.0) -> None:
         self.stack = stack
@@ -130,17 +182,24 @@ class Charging(NoCharges):
 
     @contextmanager
     def _instead(self, charged: Charged) -> Iterator[None]:
-        old, seconds = self.old, self.seconds
+        old, seconds, course = self.old, self.seconds, self._course
         self.begin(charged, 0.0)
         try:
             yield
         finally:
             self.begin(old, seconds)
+            self._course = course
 
     def begin(self, old: Charged, seconds: float) -> None:
         """A step begins at the state `old`."""
-        self.old, self.seconds = old, seconds
+        self.old, self.seconds, self._course = old, seconds, Straight()
         self._known: dict[tuple[bytes, float, bytes], tuple[Floats, Floats]] = {}
+
+    def keep(self, charge: float) -> None:
+        """In the step that has begun the electrode comes to this charge over eps_0."""
+        if self.seconds > 0.0:
+            now = self.electrode_charge(self.old)
+            self._course = KeptCourse(self.stack, self.old, self.parallel, (now, charge), self.seconds)
 
     def carried(self, length: Floats) -> Floats:
         """Charges (M, P) after motion: those of the begin of the step on other tributary lengths (P,)."""
@@ -152,7 +211,7 @@ class Charging(NoCharges):
     def after(self, gap: Any, voltage: float, length: Floats) -> Any:
         """The charges (M, P) at the end of the step, at the new position and voltage."""
         before = self.old.voltage if self.seconds > 0.0 else voltage
-        return self.stack.after(gap, self.carried(length), before, voltage, self.seconds)
+        return self.stack.after(gap, self.carried(length), before, voltage, self.seconds, self._course.bent)
 
     def effective(self, gap: Any, voltage: float, length: Floats) -> Any:
         """Effective voltage (P,) of the force law at the step's end; gaps (P,) may be complex."""
@@ -199,7 +258,7 @@ class Charging(NoCharges):
         by_gap = self.stack.fields(gap, at.voltage, self.after(gap, at.voltage, at.length))[2].imag / STEP
         # the charge that a node brings along does not grow with its length
         before = self.old.voltage if seconds > 0.0 else at.voltage
-        fresh = self.stack.after(at.gap, self.none, before, at.voltage, seconds)
+        fresh = self.stack.after(at.gap, self.none, before, at.voltage, seconds, self._course.bent)
         by_length = self.stack.fields(at.gap, at.voltage, fresh)[2]
         return np.asarray(at.length * by_gap), np.broadcast_to(by_length, at.gap.shape)
 
@@ -233,16 +292,18 @@ class Charging(NoCharges):
             source += 0.5 * (old.voltage + new.voltage) * more
             return Flow(float(eps_0 * source) + beside, 0.0, charge + float(more), 0.0)
         time, weight = self._times()
-        volts = old.voltage + (new.voltage - old.voltage) * (time / seconds)
-        charges = stack.after(new.gap, start[:, None], old.voltage, volts[:, None], time[:, None])
-        at = (new.gap, volts[:, None], charges)
+        rise = (new.voltage - old.voltage) / seconds
+        volts, course = old.voltage + rise * time[:, None], self._course
+        charges = stack.after(new.gap, start[:, None], old.voltage, volts, time[:, None], course.bent)
+        bent, faster = course.beyond(time[:, None])
+        at = (new.gap, volts := volts + bent, charges)
         leaked = float(np.sum(weight @ (stack.loss(*at) * new.length)))
         # by parts: the work of the displacement current is U D at the ends less the mean of D while U rises
         last = stack.fields(new.gap, new.voltage, new.charges)[0]
-        rise = (new.voltage - old.voltage) / seconds
         source += np.sum(new.length * (new.voltage * last - old.voltage * moved))
         crossing = stack.crossing(*at)
-        source += np.sum(weight @ ((volts[:, None] * crossing - rise * stack.fields(*at)[0]) * new.length))
+        power = volts * crossing - (rise + faster) * stack.fields(*at)[0]
+        source += np.sum(weight @ (power * new.length))
         charge += float(np.sum(new.length * (last - moved)) + np.sum(weight @ (crossing * new.length)))
         return Flow(float(eps_0 * source) + beside, float(eps_0 * leaked), charge, seconds)
 

@@ -23,7 +23,7 @@ from evfem.circuit.signals import FollowForce, VoltageProfile
 from evfem.common.arrays import Floats
 from evfem.common.rooms import Column
 from evfem.electrostatics.laws import Layers, eps_0
-from evfem.electrostatics.timesignals import NANO, ChargeControl, OpenCircuit
+from evfem.electrostatics.timesignals import FLIP, NANO, ChargeControl, OpenCircuit
 from evfem.errors import InputError
 from evfem.protocols import TimeSignal
 
@@ -174,7 +174,7 @@ class OpenSource(SignalSource):
     """A voltage until the electrode is disconnected, then its charge."""
 
     def control(self, moment: Moment, controls: Any) -> Any:
-        kept = moment.begin >= self.signal.after
+        kept = moment.begin >= self.signal.after * (1.0 - FLIP)  # times are sums of steps
         return controls.KeptCharge() if kept else super().control(moment, controls)
 
 

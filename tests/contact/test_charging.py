@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tools.meshes import between, held
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
@@ -53,6 +54,71 @@ def test_open_circuit_force_does_not_depend_on_the_gap():
     expected = 0.5 * eps_0 * (displacement + 5e2) ** 2
     np.testing.assert_allclose(pressure, expected, rtol=1e-12)
     assert np.ptp(volts) > 0.5 * np.max(volts)
+
+
+def plate(depth=0.38):
+    """A stiff plate of 4 mm with dry skin, whose motion changes no gap."""
+    at = np.meshgrid(np.linspace(0.0, 4.0, 5), np.linspace(0.0, 2.0, 3))
+    tissue = {"tissue": ev.LinearElastic(E=10.0, nu=0.0)}
+    return ev.MeshedFinger(held(between(*at, "quad9")), tissue, ev.Electrical(depth, 1650.0))
+
+
+def opened(motion, after=0.0, leak=1e-8, voltage=100.0):
+    source, display = ev.OpenCircuit(voltage, after), ev.Display(ev.FILM, friction=0.0)
+    drive = ev.Drive(gap_conductivity=leak, resolved=True)
+    return ev.simulate(ev.Scene(plate(), display, ev.StrongTroxel(), source, motion, drive=drive))
+
+
+@pytest.mark.parametrize("steps", [1, 3, 20])
+def test_a_kept_charge_that_leaks_has_its_voltage_after_steps_of_any_length(steps):
+    """U = D (s_1 + s_3 + g exp(-t / tau)) of the first displacement D, and what leaks is what the gap loses
+    of its energy; steps of up to 11 tau, of which none has a current.
+    """
+    result = opened([ev.Hover(0.25), ev.Wait(0.01, steps=steps)])
+    solid, tau = 0.38 / 1650.0 + ev.FILM.thickness / ev.FILM.eps_r, eps_0 / 1e-8
+    left = np.exp(-result.time / tau)
+    displacement = 100.0 / (solid + 0.25)
+    np.testing.assert_allclose(result.voltage, displacement * (solid + 0.25 * left), rtol=1e-6)
+    pull = 4.0 * 0.5 * eps_0 * (displacement * left) ** 2
+    np.testing.assert_allclose(result.electrostatic_force, pull, rtol=1e-4, atol=1e-9 * pull[0])
+    lost = 4.0 * 0.25 * 0.5 * eps_0 * displacement**2 * (1.0 - left[-1] ** 2)
+    assert result.leakage_dissipation[-1] == pytest.approx(lost, rel=1e-5)
+    assert np.ptp(result.source_work) < 1e-5 * lost
+    assert not any("charge" in one for one in result.warnings)
+
+
+@pytest.mark.parametrize("steps", [7, 10, 12])
+def test_an_electrode_is_disconnected_at_its_time_however_that_is_summed(steps):
+    """Ten tenths of 0.1 s are 0.09999999999999999 s."""
+    result = opened([ev.Hover(0.5), ev.Wait(0.1, steps=steps), ev.Hover(0.25)], after=0.1, leak=0.0)
+    capacity = 1.0 / (0.38 / 1650.0 + ev.FILM.thickness / ev.FILM.eps_r + result.min_gap[[-2, -1]])
+    assert result.voltage[-1] == pytest.approx(100.0 * capacity[0] / capacity[1], rel=1e-6)
+    assert result.charge[-1] == pytest.approx(result.charge[-2], rel=1e-9)
+
+
+def test_a_disconnection_within_a_step_and_works_of_a_kept_charge_are_told():
+    result = opened([ev.Hover(0.5), ev.Wait(0.2, steps=1), ev.Hover(0.1)], after=0.05, leak=0.0)
+    late, works = result.warnings
+    assert late.startswith(
+        "step 2: the electrode is disconnected at the end of this step, 0.2 s, not at 0.05 s"
+    )
+    wrong = result.source_work[2] - result.source_work[1]
+    assert works.startswith(f"source_work changes by {wrong:.2g} N mm/mm although no charge flows")
+    fine = opened([ev.Hover(0.5), ev.Wait(0.05), ev.Hover(0.1, steps=200)], after=0.05, leak=0.0)
+    assert not any("charge" in one for one in fine.warnings)
+    pull = 0.4 * fine.electrostatic_force[1]
+    assert fine.electrostatic_work[-1] - fine.electrostatic_work[1] == pytest.approx(pull, rel=0.01)
+
+
+def test_derivatives_by_the_moment_of_disconnection_say_where_there_is_none():
+    source, gap = ev.OpenCircuit(100.0, 0.01), [ev.Hover(0.5), ev.Wait(0.01, steps=3), ev.Hover(0.2)]
+    display, drive = ev.Display(ev.FILM, friction=0.0), ev.Drive(resolved=True)
+    scene = ev.Scene(plate(), display, ev.StrongTroxel(), source, gap, drive=drive)
+    found = ev.sensitivities(scene, ["electrostatics.signal.after", "electrostatics.signal.voltage"])
+    assert np.isnan(found["voltage", "electrostatics.signal.after"][-1])
+    assert "no longer on the other" in found.reasons["electrostatics.signal.after"]
+    by_voltage = found["voltage", "electrostatics.signal.voltage"]
+    np.testing.assert_allclose(by_voltage, ev.simulate(scene).voltage / 100.0, rtol=1e-4)
 
 
 #: a skin and an insulator with Debye poles, and their polarisations beside the charges
