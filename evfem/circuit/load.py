@@ -2,8 +2,10 @@
 
 Under a drive by its mean the load is a sum of admittances (`evfem.electrostatics.alternating`), one of
 each node of the pad with its own gap and tributary area, over the harmonics of the voltage. Of a bias
-there is no current, and of a square wave the harmonics up to the 31st count: an ideal edge has an infinite
-current. Resolved in time all three are those of the charges, `current_rms` and `power` over the step.
+there is no current, and of a square wave, the drive's or a signal, the harmonics up to the 31st count: an
+ideal edge has an infinite current, these have that of edges of 1/64 of the period. Samples are straight in
+between, so that an edge takes one of them. Resolved in time all three are those of the charges, `current_rms`
+and `power` over the step, which a jump takes.
 
 The air between two faces holds up to Paschen's voltage (`evfem.electrostatics.breakdown`), which the peak
 of the voltage across a gap must not reach, and a layer of the insulator up to the field of its `strength`.

@@ -83,6 +83,7 @@ Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 # A signal that repeats has `cycle`, its frequency (Hz), and `powers()`: its effective voltage (V), and the
 # orders of its harmonics and their fractions of the squared voltage. One that a `Drive` has by the name of
 # its kind also has `crest`, its peak over its effective voltage, and `harmonics()`, those without a bias.
+# One that has `jumps` has ideal edges, whose current is infinite.
 
 
 class _Periodic(Checked):

@@ -21,7 +21,7 @@ from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum, steady
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import Sandwich
 from evfem.electrostatics.roughness import NONE, distribution_of
-from evfem.electrostatics.timesignals import NANO, Carrier, ChargeControl, OpenCircuit
+from evfem.electrostatics.timesignals import NANO, WAVEFORMS, Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.faces import layer_thickness
 from evfem.protocols import TimeSignal
@@ -212,11 +212,12 @@ class Electrics:
 
     @property
     def smooth(self) -> Any:
-        """Which harmonics (H,) an amplifier with edges of its own has: of a square wave the first ones."""
+        """Which harmonics (H,) an amplifier with edges of its own has: of a voltage that jumps the first."""
         order = self.harmonics[0]
         assert self.drive is not None
-        ideal = waveform(self.drive, self.given) == "square" and powers(self.given) is None
-        return order < 2.0 * SINGLE if ideal else np.full(order.shape, True)
+        driven = WAVEFORMS[waveform(self.drive, self.given)]
+        jumps = hasattr(driven if powers(self.given) is None else self.given, "jumps")
+        return order < 2.0 * SINGLE if jumps else np.full(order.shape, True)
 
     def layers_at(self, frequency: float) -> Layers:
         """The solid layers at a frequency (Hz), with the gap that conducts."""

@@ -143,14 +143,37 @@ def test_a_finger_over_uneven_electrodes_joins_their_capacitors():
     assert runs[2].breakdown[0] == pytest.approx(over * runs[1].breakdown[0], rel=0.02)
 
 
-def test_a_square_wave_is_the_sum_of_its_first_sines():
-    drive = ev.Drive(frequency=200.0, waveform="square", skin="gabriel_dry")
-    square = ev.simulate(scene(drive=drive, roughness_gap=ROUGH))
+@pytest.mark.parametrize(
+    ("wave", "voltage"),
+    [
+        ({"frequency": 200.0, "waveform": "square"}, 50.0),
+        ({}, ev.Square(200.0, 50.0)),
+        ({}, ev.Square(200.0, 50.0, bias=30.0)),
+    ],
+)
+def test_a_square_wave_is_the_sum_of_its_first_sines(wave, voltage):
+    """Of 50 V to both sides, whoever gives it; a bias has no current."""
+    drive = ev.Drive(**wave, skin="gabriel_dry")
+    square = ev.simulate(scene(drive=drive, voltage=voltage, roughness_gap=ROUGH))
     order = np.arange(1.0, 32.0, 2.0)
     admittance = 1.0 / ev.electrical_impedance(square, 200.0 * order).impedance
     volts = 50.0**2 * 8.0 / (np.pi * order) ** 2
     assert square.power[-1] == pytest.approx((volts * admittance.real).sum(), rel=1e-10)
     assert square.current_rms[-1] == pytest.approx(np.sqrt((volts * abs(admittance) ** 2).sum()), rel=1e-10)
+
+
+@pytest.mark.parametrize("samples", [64, 256])
+def test_edges_of_samples_take_one_of_them(samples):
+    """A capacitor has C dU/dt, 2 U in 1/(N f), twice in a period: effective C 2 U f sqrt(2 N); with 64
+    samples that is the current of a square wave.
+    """
+    steps = ev.Sampled(np.repeat([50.0, -50.0], samples // 2), 200.0 * samples, repeat=True)
+    found = ev.simulate(scene(drive=ev.Drive(), voltage=steps, roughness_gap=ROUGH))
+    farad = abs(1.0 / ev.electrical_impedance(found, 200.0).impedance[0]) / (2.0 * np.pi * 200.0)
+    expected = farad * 2.0 * 50.0 * 200.0 * (2.0 * samples) ** 0.5
+    assert found.current_rms[-1] == pytest.approx(expected, rel=5e-3)
+    square = ev.simulate(scene(drive=ev.Drive(), voltage=ev.Square(200.0, 50.0), roughness_gap=ROUGH))
+    assert square.current_rms[-1] == pytest.approx(expected * (64.0 / samples) ** 0.5, rel=2e-3)
 
 
 RESOLVED = ev.Drive(skin="gabriel_dry", gap_conductivity=1e-8, resolved=True)
