@@ -21,10 +21,13 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.notices import warn
 from evfem.common.tables import read_bytes
 from evfem.errors import InputError
 
 FORM = "evfem-voltage-1"
+#: fraction of a sample that counts as rounding of a time
+EDGE = 1e-6
 KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
 #: bits of a sample -> the largest one
 LARGEST = {16: 2**15 - 1, 24: 2**23 - 1, 32: 2**31 - 1}
@@ -159,21 +162,49 @@ def intensity(path: Path, key: str, rate: float, tap: float) -> Floats:
       the amplitude between its breakpoints, from 0 at time 0; the emphasis of one is a transient event.
     - Waveforms of Android, `VibrationEffect.createWaveform`: XML, or JSON with its arguments.
 
+    It is 0 from its end on. Events and crests between two samples, which do not hold them, are warned of.
     Raises InputError for a file that is missing, damaged, without events, with envelopes of events, parts
     that the device makes or that repeat, or longer than 1,000,000 samples.
     """
     with _parsed(path, key, PATTERN) as whole:
         events, points, controls = _pattern(whole, path, key, tap)
         ends = [*(end for _, end, _ in events), *(time for time, _ in points)]
-        size = int(np.ceil(max(ends) * rate)) + 1
+        size = _sample(max(ends), rate) + 1
     if not 1 < size <= MOST_PATTERN:
         raise InputError(key, f"{path.name} with {size} samples", f"2 to {MOST_PATTERN} samples")
     time = np.arange(size) / rate
-    found = np.interp(time, *np.array(points).T) * (time < points[-1][0]) if points else np.zeros(size)
+    found = np.interp(time, *np.array(points).T) if points else np.zeros(size)
+    found[_sample(points[-1][0], rate) if points else size :] = 0.0
     for start, end, strength in events:
-        inside = (time >= start) & (time < end)
+        inside = slice(_sample(start, rate), _sample(end, rate))
         found[inside] = np.maximum(found[inside], strength)
+    _warn_of_lost(path.name, events, points, rate)
     return np.asarray(found * _control(controls, time))
+
+
+def _sample(time: float, rate: float) -> int:
+    """The first sample at a time (s) or after it, to rounding; from 0 on."""
+    return max(int(np.ceil(time * rate - EDGE)), 0)
+
+
+def _warn_of_lost(name: str, events: list[Event], points: list[Point], rate: float) -> None:
+    """A warning where samples at `rate` (Hz) have nothing of an event, or less than half of a crest of
+    points; it says which rate holds them.
+    """
+    short = [
+        end - start
+        for start, end, strength in events
+        if strength > 0.0 and 0.0 <= start < end and _sample(start, rate) == _sample(end, rate)
+    ]
+    if len(points) > 2:
+        time, value = np.array(points).T
+        beside = (np.interp(side(time * rate) / rate, time, value) for side in (np.floor, np.ceil))
+        crests = np.flatnonzero(value > 2.0 * np.maximum(*beside))
+        crests = crests[(crests > 0) & (crests < time.size - 1)]
+        short += (0.5 * (time[crests + 1] - time[crests - 1])).tolist()
+    if short:
+        lost = f"{len(short)} events or crests last less than a sample of {1e3 / rate:.4g} ms and are lost"
+        warn(f"{name}: {lost}; a rate of {np.ceil(1.0 / max(min(short), 1e-9) - EDGE):.10g} Hz holds them")
 
 
 def _pattern(whole: Any, path: Path, key: str, tap: float) -> tuple[list[Event], list[Point], list[Any]]:

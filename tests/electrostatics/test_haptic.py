@@ -62,6 +62,43 @@ def test_a_waveform_of_android_has_steps(tmp_path, name, text):
     assert found.voltage.size == 271
 
 
+def transient(path, time):
+    event = {"Time": time, "EventType": "HapticTransient", "EventParameters": []}
+    path.write_text(json.dumps({"Version": 1.0, "Pattern": [{"Event": event}]}))
+    return path
+
+
+def test_a_pattern_ends_at_0(tmp_path):
+    """Of 10 ms from a whole millisecond on ten samples are on, though 0.033 s + 0.01 s rounds up."""
+    for start in range(0, 2000, 11):
+        found = ev.Sampled.from_haptic(transient(tmp_path / "a.ahap", start / 1e3), 100.0)
+        assert found.voltage.tolist() == [0.0] * start + [100.0] * 10 + [0.0]
+        assert found(100.0) == 0.0
+    rows = [{"time": t, "amplitude": 0.5} for t in (0.0, 0.033 + 0.01)]
+    assert ev.Sampled.from_haptic(meta(tmp_path / "a.haptic", rows), 100.0)(1.0) == 0.0
+
+
+PULSES = {"timings": [101, 5, 101, 5, 100], "amplitudes": [0, 255, 0, 255, 0]}
+CREST = [{"time": t, "amplitude": a} for t, a in ((0.0, 0.0), (0.1002, 0.0), (0.1004, 1.0), (0.1006, 0.0))]
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "rate", "holds"),
+    [
+        ("a.json", lambda path: path.write_text(json.dumps(PULSES)), 50.0, 200.0),
+        ("a.ahap", lambda path: transient(path, 0.1003), 1000.0, 2000.0),
+        ("a.haptic", lambda path: meta(path, CREST), 1000.0, 5000.0),
+    ],
+)
+def test_events_between_two_samples_are_told_with_a_rate_that_holds_them(tmp_path, name, write, rate, holds):
+    path = tmp_path / name
+    write(path)
+    told = rf"{name}: \d events or crests last .* {1e3 / rate:g} ms .*; a rate of {holds:g} Hz holds them"
+    with pytest.warns(UserWarning, match=told):
+        assert not ev.Sampled.from_haptic(path, 100.0, rate=rate, tap=5e-4).voltage.any()
+    assert ev.Sampled.from_haptic(path, 100.0, rate=holds, tap=5e-4).largest > 70.0
+
+
 def test_timings_alone_begin_with_off(tmp_path):
     (tmp_path / "a.json").write_text(json.dumps({"timings": [10, 20, 30]}))
     found = ev.Sampled.from_haptic(tmp_path / "a.json", 100.0)
