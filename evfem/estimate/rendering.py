@@ -16,6 +16,7 @@ import numpy as np
 
 from evfem.circuit.encoding import Encoding, share_not_renderable
 from evfem.circuit.signals import Amplifier, FollowForce, VoltageProfile
+from evfem.common.tables import MOST_ROWS
 from evfem.common.views import plus
 from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.drive import Drive
@@ -30,6 +31,8 @@ from evfem.tensor import Array
 
 #: friction below that of the display by less than this fraction counts as solver noise
 NOISE = 1e-6
+#: straight pieces of a voltage keep its square this close to the target, as a fraction of the largest one
+CHORD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +125,7 @@ def _slide_rows(result: Result) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """An effective voltage over the position, and its error by the closed forms.
+    """An effective voltage over the position, and its error by the closed forms, over the path.
 
     `share_not_renderable`: fraction of the path on which the target is below the display's own friction (no
     loss while the finger still sticks at the start). Voltages in V: `largest`, `rms` over the path,
@@ -157,7 +160,9 @@ def voltage_for(
     with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear area law (m =
     1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops out. Otherwise the area
     law needs the force of `depth` mm. The voltage is 0 where the target is below the display's friction.
-    `amplifier` limits the profile (its slew needs the `speed` along x in mm/s).
+    Forces are straight between the positions of `reference`, and so is the square of the voltage: the profile
+    has rows in between, which keep it within 0.1 % of the largest one. `amplifier` limits the profile (its
+    slew needs the `speed` along x in mm/s).
 
     >>> from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
     >>> from evfem.circuit.encoding import AreaLaw
@@ -169,19 +174,19 @@ def voltage_for(
     (1776.73, 0.0)
     >>> limited = voltage_for(felt, display, amplifier=Amplifier(voltage_max=1000.0))
     >>> limited.largest, round(limited.share_limited, 3), round(limited.error_of_amplifier, 3)
-    (1000.0, 0.859, 0.098)
+    (1000.0, 0.921, 0.104)
     """
     if not isinstance(reference, ApparentFriction):
         raise InputError(
             "reference", describe_value(reference), "an ApparentFriction, as apparent_friction makes it"
         )
     x = reference.position
-    force = depth * reference.normal_force
-    voltage = display.voltage_for_friction(np.maximum(reference.friction, 0.0), force)
-    wish = VoltageProfile(x, np.broadcast_to(voltage, x.shape))
+    wish = _wish(reference, display, depth)
     profile = wish if amplifier is None else amplifier.limit(wish, speed)
-    felt, limited = (display.tangential_force(force, signal(x)) / depth for signal in (wish, profile))
-    size = float(np.linalg.norm(reference.tangential_force)) or 1.0
+    at, weight = _quadrature(np.concatenate([x, wish.position, profile.position]), x[0], x[-1])
+    wanted, force = (np.interp(at, x, of) for of in (reference.tangential_force, reference.normal_force))
+    felt, limited = (display.tangential_force(depth * force, of(at)) / depth for of in (wish, profile))
+    size = _norm(wanted, weight) or 1.0
     largest = float(np.max(profile.voltage))
     return Signal(
         profile=profile,
@@ -189,11 +194,57 @@ def voltage_for(
         largest=largest,
         rms=profile.rms(float(x[0]), float(x[-1])),
         carrier=display.peak(largest),
-        error_of_display=float(np.linalg.norm(felt - reference.tangential_force)) / size,
-        error_of_amplifier=float(np.linalg.norm(limited - felt)) / size,
+        error_of_display=_norm(felt - wanted, weight) / size,
+        error_of_amplifier=_norm(limited - felt, weight) / size,
         share_limited=_share_apart(wish, profile),
         limited_by="" if amplifier is None else amplifier.stops(wish),
     )
+
+
+def _wish(reference: ApparentFriction, display: Encoding, depth: float) -> VoltageProfile:
+    """The voltage of a display, with the rows of `reference`, those where the target crosses the display's
+    own friction, and between these as many, even in the voltage, as `CHORD` asks: a chord of dU misses U^2
+    by dU^2 / 4.
+    """
+    given = reference.position, reference.normal_force, reference.tangential_force
+
+    def at(row: Array) -> tuple[Array, Array]:
+        x, load, force = (np.interp(row, np.arange(len(of)), of) for of in given)
+        return x, np.asarray(display.voltage_for_friction(np.maximum(force / load, 0.0), depth * load))
+
+    excess = given[2] - display.friction * given[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = excess[:-1] / (excess[:-1] - excess[1:])
+    whole = np.arange(len(excess), dtype=float)
+    row = np.sort(np.append(whole, (whole[:-1] + share)[(share > 0.0) & (share < 1.0)]))
+    x, volts = at(row)
+    rise = np.where(np.diff(x) > 0.0, np.abs(np.diff(volts)), 0.0) / (volts.max() or 1.0)
+    pieces = np.clip(np.ceil(rise / np.sqrt(4.0 * CHORD)), 1, max(MOST_ROWS // row.size, 1)).astype(int)
+    return VoltageProfile(*at(np.append(_between(row, volts, pieces), row[-1])))
+
+
+def _between(row: Array, volts: Array, pieces: Array) -> Array:
+    """Rows (sum of `pieces`,) that divide each way from row to row evenly in the voltage, whose square is
+    straight there.
+    """
+    first, last, start, way, count = (
+        np.repeat(of, pieces) for of in (volts[:-1], volts[1:], row[:-1], np.diff(row), pieces)
+    )
+    part = (np.arange(count.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / count
+    squares = part * (2.0 * first + part * (last - first))
+    return start + way * squares / np.where(count > 1, first + last, 1.0)
+
+
+def _quadrature(rows: Array, start: float, stop: float) -> tuple[Array, Array]:
+    """Positions and weights (mm) of Gauss's rule with two points between rows (mm) from start to stop."""
+    edges = np.unique(np.clip(rows, start, stop))
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    at = np.concatenate([middle - half / np.sqrt(3.0), middle + half / np.sqrt(3.0)])
+    return at, np.concatenate([half, half])
+
+
+def _norm(values: Array, weight: Array) -> float:
+    return float(np.sqrt(np.sum(weight * values**2)))
 
 
 def _share_apart(one: VoltageProfile, other: VoltageProfile) -> float:
