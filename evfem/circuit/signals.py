@@ -289,10 +289,16 @@ class Amplifier:
             found["slew_rate"] = self.slew_rate / swing
         return found
 
-    def stops(self, profile: VoltageProfile) -> str:
-        """The name of the limit that cuts a profile off, empty if none does."""
+    def stops(self, profile: VoltageProfile, speed: float | None = None) -> str:
+        """The names of the limits that act on a profile at `speed` (mm/s): the one that cuts it off, then
+        `slew` where what is left is steeper, with a comma in between; empty if none does.
+        """
         name = min(self.limits, key=lambda one: self.limits[one])
-        return name if np.abs(profile.voltage).max() > self.limits[name] else ""
+        found = [name] if np.abs(profile.voltage).max() > self.limits[name] else []
+        if self.slew is not None and speed is not None:
+            fastest = self._clipped(profile).steepest() * speed
+            found += ["slew"] if fastest > self.slew * (1.0 + 1e-9) else []
+        return ", ".join(found)
 
     def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
         """The profile cut off at the smallest of its `limits`, then followed no faster than `slew` at `speed`

@@ -131,7 +131,8 @@ class Signal:
     loss while the finger still sticks at the start). Voltages in V: `largest`, `rms` over the path,
     `carrier` (peak of the display's waveform at the largest). `error_of_display`: relative L2 error of the
     friction force by (16a), (16b) without the amplifier, `error_of_amplifier` the change by the amplifier,
-    relative to the target; `share_limited` the fraction of the path on which it limits.
+    relative to the target; `share_limited` the fraction of the path on which it limits, `limited_by` the
+    names of its limits that do.
     """
 
     profile: VoltageProfile
@@ -197,7 +198,7 @@ def voltage_for(
         error_of_display=_norm(felt - wanted, weight) / size,
         error_of_amplifier=_norm(limited - felt, weight) / size,
         share_limited=_share_apart(wish, profile),
-        limited_by="" if amplifier is None else amplifier.stops(wish),
+        limited_by="" if amplifier is None else amplifier.stops(wish, speed),
     )
 
 

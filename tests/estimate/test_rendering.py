@@ -125,6 +125,19 @@ def test_between_two_rows_the_force_is_straight_not_the_voltage(area):
     assert max(one.error_of_display for one in (even, grown)) < 1e-3
 
 
+@pytest.mark.parametrize(
+    ("most", "slew", "names"),
+    [(2.0, 0.5, "slew"), (0.9, 0.5, "voltage_max, slew"), (0.5, 50.0, "voltage_max"), (2.0, 50.0, "")],
+)
+def test_the_limits_that_act_are_named(most, slew, names):
+    """A rise to U over 1 mm at 1 mm/s, at first 1/16 U in 1/256 mm: 16 U/s."""
+    U = voltage_for(felt([0.2, 0.3, 0.3]), encoding(0.2)).largest
+    amplifier = ev.Amplifier(most * U, slew=slew * U)
+    found = voltage_for(felt([0.2, 0.3, 0.3]), encoding(0.2), amplifier=amplifier, speed=1.0)
+    assert found.limited_by == names
+    assert (found.share_limited > 0.0) == bool(names)
+
+
 def test_rows_at_one_position_stay_a_jump():
     wish = ApparentFriction([0.0, 1.0, 1.0, 2.0], np.full(4, 0.05), 0.05 * np.array([0.2, 0.2, 0.4, 0.4]))
     signal = voltage_for(wish, encoding(0.2))
