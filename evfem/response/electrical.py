@@ -2,8 +2,9 @@
 
 The state is the last one of a scene. The nodes of the pad are in parallel, each a stack of skin, gap and
 insulator over its own gap and tributary area (`evfem.electrostatics.alternating`), with the separation of
-rough faces, whatever the law of the attraction. Voltages are small, or slow beside the finger: it does not
-move.
+rough faces, whatever the law of the attraction, and a `parallel_capacitance` of the voltage is in parallel
+with them, as in the columns `charge`, `current_rms` and `power`. Voltages are small, or slow beside the
+finger: it does not move.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.circuit.load import admittance_of
+from evfem.circuit.load import PER_MM, admittance_of
 from evfem.common.arrays import Floats, blas_limits
 from evfem.common.checks import Values, to_python
 from evfem.common.storage import write_text
@@ -74,7 +75,8 @@ def electrical_impedance(
     ----------
     scene
         A `Scene` with a law, the path of a scene file, or a result, whose scene is run again. Its
-        `drive` says what skin and gap conduct; the voltage only loads the finger, and may be 0.
+        `drive` says what skin and gap conduct; the voltage only loads the finger, and may be 0, but
+        its `parallel_capacitance` (cable, amplifier) counts.
     frequencies
         In Hz, larger than 0.
 
@@ -111,7 +113,8 @@ def electrical_impedance(
     model = run.model
     attraction = make_attraction(model.closing, model.pad, model.surface)
     pad = model.equilibrium.pad_state(run.state)
-    each = [admittance_of(model, attraction, pad, float(one)) for one in frequency]
+    beside = 2j * np.pi * PER_MM * model.closing.electrics.parallel
+    each = [admittance_of(model, attraction, pad, float(one)) + beside * one for one in frequency]
     in_space = model.mesh.dim == 3
     whole = 1.0 if in_space or scene.depth is None else scene.depth
     unit = "ohm" if in_space or scene.depth is not None else "ohm mm"

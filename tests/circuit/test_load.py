@@ -107,6 +107,35 @@ def test_without_losses_it_is_a_capacitor():
     assert driven.charge[-1] == pytest.approx(driven.current_rms[-1] / (1e3 * np.pi), rel=1e-12)
 
 
+def test_a_cable_beside_the_finger_is_in_the_impedance_as_in_the_columns():
+    """A charge of 0.02 nC/mm that swings; 0.01 nF/mm beside the finger are a capacitor, 0.1 nF over 10 mm."""
+    found = []
+    for beside in (0.0, 0.01):
+        charge = ev.ChargeControl(ev.Sine(100.0, 0.02), parallel_capacitance=beside)
+        approach = (ev.Hover(gap=0.05), ev.Wait(0.02, steps=80))
+        result = ev.simulate(scene(ev.Drive(resolved=True), charge, approach, depth=10.0))
+        volts, current = (np.sqrt((of[-40:] ** 2).mean()) for of in (result.voltage, result.current_rms))
+        found.append(ev.electrical_impedance(result, 100.0))
+        assert found[-1].current_rms(volts)[0] == pytest.approx(10.0 * current, rel=2e-3)
+    alone, both = (1.0 / one.impedance[0] for one in found)
+    assert both - alone == pytest.approx(2j * np.pi * 100.0 * 1e-10, rel=1e-9)
+
+
+def test_in_space_a_charge_is_in_nanocoulombs_and_a_capacitance_in_nanofarads():
+    found = []
+    for beside in (0.0, 0.1):
+        charge = ev.ChargeControl(0.02, parallel_capacitance=beside)
+        motion = ev.Press(indentation=0.2, steps=1), ev.Wait(0.01, steps=1)
+        tip = dome_scene(
+            *motion, law=ev.StrongTroxel(), voltage=charge, surface=SCREEN, drive=ev.Drive(resolved=True)
+        )
+        result = ev.simulate(tip)
+        assert result.charge[-1] == pytest.approx(0.02e-9, rel=1e-9)
+        found.append(1.0 / ev.electrical_impedance(result, 100.0).impedance[0])
+        assert found[-1].imag == pytest.approx(200.0 * np.pi * 0.02e-9 / result.voltage[-1], rel=1e-6)
+    assert np.diff(found)[0] == pytest.approx(200j * np.pi * 0.1e-9, rel=1e-6)
+
+
 def test_electrodes_that_end_and_a_finger_without_ground_are_capacitors_in_series():
     """Of two halves one is live: half of the current; without ground the finger joins both, with half of
     that, and half of the voltage over each gap.
