@@ -51,9 +51,9 @@ HEADER = {"time": "s", "voltage": "V"}
 LARGEST, FASTEST = 1e6, 1e9
 #: coulombs, or farads, per metre of depth in a nanocoulomb, or nanofarad, per millimetre
 NANO = 1e-6
-#: largest charge (nC per mm of depth)
+#: largest charge (nC per mm of depth, in space nC)
 MOST_CHARGE = 1e6
-#: largest capacitance beside the finger (nF per mm of depth)
+#: largest capacitance beside the finger (nF per mm of depth, in space nF)
 MOST_CAPACITANCE = 1e3
 #: fraction of the fluctuation's power that lies below the highest frequency of samples
 POWER = 0.95
@@ -68,14 +68,14 @@ _BIAS = number(f"a voltage in V between -{LARGEST:g} and {LARGEST:g}", Within(-L
 _PHASE = number("a phase in rad", Within(), "rad")
 RATE = number(f"a rate in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True), "Hz")
 START = number("a time in s", Within(), "s")
-_CHARGE = "a charge in nC per mm of depth, or a signal in time that is called with times"
+_CHARGE = "a charge in nC per mm of depth (in space nC), or a signal in time that is called with times"
 _ENVELOPE = "a voltage in V, or a signal in time that is called with times"
 _NUMBER_OR_SIGNAL = {"type": float | dict, "kinds": lambda: SIGNALS, "tag": "kind"}
 Frequency = Annotated[float, FREQUENCY, "of the sine, square wave or carrier"]
 Parallel = Annotated[
     float,
     number(f"a capacitance in nF/mm from 0 to {MOST_CAPACITANCE:g}", Within(0.0, MOST_CAPACITANCE), "nF/mm"),
-    "beside the finger, of cable, amplifier and the rest of the electrode, per mm of depth",
+    "beside the finger, of cable, amplifier and the rest of the electrode; in space in nF",
 ]
 Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 
@@ -216,7 +216,8 @@ class ChargeControl:
     A plate of the area A under the charge Q is pulled by Q^2 / (2 eps_0 A), however far it is. What is
     beside the finger, `parallel_capacitance`, takes a share of the charge, C_p U: a plate with the capacity
     C_0 that comes from the gap g on a spring is then stable up to the travel g/3 (1 + C_0 / C_p). A metre of
-    coaxial cable, 100 pF, is 0.01 nF/mm over a depth of 10 mm, and tens of times as much as a finger.
+    coaxial cable, 100 pF, is 0.01 nF/mm over a depth of 10 mm, in space 0.1 nF, and tens of times as much as
+    a finger.
 
     >>> ChargeControl(0.02).charge_at(0.5)
     0.02
@@ -225,7 +226,7 @@ class ChargeControl:
     charge: Annotated[
         Any,
         {"allowed": "a charge in nC/mm, or a signal of charges", "unit": "nC/mm", **_NUMBER_OR_SIGNAL},
-        "of the electrode, per mm of depth: a number, or a signal of charges",
+        "of the electrode, in space in nC: a number, or a signal of charges",
     ]
     parallel_capacitance: Parallel = 0.0
     kind = "charge"
@@ -247,7 +248,7 @@ class ChargeControl:
         return self.charge.highest_frequency if isinstance(self.charge, TimeSignal) else 0.0
 
     def charge_at(self, time: float) -> float:
-        """Charge in nC per mm of depth at `time` (s)."""
+        """Charge at `time` (s): nC, in the plane per mm of depth."""
         return float(self.charge(time) if isinstance(self.charge, TimeSignal) else self.charge)
 
     def __call__(self, time: Values) -> Values:

@@ -42,15 +42,16 @@ _MASS = number("a mass in t, not negative, up to 1e3", Within(0.0, 1e3), "t")
 
 @dataclass(frozen=True)
 class Hand(Room):
-    """Spring (N/mm), damper (N s/mm) and mass (t) between drive and bone, per mm of depth.
+    """Spring (N/mm), damper (N s/mm) and mass (t) between drive and bone, in the plane per mm
+    of depth.
 
     >>> Hand(stiffness=0.1)
     Hand(stiffness=0.1, damping=0.0, mass=0.0)
     """
 
-    stiffness: Annotated[float, _STIFFNESS, "of the spring, per mm of depth"]
-    damping: Annotated[float, _DAMPING, "of the damper beside it, per mm of depth"] = 0.0
-    mass: Annotated[float, _MASS, "that moves with the bone, per mm of depth"] = 0.0
+    stiffness: Annotated[float, _STIFFNESS, "of the spring, in the plane per mm of depth"]
+    damping: Annotated[float, _DAMPING, "of the damper beside it, in the plane per mm of depth"] = 0.0
+    mass: Annotated[float, _MASS, "that moves with the bone, in the plane per mm of depth"] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)
