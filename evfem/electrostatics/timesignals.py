@@ -43,7 +43,7 @@ from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, read_columns
 from evfem.electrostatics import wav
 from evfem.electrostatics.alternating import PERIODS, SMOOTH, grouped, shares, square_harmonics
-from evfem.errors import ABSENT, InputError
+from evfem.errors import InputError
 from evfem.protocols import TimeSignal
 
 HEADER = {"time": "s", "voltage": "V"}
@@ -402,21 +402,15 @@ class Sampled:
     def from_wav(
         cls, path: str | Path, full_scale: float | None = None, *, start: float = 0.0, repeat: bool = False
     ) -> Sampled:
-        """Read a WAV with one channel; `full_scale` (V) is the voltage of the largest sample.
+        """Read a WAV with one channel; `full_scale` (V) is the voltage of the largest sample that its
+        integers can have, and of 1.0 in a file of floats, where a warning tells larger ones.
 
         A file that evfem wrote says so itself; one with a carrier is the voltage of the moment.
         Raises InputError for a missing, cut off or foreign file, for one without either full
         scale, and for more than 1,000,000 samples.
         """
-        rate, samples, scale = wav.read(Path(path), "path")
-        if samples.size > MOST_ROWS:
-            raise InputError("path", f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
-        if full_scale is None and not scale:
-            needed = "the voltage of the largest sample, in V, for a WAV that evfem did not write"
-            raise InputError("full_scale", ABSENT, needed)
-        scale_V = scale["full_scale_V"] if full_scale is None else full_scale
-        volts = above("full_scale", scale_V, 0.0, "a voltage in V above zero")
-        return cls(volts * wav.normalised_samples(samples, scale.get("bits", 0)), rate, start, repeat)
+        rate, volts = wav.voltages(Path(path), "path", full_scale)
+        return cls(volts, rate, start, repeat)
 
     @classmethod
     def from_haptic(

@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.checks import above
 from evfem.common.notices import warn
-from evfem.common.tables import read_bytes
-from evfem.errors import InputError
+from evfem.common.tables import MOST_ROWS, read_bytes
+from evfem.errors import ABSENT, InputError
 
 FORM = "evfem-voltage-1"
 #: fraction of a sample that counts as rounding of a time
@@ -133,6 +134,25 @@ def normalised_samples(samples: Any, bits: int = 0) -> Floats:
     if samples.dtype.kind == "u":  # 8 bit, around 128
         return (samples.astype(float) - 128.0) / 127.0
     return np.asarray(samples / float(np.iinfo(samples.dtype).max))
+
+
+def voltages(path: Path, key: str, full_scale: float | None) -> tuple[int, Floats]:
+    """Rate (Hz) and voltages (n,) in V of a WAV with one channel, by `full_scale` (V) or evfem's comment;
+    floats beyond 1.0, which is full scale, are kept and warned of.
+    """
+    rate, samples, scale = read(path, key)
+    if samples.size > MOST_ROWS:
+        raise InputError(key, f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
+    if full_scale is None and not scale:
+        needed = "the voltage of the largest sample, 1.0 of floats, in V, for a WAV that evfem did not write"
+        raise InputError("full_scale", ABSENT, needed)
+    given = scale["full_scale_V"] if full_scale is None else full_scale
+    volts = above("full_scale", given, 0.0, "a voltage in V above zero")
+    found = normalised_samples(samples, scale.get("bits", 0))
+    if samples.dtype.kind == "f" and (most := float(np.abs(found).max())) > 1.0:
+        many = f"{np.sum(np.abs(found) > 1.0)} of {found.size} samples"
+        warn(f"{path.name}: {many} are beyond 1.0, which is full scale, and make up to {volts * most:.6g} V")
+    return rate, np.asarray(volts * found)
 
 
 @contextmanager

@@ -205,7 +205,9 @@ class SampledTable:
         str | None, _path("the path of a csv file with the header time,voltage, or of a .wav"), "the samples"
     ] = None
     full_scale: Annotated[
-        float | None, number("the voltage of the largest sample of a .wav, in V", Within(), "V"), "of a .wav"
+        float | None,
+        number("the voltage of the largest sample of a .wav, 1.0 of floats", Within(), "V"),
+        "of a .wav",
     ] = None
     voltage: Annotated[
         list[float] | None, instance("samples in V", list, unit="V"), "the samples in the scene file"

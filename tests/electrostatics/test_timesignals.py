@@ -1,6 +1,7 @@
 """Voltages over time: their values, the frequencies of their squares, and samples from files."""
 
 import struct
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -121,6 +122,17 @@ def test_any_wav_with_one_channel_is_read(tmp_path, dtype):
     np.testing.assert_allclose(signal.voltage, 200.0 * shape, atol=200.0 / steps)
     with pytest.raises(ev.InputError, match="full_scale: missing"):
         ev.Sampled.from_wav(tmp_path / "own.wav")
+
+
+def test_floats_beyond_full_scale_are_larger_voltages_and_told(tmp_path):
+    """1.0 is full scale in a WAV of floats, whether a sample has it or not."""
+    for largest in (0.5, 2.0):
+        samples = np.array([0.0, largest, -0.25], dtype="float32")
+        wavfile.write(tmp_path / "own.wav", 8000, samples)
+        loud = pytest.warns(UserWarning, match=r"own.wav: 1 of 3 samples are beyond 1.0, .* up to 400 V")
+        with loud if largest > 1.0 else nullcontext():
+            signal = ev.Sampled.from_wav(tmp_path / "own.wav", full_scale=200.0)
+        assert signal.voltage.tolist() == [0.0, 200.0 * largest, -50.0]
 
 
 def test_a_wav_of_evfem_says_its_full_scale_and_plays_with_its_carrier(tmp_path):
