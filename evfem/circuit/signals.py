@@ -26,6 +26,8 @@ HEADER = {"position": "mm", "voltage": "V"}
 LARGEST = 1e6
 #: share of the largest voltage by which a wave swings that matters
 SWING = 0.05
+#: of a position that is at a jump, in mm, beyond 1 mm as a fraction of it
+ROUNDING = 1e-12
 _POSITION = {"allowed": "positions in mm that never fall", "type": list[float], "unit": "mm"}
 _FORCE = {"allowed": "as many forces in N/mm", "type": list[float], "unit": "N/mm"}
 _LARGEST = number(f"a voltage in V, above 0, up to {LARGEST:g}", Within(0.0, LARGEST, above=True), "V")
@@ -36,7 +38,8 @@ class VoltageProfile:
     """Voltage in V over the position in mm: linear between the rows, constant beyond the first and the last.
 
     Positions must not fall; at a repeated position the later row holds from that position on (a
-    jump). Calling the profile with positions gives voltages of the same shape.
+    jump), to rounding and on the way back too. Calling the profile with positions gives voltages of
+    the same shape.
 
     >>> profile = VoltageProfile([0.0, 5.0, 5.0], [0.0, 100.0, 400.0])
     >>> profile(2.5), profile(5.0), profile(9.0)
@@ -59,7 +62,7 @@ class VoltageProfile:
 
     def __call__(self, position: Values) -> Values:
         """Voltage in V at `position` in mm."""
-        return to_python(piecewise_linear(self.position, self.voltage, position))
+        return to_python(piecewise_linear(self.position, self.voltage, _at_jumps(self.position, position)))
 
     def jumps(self, begin: float, end: float) -> tuple[Floats, Floats, Floats]:
         """Positions (mm) at which it jumps on the way from `begin` to `end`, in their order, and the voltages
@@ -69,7 +72,7 @@ class VoltageProfile:
         >>> [one.tolist() for one in profile.jumps(6.0, 4.0)]
         [[5.0], [400.0], [100.0]]
         """
-        x, low, high = self.position, min(begin, end), max(begin, end)
+        x, (low, high) = self.position, sorted(_at_jumps(self.position, [begin, end]).tolist())
         row = np.flatnonzero((np.diff(x) == 0.0) & (x[1:] > low) & (x[1:] <= high))
         before, after = self.voltage[row], self.voltage[row + 1]
         return (x[row], before, after) if end >= begin else (x[row][::-1], after[::-1], before[::-1])
@@ -104,6 +107,17 @@ class VoltageProfile:
         if rise.size == 0:
             return 0.0
         return float(np.max(rise / run)) if np.all(run > 0) else float("inf")
+
+
+def _at_jumps(position: Floats, x: Values) -> Any:
+    """Positions x (...) in mm, those within rounding of a jump of rows at `position` moved to it: steps of a
+    slide miss it by a bit or two.
+    """
+    x, jumps = np.real(x), position[1:][np.diff(position) == 0.0]
+    if jumps.size == 0:
+        return x
+    after = jumps[np.minimum(np.searchsorted(jumps, x), jumps.size - 1)]
+    return np.where(np.abs(after - x) <= ROUNDING * np.maximum(np.abs(after), 1.0), after, x)
 
 
 def mean_squares(profile: VoltageProfile, edges: Floats) -> Floats:
@@ -217,7 +231,9 @@ class FollowForce:
 
     def __call__(self, position: Values) -> Values:
         """Wished force in N/mm at `position` in mm."""
-        return to_python(piecewise_linear(self.position, self.tangential_force, position))
+        return to_python(
+            piecewise_linear(self.position, self.tangential_force, _at_jumps(self.position, position))
+        )
 
 
 #: kinds of voltages in a file that are found

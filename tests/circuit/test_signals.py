@@ -7,14 +7,24 @@ import numpy as np
 import pytest
 from tools.refusals import refuses
 
-from evfem.circuit.signals import Amplifier, VoltageProfile, carrier_amplitude, mean_squares, waves_in
+from evfem.circuit.signals import (
+    Amplifier,
+    FollowForce,
+    VoltageProfile,
+    carrier_amplitude,
+    mean_squares,
+    waves_in,
+)
 
 JUMP = VoltageProfile([0.0, 2.0, 2.0, 4.0], [10.0, 10.0, 100.0, 50.0])
 
 
 def test_linear_between_constant_beyond_later_row_at_a_jump():
     assert JUMP(np.array([-9.0, 1.0, 2.0, 3.0, 9.0])).tolist() == [10.0, 10.0, 100.0, 75.0, 50.0]
-    assert JUMP(np.nextafter(2.0, 0.0)) == 10.0
+    assert JUMP([2.0 - 1e-9, np.nextafter(2.0, 0.0)]).tolist() == [10.0, 100.0]  # at the jump to rounding
+    force = FollowForce(JUMP.position, JUMP.voltage)
+    assert force([2.0 - 1e-9, np.nextafter(2.0, 0.0)]).tolist() == [10.0, 100.0]
+    assert [one.size for one in JUMP.jumps(3.0, np.nextafter(2.0, 0.0))] == [0, 0, 0]
     assert VoltageProfile([1.0, 1.0], [5.0, 7.0])(np.array([0.9, 1.0, 1.1])).tolist() == [5.0, 7.0, 7.0]
     assert type(JUMP(1.0)) is float
 

@@ -289,6 +289,15 @@ def test_a_voltage_profile_follows_the_bone():
     assert result.electrostatic_force[-1] == pytest.approx(constant.electrostatic_force[-1], rel=0.05)
 
 
+def test_a_jump_holds_where_a_way_back_ends_at_it():
+    """Steps of -0.1 mm from 0.7 mm arrive at 0.29999999999999993 mm, and beyond it the voltage is 0."""
+    profile = VoltageProfile([0.0, 0.3, 0.3, 1.0], [0.0, 0.0, 1000.0, 1000.0])
+    back = Press(0.1, steps=1), Slide(0.7, steps=7), Slide(-0.4, steps=4), Slide(-0.1, steps=1)
+    result = run(Display(), *back, law=Kaczmarek(), voltage=profile)
+    assert result.position[-2] < 0.3 == pytest.approx(result.position[-2], rel=1e-12)
+    assert result.voltage.tolist() == [0.0] * 3 + [1000.0] * 9 + [0.0]
+
+
 def test_a_finished_run_leaves_no_factors_to_the_garbage_collector():
     """They may take most of a run's memory, and many runs follow each other in a sweep or a notebook."""
     pad = ev.FingerPad(resolution="coarse", ridges=False)
