@@ -15,7 +15,7 @@ from evfem.electrostatics.dielectrics import Dielectric, seen_at
 from evfem.electrostatics.drive import powers, waveform
 from evfem.electrostatics.laws import Layer
 from evfem.electrostatics.relaxation import Sandwich
-from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit, Square
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 
@@ -91,8 +91,10 @@ def bandwidth(scene: Scene) -> float:
 def _swings(scene: Scene) -> bool:
     """Whether the attraction swings within a period: not that of a square wave where nothing conducts."""
     assert scene.drive is not None
-    square = waveform(scene.drive, scene.voltage) == "square" and powers(scene.voltage) is None
-    return not square or scene.electrics.conducts
+    given, found = scene.voltage, powers(scene.voltage)
+    square = waveform(scene.drive, given) == "square" if found is None else isinstance(given, Square)
+    biased = found is not None and 0.0 in found[1]
+    return not square or biased or scene.electrics.conducts
 
 
 def slowest_swing(scene: Scene) -> float:

@@ -138,6 +138,9 @@ def test_the_plan_warns_of_a_mean_that_the_tissue_would_follow():
     even, leaking = (ev.Drive(50.0, "square", gap_conductivity=sigma) for sigma in (0.0, 1e-8))
     assert "swing" not in str(ev.plan(replace(slow, drive=even)))  # its square is constant
     assert "swings at 100 Hz" in str(ev.plan(replace(slow, drive=leaking)).warning)
+    signals = [replace(slow, voltage=ev.Square(50.0, 70.0, bias), drive=ev.Drive()) for bias in (0.0, 9.0)]
+    assert "swing" not in str(ev.plan(signals[0]))
+    assert "swings at 50 Hz" in str(ev.plan(signals[1]).warning)
 
 
 def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():
