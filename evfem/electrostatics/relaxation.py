@@ -56,18 +56,7 @@ from evfem.electrostatics.laws import Layer, eps_0
 POINTS, SCALE, TURN, SHIFT, RISE = 26, 0.5017, 0.6407, 0.6122, 0.2645
 
 
-def straight(s: Any) -> float:
-    """The transform of nothing."""
-    return 0.0
-
-
-def at_times(transform: Any, time: Any) -> Any:
-    """Values (T, 1) at times (T, 1) above 0 of a function with this transform."""
-    z, weight = (one.reshape(-1, 1, 1) for one in _contour())
-    return 2.0 * np.real(np.sum(weight / time * transform(z / time), axis=0))
-
-
-def _contour() -> tuple[Any, Any]:
+def contour() -> tuple[Any, Any]:
     """Points z and weights of the upper half of Talbot's contour."""
     theta = np.pi * np.arange(1, POINTS, 2) / POINTS
     turned = TURN * theta
@@ -200,9 +189,7 @@ class Sandwich:
         first, third = self._polarisations(charges)
         return self.skin.loss(E_1, first) + gap * self.leak * E_2**2 + self.insulator.loss(E_3, third)
 
-    def after(
-        self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values, bent: Any = straight
-    ) -> Any:
+    def after(self, gap: Any, charges: Any, before: Any, after: Any, seconds: Any, bent: Any = None) -> Any:
         """State (M, ...) of `charges` after `seconds` at `gap` (mm), voltage from `before` to `after` (V) on
         a straight line, and beyond that of the transform `bent` at complex rates (S, ...).
         """
@@ -212,9 +199,9 @@ class Sandwich:
             return charges.copy()
         time = _lifted(np.where(lasts, seconds, 1.0), axes)
         charges = np.stack([_lifted(one, axes) for one in charges])
-        z, weight = (one.reshape((-1,) + (1,) * axes) for one in _contour())
+        z, weight = (one.reshape((-1,) + (1,) * axes) for one in contour())
         s = z / time
-        volts = (before + (np.asarray(after) - before) / z) / s + bent(s)
+        volts = (before + (np.asarray(after) - before) / z) / s + (bent(s) if bent else 0.0)
         fields, slopes = self._fields(np.real(gap), charges, volts, s)
         value = self._moved(s, weight / time, fields)
         value = value + self._kept(charges, time)
@@ -237,9 +224,7 @@ class Sandwich:
         return fields, (steeper / Y_1, steeper / Y_2, steeper / Y_3)
 
     def _series(self, gap: Any, start: Any, s: Any) -> tuple[Any, Any, Any, Any]:
-        """What a state leaves in skin and insulator, the three admittances, the reduced thickness of all, and
-        the voltage of what is left, at s.
-        """
+        """What a state leaves in skin and film, admittances, the sum of z, the voltage of what is left."""
         first, third = self._polarisations(start)
         left, right = self.skin.left(s, first) + start[0] / s, self.insulator.left(s, third) - start[1] / s
         Y_1, Y_3 = self.skin.admittance(s), self.insulator.admittance(s)
@@ -248,9 +233,7 @@ class Sandwich:
         return (left, right), (Y_1, Y_2, Y_3), z_1 + gap / Y_2 + z_3, z_1 * left + z_3 * right
 
     def on_electrode(self, gap: Any, start: Any, s: Any) -> tuple[Any, Any]:
-        """Transforms (S, ...) at s of the electrode's charge density over eps_0 below an insulator that does
-        not conduct: per voltage, and without one.
-        """
+        """Charge density over eps_0 below an insulator that does not conduct: by the voltage, without one."""
         _, _, total, own = self._series(gap, start, s)
         return 1.0 / total, own / total + start[1] / s
 

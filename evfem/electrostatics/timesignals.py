@@ -216,8 +216,7 @@ class ChargeControl:
     A plate of the area A under the charge Q is pulled by Q^2 / (2 eps_0 A), however far it is. What is
     beside the finger, `parallel_capacitance`, takes a share of the charge, C_p U: a plate with the capacity
     C_0 that comes from the gap g on a spring is then stable up to the travel g/3 (1 + C_0 / C_p). A metre of
-    coaxial cable, 100 pF, is 0.01 nF/mm over a depth of 10 mm, in space 0.1 nF, and tens of times as much as
-    a finger.
+    coaxial cable, 100 pF, is 0.01 nF/mm over a depth of 10 mm, in space 0.1 nF: tens of times a finger's.
 
     >>> ChargeControl(0.02).charge_at(0.5)
     0.02

@@ -149,9 +149,10 @@ def voltages(path: Path, key: str, full_scale: float | None) -> tuple[int, Float
     given = scale["full_scale_V"] if full_scale is None else full_scale
     volts = above("full_scale", given, 0.0, "a voltage in V above zero")
     found = normalised_samples(samples, scale.get("bits", 0))
-    if samples.dtype.kind == "f" and (most := float(np.abs(found).max())) > 1.0:
-        many = f"{np.sum(np.abs(found) > 1.0)} of {found.size} samples"
-        warn(f"{path.name}: {many} are beyond 1.0, which is full scale, and make up to {volts * most:.6g} V")
+    beyond = np.abs(found)[np.abs(found) > 1.0]
+    if samples.dtype.kind == "f" and beyond.size:
+        many = f"{beyond.size} of {found.size} samples are beyond 1.0, which is full scale"
+        warn(f"{path.name}: {many}, and make up to {volts * beyond.max():.6g} V")
     return rate, np.asarray(volts * found)
 
 
@@ -208,20 +209,14 @@ def _sample(time: float, rate: float) -> int:
 
 
 def _warn_of_lost(name: str, events: list[Event], points: list[Point], rate: float) -> None:
-    """A warning where samples at `rate` (Hz) have nothing of an event, or less than half of a crest of
-    points; it says which rate holds them.
-    """
-    short = [
-        end - start
-        for start, end, strength in events
-        if strength > 0.0 and 0.0 <= start < end and _sample(start, rate) == _sample(end, rate)
-    ]
+    """A warning where samples at `rate` (Hz) have nothing of an event, or less than half of a crest."""
+    acting = [(start, end) for start, end, strength in events if strength > 0.0 and 0.0 <= start < end]
+    short = [end - start for start, end in acting if _sample(start, rate) == _sample(end, rate)]
     if len(points) > 2:
         time, value = np.array(points).T
         beside = (np.interp(side(time * rate) / rate, time, value) for side in (np.floor, np.ceil))
-        crests = np.flatnonzero(value > 2.0 * np.maximum(*beside))
-        crests = crests[(crests > 0) & (crests < time.size - 1)]
-        short += (0.5 * (time[crests + 1] - time[crests - 1])).tolist()
+        crests = (value > 2.0 * np.maximum(*beside))[1:-1]
+        short += (0.5 * (time[2:] - time[:-2])[crests]).tolist()
     if short:
         lost = f"{len(short)} events or crests last less than a sample of {1e3 / rate:.4g} ms and are lost"
         warn(f"{name}: {lost}; a rate of {np.ceil(1.0 / max(min(short), 1e-9) - EDGE):.10g} Hz holds them")

@@ -24,7 +24,7 @@ from evfem.common.arrays import NODES, WEIGHTS, Floats
 from evfem.common.constants import KILOVOLT
 from evfem.common.rooms import Column, Room
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.relaxation import Sandwich, at_times
+from evfem.electrostatics.relaxation import Sandwich, contour
 from evfem.tensor import STEP
 from evfem.terms.traction import PadPath
 
@@ -62,6 +62,12 @@ class Flow:
         """
         square = self.charge**2 / self.seconds if self.seconds > 0.0 else 0.0
         return np.array([self.source_work, self.leakage, square, self.seconds])
+
+
+def at_times(transform: Any, time: Any) -> Any:
+    """Values (T, 1) at times (T, 1) above 0 of a function with this transform."""
+    z, weight = (one.reshape(-1, 1, 1) for one in contour())
+    return 2.0 * np.real(np.sum(weight / time * transform(z / time), axis=0))
 
 
 class Straight:
@@ -296,7 +302,8 @@ class Charging(NoCharges):
         volts, course = old.voltage + rise * time[:, None], self._course
         charges = stack.after(new.gap, start[:, None], old.voltage, volts, time[:, None], course.bent)
         bent, faster = course.beyond(time[:, None])
-        at = (new.gap, volts := volts + bent, charges)
+        volts = volts + bent
+        at = (new.gap, volts, charges)
         leaked = float(np.sum(weight @ (stack.loss(*at) * new.length)))
         # by parts: the work of the displacement current is U D at the ends less the mean of D while U rises
         last = stack.fields(new.gap, new.voltage, new.charges)[0]

@@ -31,7 +31,7 @@ class Friction:
 def follow(wish, squared, largest=2000.0, before=1000.0):
     """The control after one iteration at `squared` kV^2, what it changed, and contact problems it posed."""
     control, friction = FollowFriction(wish, largest), Friction(squared)
-    control.begin(SimpleNamespace(voltage=before))
+    control.begin(SimpleNamespace(voltage=before), None)
     step = LinearContactStep(None, None, np.zeros(1), np.zeros(2))
     return control, control.solve(step, friction.drive()), friction.residuals
 

@@ -44,9 +44,9 @@ def test_a_prescribed_force_counts_like_the_forces_of_the_nodes(pressed, missing
 def test_a_wished_friction_force_counts_while_the_voltage_is_free(pressed, missing):
     reaction = pressed[1].reaction
     control = FollowFriction(float(reaction[0] + missing), 2000.0)
-    control.begin(pressed[1])
+    control.begin(pressed[1], None)
     assert residual(pressed, voltage=control) == pytest.approx(0.01 / np.abs(reaction).max(), rel=1e-5)
-    control.begin(replace(pressed[1], voltage=0.0))  # at its lower bound
+    control.begin(replace(pressed[1], voltage=0.0), None)  # at its lower bound
     assert residual(pressed, voltage=control) < 1e-8
     assert residual(pressed, voltage=GivenVoltage(5.0)) < 1e-8
 
