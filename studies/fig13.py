@@ -74,9 +74,10 @@ def _instant(recording: Recording, step: int) -> Instant:
 def instants(case: rendered.Case) -> dict[str, Instant]:
     """Reference and display in the step of the slide with the largest voltage by (20a)."""
     reference, _, _, (_, friction), signal = rendered.felt_on(case, every=1)
-    number = int(np.argmax(signal.profile.voltage[1:])) + 1
     press, slide = reference.scene.motion
     assert isinstance(slide, ev.Slide)
+    ends = np.linspace(*signal.profile.position[[0, -1]], slide.steps + 1)
+    number = int(np.argmax(signal.profile(ends[1:]))) + 1
     short = replace(slide, distance=slide.distance * number / slide.steps, steps=number)
     scene = replace(reference.scene, motion=(press, short), output=ev.Output(every=1_000_000))
     short_reference, surface = replace(reference, scene=scene), ev.Display(friction=friction)
