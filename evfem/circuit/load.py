@@ -106,16 +106,16 @@ class Supply(Room):
         }
 
     def doubts(self, scene: Any, rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-        times = np.array([row["time"] for row in rows])
-        after = getattr(scene.voltage, "after", 0.0)
+        if not isinstance(scene.voltage, (ChargeControl, OpenCircuit)):
+            return
+        times, after = np.array([row["time"] for row in rows]), getattr(scene.voltage, "after", 0.0)
         late = np.flatnonzero((times[1:] > after * (1.0 + SAME)) & (times[:-1] < after * (1.0 - SAME)))
         for k in late[:1] + 1:
             yield (
                 f"step {rows[k]['step']}: the electrode is disconnected at the end of this step, "
                 f"{times[k]:g} s, not at {after:g} s within it: let a step end there"
             )
-        if isinstance(scene.voltage, (ChargeControl, OpenCircuit)):
-            yield from _of_no_current(rows, times >= after * (1.0 - SAME))
+        yield from _of_no_current(rows, times >= after * (1.0 - SAME))
 
 
 def _of_no_current(rows: Sequence[Mapping[str, Any]], kept: Any) -> Iterator[str]:
@@ -131,7 +131,8 @@ def _of_no_current(rows: Sequence[Mapping[str, Any]], kept: Any) -> Iterator[str
         unit = "N mm" if "contact_area" in rows[0] else "N mm/mm"
         yield (
             f"source_work changes by {found:.2g} {unit} although no charge flows, and electrostatic_work is "
-            "wrong by as much: it falls with the length of the steps in which the kept charge moves"
+            "wrong by as much, where the charge leaks the voltage too: both less with shorter steps in which "
+            "the kept charge moves"
         )
 
 
