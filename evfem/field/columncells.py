@@ -21,6 +21,7 @@ with the real parts of the permittivities (`evfem.field.columns`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -92,40 +93,72 @@ class Cells:
         inverse = 1.0 / self.X
         slanted = self.X + self.Y**2 * inverse  # (2, E, R): at points across
         across = slanted[None] / self.height[:, None]
-        parts = [self.height * inverse, -self.Y * inverse, across.reshape(4, *across.shape[2:])]
-        geometry = np.concatenate(parts) * self.eps
-        return (_PRODUCTS @ geometry.reshape(8, -1)).reshape(36, *across.shape[2:])
+        return self._integrals(self.height * inverse, -self.Y * inverse, across)
+
+    def rates(self, other: Cells) -> Any:
+        """Derivative of `matrices`, (36, E, R), on the way to `other` cells."""
+        inverse, height = 1.0 / self.X, self.height
+        by_X, by_Y, by_height = other.X - self.X, other.Y - self.Y, other.height - self.height
+        slope = self.Y * inverse
+        slanted, turned = self.X + self.Y * slope, by_X + slope * (2.0 * by_Y - slope * by_X)
+        across = (turned[None] - slanted[None] * (by_height / height)[:, None]) / height[:, None]
+        return self._integrals(
+            (by_height - height * inverse * by_X) * inverse, (slope * by_X - by_Y) * inverse, across
+        )
+
+    def _integrals(self, along: Floats, mixed: Floats, across: Floats) -> Any:
+        """Matrices (36, E, R) from the geometry's factors (2, E, R), (2, E, R) and (2, 2, E, R)."""
+        shape = across.shape[2:]
+        geometry = np.concatenate([along, mixed, across.reshape(4, *shape)]) * self.eps
+        return (_PRODUCTS @ geometry.reshape(8, -1)).reshape(36, *shape)
 
     def _part(self, values: Any, k: int) -> Any:
         """View (E, R) of values (L, rows) at the node of shape function `k` of all cells."""
         i, j = _PLACES[k]
         return values[i : i + self.lines - 1, j : j + 2 * self.rows - 1 : 2]
 
-    def load(self, phi: Any) -> Any:
-        """Minus the matrix times a potential (L, rows)."""
-        result = np.zeros(phi.shape, dtype=self.matrices.dtype)
+    def load(self, phi: Any, matrices: Any = None) -> Any:
+        """Minus the matrix times a potential (L, rows), or minus one of other `matrices` (36, E, R)."""
+        matrices = self.matrices if matrices is None else matrices
+        result = np.zeros(phi.shape, dtype=matrices.dtype)
         for a in range(6):
-            product = sum(self.matrices[6 * a + b] * self._part(phi, b) for b in range(6))
+            product = sum(matrices[6 * a + b] * self._part(phi, b) for b in range(6))
             self._part(result, a)[...] -= product
         return result
 
-    def potential(self, strips: Any | None, floating: bool) -> Any:
-        """Potential (L, rows): 1 on the lowest curve (or strips), 0 on the highest; `floating`: no charge."""
-        # values prescribed for the electrodes, and for 1 on the highest curve
-        prescribed = np.zeros((2, self.lines, self.per_line))
-        prescribed[1, :, -1] = 1.0
-        prescribed[0, :, 0] = float(strips is None)
-        held = [0, self.per_line - 1] if strips is None else [self.per_line - 1]
-        load = np.stack([self.load(one) for one in prescribed[: 2 if floating else 1]])
-        if strips is not None:
-            load[0, :, 0] += strips.load()
-        load[:, :, held] = 0.0
-        free = _solved(self._band(strips, held), load.reshape(len(load), -1).T).T
-        phi = free.reshape(load.shape) + prescribed[: len(load)]
+    def potential(self, strips: Any | None, floating: bool, near: Potentials | None = None) -> Any:
+        """Potential (L, rows): 1 on the lowest curve (or strips), 0 on the highest; `floating`: no charge.
+        With those of cells that differ little, `near`, to first order in the difference.
+        """
+        phi = self.potentials(strips, floating).values if near is None else self._moved(near, strips)
         if not floating:
             return phi[0]
         charges = [np.sum(self.load(one)[:, -1]) for one in phi]
         return phi[0] - charges[0] / charges[1] * phi[1]
+
+    def potentials(self, strips: Any | None, floating: bool) -> Potentials:
+        """The potentials of these cells, with their factorised matrix."""
+        prescribed = np.zeros((2 if floating else 1, self.lines, self.per_line))
+        prescribed[1:, :, -1] = 1.0
+        prescribed[0, :, 0] = float(strips is None)
+        held = [0, self.per_line - 1] if strips is None else [self.per_line - 1]
+        load = np.stack([self.load(one) for one in prescribed])
+        if strips is not None:
+            load[0, :, 0] += strips.load()
+        load[:, :, held] = 0.0
+        divided = _divider(self._band(strips, held))
+        return Potentials(prescribed + divided(load), held, divided, self, strips)
+
+    def _moved(self, near: Potentials, strips: Any | None) -> Any:
+        """Potentials (k, L, rows) to first order in the way from the cells of `near` to these."""
+        rates = near.cells.rates(self)
+        load = np.stack([near.cells.load(one, rates) for one in near.values])
+        if strips is not None and near.strips is not None:
+            bottom = near.values[:, :, 0]
+            load[:, :, 0] -= strips.charges(bottom) - near.strips.charges(bottom)
+            load[0, :, 0] += strips.load() - near.strips.load()
+        load[:, :, near.held] = 0.0
+        return near.values + near.divided(load)
 
     def _band(self, strips: Any | None, held: list[int]) -> Any:
         """The matrix as a lower band, (width, unknowns); the rows `held` of every line drop out."""
@@ -203,17 +236,42 @@ class Cells:
         return y
 
 
-def _solved(band: Any, load: Any) -> Any:
-    """Solution of a lower band, positive definite, or complex and symmetric."""
+def _divider(band: Any) -> Callable[[Any], Any]:
+    """Divides loads (k, L, rows) by a matrix's lower band: positive definite, or complex and symmetric."""
     width, size = band.shape
     if not np.iscomplexobj(band):
-        factor, found = np.array(band.T, order="C"), np.array(load.T, order="C")
+        factor = np.array(band.T, order="C")
         if lapack("dpbtrf", b"L", size, width - 1, factor, width):
             raise np.linalg.LinAlgError("the field's matrix is not positive definite")
-        lapack("dpbtrs", b"L", size, width - 1, len(found), factor, width, found, size)
-        return found.T
+
+        def divided(load: Floats) -> Floats:
+            found = np.array(load, order="C")
+            lapack("dpbtrs", b"L", size, width - 1, len(found), factor, width, found, size)
+            return found
+
+        return divided
     whole = np.zeros((2 * width - 1, size), dtype=complex)
     whole[width - 1 :] = band
     for k in range(1, width):
         whole[width - 1 - k, k:] = band[k, : size - k]
-    return linalg().solve_banded((width - 1, width - 1), whole, load, check_finite=False)
+    ends = (width - 1, width - 1)
+
+    def complex_divided(load: Any) -> Any:
+        found = linalg().solve_banded(ends, whole, load.reshape(len(load), -1).T, check_finite=False)
+        return found.T.reshape(load.shape)
+
+    return complex_divided
+
+
+@dataclass(frozen=True, eq=False)
+class Potentials:
+    """Potentials `values` (k, L, rows) of `cells`, above `strips` or a whole electrode: the second one, of a
+    body without charge, is 0 on the electrode and 1 on the body. Rows `held` of each line are prescribed;
+    `divided` solves for loads (k, L, rows).
+    """
+
+    values: Any
+    held: list[int]
+    divided: Callable[[Any], Any]
+    cells: Cells
+    strips: Any | None

@@ -21,12 +21,13 @@ x_k and y_lk are exact: C is stationary in the potential, so they are virtual wo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import eps_0
-from evfem.field.columncells import AT, WEIGHTS, Cells
+from evfem.field.columncells import AT, WEIGHTS, Cells, Potentials
 
 #: fraction of the lowest layer that is replaced by a thin-layer expansion above finite electrodes
 THIN = 0.2
@@ -58,12 +59,14 @@ class Columns:
         levels: Floats,
         electrodes: Floats | None = None,
         floating: bool = False,
+        near: Potentials | None = None,
     ) -> Capacitance:
         """Solve between curves of heights `levels` (n + 1, L) at the lines `x` (L,) in mm.
 
         `electrodes` (K, 3) are pieces of the lowest curve, from and to in mm and their voltage over U;
         between them nothing crosses it. Without, all of it is one electrode. The highest curve is at
-        0, or, `floating`, at the potential at which it has no charge.
+        0, or, `floating`, at the potential at which it has no charge. `near` are `potentials` of curves that
+        differ little: the field is right to first order in the difference.
 
         >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
         >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
@@ -71,7 +74,7 @@ class Columns:
         (10.0, -100.0)
         """
         cells, strips = self.cells(x, levels, electrodes)
-        phi = cells.potential(strips, floating)
+        phi = cells.potential(strips, floating, near)
         found = cells.squares(phi)
         value = cells.energy(found)
         by_x = cells.by_x(found, np.ones_like(cells.share), np.zeros_like(cells.rise))
@@ -82,6 +85,11 @@ class Columns:
             by_level[1] += THIN * by_level[0]
             by_level[0] *= 1.0 - THIN
         return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, cells.heights())
+
+    def potentials(self, x: Floats, levels: Floats, electrodes: Floats | None, floating: bool) -> Potentials:
+        """The potentials, with what solves for those of other curves that differ little."""
+        cells, strips = self.cells(x, levels, electrodes)
+        return cells.potentials(strips, floating)
 
     def cells(self, x: Floats, levels: Floats, electrodes: Floats | None) -> tuple[Cells, Strips | None]:
         """The cells, and the thin-layer expansion below them for finite electrodes."""
@@ -131,6 +139,14 @@ class Strips:
         own = [np.sum(weight * shape**2, axis=(0, 2)) + self.along for shape in self.shapes]
         beside = np.sum(weight * np.prod(self.shapes, 0), axis=(0, 2)) - self.along
         return np.append(own[0], 0.0) + np.append(0.0, own[1]), beside
+
+    def charges(self, phi: Any) -> Any:
+        """What the matrix makes of potentials (..., L) of the bottom row."""
+        diagonal, beside = self.matrix()
+        result = diagonal * phi
+        result[..., :-1] += beside * phi[..., 1:]
+        result[..., 1:] += beside * phi[..., :-1]
+        return result
 
     def load(self) -> Floats:
         """Contribution (L,) of the electrodes to the right-hand side of the bottom row."""

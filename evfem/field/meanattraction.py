@@ -37,6 +37,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import eps_0
+from evfem.field.columncells import Potentials
 from evfem.field.columns import Columns
 
 
@@ -50,7 +51,12 @@ class MeanPull:
 
 
 def mean_pull(
-    columns: Columns, x: Floats, levels: Floats, electrodes: Floats | None = None, floating: bool = False
+    columns: Columns,
+    x: Floats,
+    levels: Floats,
+    electrodes: Floats | None = None,
+    floating: bool = False,
+    near: Potentials | None = None,
 ) -> MeanPull:
     """Solve as `Columns.solve` does, for layers insulator, gap and, if there is one, skin, with
     complex permittivities.
@@ -62,7 +68,7 @@ def mean_pull(
     True
     """
     cells, strips = columns.cells(x, levels, electrodes)
-    phi = cells.potential(strips, floating)
+    phi = cells.potential(strips, floating, near)
     found = cells.squares(phi)
     gap, skin = cells.layer == 1, cells.layer > 1
     fraction = np.where(gap, cells.share, np.where(skin, 1.0, 0.0))

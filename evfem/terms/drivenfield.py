@@ -17,7 +17,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.field.columns import Columns
 from evfem.field.meanattraction import mean_pull
-from evfem.terms.fullfield import FieldAttraction
+from evfem.terms.fullfield import FieldAttraction, Near
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,13 @@ class DrivenFieldAttraction(FieldAttraction):
         return tuple((weight, self.columns_of(*stack)) for weight, stack in zip(weights, real, strict=True))
 
     @cached_property
-    def _columns(self) -> Columns:
-        return self._of_harmonics[0][1]
+    def _stacks(self) -> tuple[Columns, ...]:
+        return tuple(columns for _, columns in self._of_harmonics)
 
-    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[None, Floats]:
+    def _solved(self, x: Floats, levels: Floats, slope: Floats, near: Near) -> tuple[None, Floats]:
         """Mean forces (L, 2) on the lines at 1 V effective, whatever the slope below."""
         pulls = (
-            weight * mean_pull(columns, x, levels, self._electrodes, self.floating).forces
-            for weight, columns in self._of_harmonics
+            weight * mean_pull(columns, x, levels, self._electrodes, self.floating, one).forces
+            for (weight, columns), one in zip(self._of_harmonics, near, strict=True)
         )
         return None, np.asarray(sum(pulls))

@@ -10,7 +10,7 @@ gap in series. Nodal forces are derivatives of the discrete energy
 
 The tangent of a step is that of the column law, between rough faces scaled by the ratio of the forces
 (`tangent_factor`). Where iterations stagnate, among ridges or steep waves close to a thin insulator, it is
-that of the field by differences (`fringe_stiffness`): the field of a node decays within a few nodes, so every
+that of the field by differences (`full_stiffness`): the field of a node decays within a few nodes, so every
 `APART`-th one is moved at once. In every accepted state C lies between its bounds (`certificate`).
 """
 
@@ -31,6 +31,7 @@ from evfem.electrostatics.alternating import voltage_fraction
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
 from evfem.field.bounds import columns_sum, least_upper_sum
+from evfem.field.columncells import Potentials
 from evfem.field.columns import Capacitance, Columns
 from evfem.surface.pad import Pad, surface_state
 from evfem.terms.attraction import Attraction
@@ -54,7 +55,10 @@ PARTS = 4
 KEPT = 3
 #: nodes of a line that are moved at once for differences: one of so many, by this length (mm), small
 #: beside the gap that touching nodes keep
-APART, MOVED = 8, 1e-9
+APART, MOVED = 8, 1e-10
+
+#: for each stack of layers the potentials that are corrected, or None to solve anew
+Near = tuple[Potentials | None, ...]
 
 
 def in_sight(points: Floats) -> Ints:
@@ -269,11 +273,11 @@ class FieldAttraction(Attraction):
                 self.solved.popitem(last=False)
         return found
 
-    def _above(self, pad: PadState, lines: Any) -> tuple[Capacitance | None, Floats]:
+    def _above(self, pad: PadState, lines: Any, near: Near | None = None) -> tuple[Any, Floats]:
         """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
         x, levels = self.outline(pad, lines)
         slope = surface_state(self.surface, lines @ pad.position).slope[:, 0]
-        field, forces = self._solved(x, levels, slope)
+        field, forces = self._solved(x, levels, slope, near or (None,) * len(self._stacks))
         return field, np.asarray(lines.T @ forces)
 
     def full_stiffness(self, pad: PadState) -> Entries:
@@ -281,7 +285,10 @@ class FieldAttraction(Attraction):
         position, voltage, frame = pad.position, pad.voltage, pad.frame
         lines, nodes = self.visible(position), in_line(self._plane, self.edges)
         closed = frame.gap <= TOUCHING
-        start = self._above(pad, lines)[1]
+        stacks, electrodes = self._stacks, self._electrodes
+        outline = self.outline(pad, lines)
+        near = tuple(one.potentials(*outline, electrodes, self.floating) for one in stacks)
+        start = self._above(pad, lines, near)[1]
         directions = np.zeros((2, self._size, 2))
         directions[0, :, 0] = 1.0
         directions[0, closed, 1], directions[1, ~closed, 1] = frame.slope[closed, 0], 1.0
@@ -290,7 +297,8 @@ class FieldAttraction(Attraction):
             moved = nodes[first::APART]
             shifted = position.copy()
             shifted[moved] += MOVED * directions[axis, moved]
-            rate = voltage**2 / MOVED * (self._above(replace(pad, position=shifted), lines)[1] - start)[nodes]
+            forces = self._above(replace(pad, position=shifted), lines, near)[1]
+            rate = voltage**2 / MOVED * (forces - start)[nodes]
             nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
             column = 2 * moved[nearest.astype(int)] + axis
             blocks += [(2 * nodes + k, column, rate[:, k]) for k in range(2)]
@@ -298,9 +306,9 @@ class FieldAttraction(Attraction):
         fraction = voltage_fraction(self._electrodes, position[:, 0])[outer.row // 2] ** 2
         return Entries.of(outer.size, [*blocks, (outer.row, outer.column, fraction * outer.value)])
 
-    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
+    def _solved(self, x: Floats, levels: Floats, slope: Floats, near: Near) -> tuple[Any, Floats]:
         """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""
-        found = self._columns.solve(x, levels, self._electrodes, self.floating)
+        found = self._columns.solve(x, levels, self._electrodes, self.floating, near[0])
         along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
         return found, 0.5 * np.stack([along, found.by_level[2:].sum(axis=0)], axis=1)
 
@@ -310,9 +318,15 @@ class FieldAttraction(Attraction):
         electrodes = getattr(self.surface, "electrodes", None)
         return None if electrodes is None else np.asarray(electrodes, dtype=float)
 
-    @cached_property
+    @property
     def _columns(self) -> Columns:
-        return self.columns_of(self.insulator_eps_r, getattr(self.law, "gap_eps_r", 1.0), self.skin.eps_r)
+        return self._stacks[0]
+
+    @cached_property
+    def _stacks(self) -> tuple[Columns, ...]:
+        """Layers, one stack for each field that is solved."""
+        gap = getattr(self.law, "gap_eps_r", 1.0)
+        return (self.columns_of(self.insulator_eps_r, gap, self.skin.eps_r),)
 
     @property
     def insulator_eps_r(self) -> float:

@@ -47,6 +47,29 @@ def halves(right):
     return np.array([[-9.0, 0.09, 1.0], [0.16, 9.0, right]])
 
 
+@pytest.mark.parametrize("skin", [1650.0, 1650.0 - 4e4j])
+@pytest.mark.parametrize("electrodes", [(None, False), (halves(-0.5), False), (halves(-0.5), True)])
+def test_a_field_near_another_is_right_to_first_order(electrodes, skin):
+    """Every line and level moves, gaps by up to an eighth: half the way, a quarter of the error."""
+    rng = np.random.default_rng(11)
+    x, levels = wave(17, 0.005)
+    levels = np.vstack([levels, levels[2] + 0.3])
+    ways = 2e-4 * rng.normal(size=x.shape), 2e-4 * rng.normal(size=levels.shape)
+    stack = Columns((3.35, 1.0, skin), (FINE, ROWS, ROWS))
+    near = stack.potentials(x, levels, *electrodes)
+
+    def potential(part, near=None):
+        cells, strips = stack.cells(x + part * ways[0], levels + part * ways[1], electrodes[0])
+        return cells.potential(strips, electrodes[1], near)
+
+    errors, changes = [], []
+    for part in (1.0, 0.5, 0.25):
+        errors.append(np.abs(potential(part, near) - potential(part)).max())
+        changes.append(np.abs(potential(part) - potential(0.0)).max())
+    assert np.log2(np.divide(errors[:2], errors[1:])) == pytest.approx([2.0, 2.0], abs=0.2)
+    assert errors[2] < 0.05 * changes[2]
+
+
 @pytest.mark.parametrize("electrodes", [(), (halves(-0.5), False), (halves(-0.5), True)])
 def test_derivatives_are_those_of_the_discrete_energy(electrodes):
     """By every x and every level at once, along a random way, on an uneven outline; over electrodes that
