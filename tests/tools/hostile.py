@@ -298,7 +298,8 @@ def _json(path, rng):
         holder, key = rng.choice(_places(table) or [({"": 0}, "")])
         value = holder[key]
         new = [deepcopy(rng.choice(LEAVES))] * 2  # a list of them may be changed later
-        new += [value * rng.choice((-1, 0, 1e3, 1e-9, 1e300))] if type(value) in (int, float) else []
+        if type(value) is float or (type(value) is int and abs(value) < 1e300):
+            new.append(value * rng.choice((-1, 0, 1e3, 1e-9, 1e300)))
         new += [value * rng.choice((0, 2, 100))] if isinstance(value, list) else []
         holder[key] = rng.choice(new)
         if rng.random() < 0.1:
