@@ -132,7 +132,7 @@ def page(result: Result, checked: Checked | None = None) -> str:
     )
     meta = '<meta charset="utf-8">\n<meta name="viewport" content="width=device-width, initial-scale=1">'
     head = f"{meta}\n<title>{html.escape(title)}</title>\n<style>{STYLE}</style>"
-    body = "\n".join(parts)
+    body = "<main>\n" + "\n".join(parts) + "\n</main>"
     return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
 
 
@@ -344,7 +344,7 @@ def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]], ki
     lines = ["".join(f"<td>{html.escape(cell).replace('_', '_<wbr>')}</td>" for cell in row) for row in rows]
     body = "\n".join(f"<tr>{line}</tr>" for line in ([top] if top else []) + lines)
     named = f"<caption>{html.escape(caption)}</caption>\n" if caption else ""
-    return f'<div class="wide"><table class="{kind}">\n{named}{body}\n</table></div>'
+    return f'<div class="wide" tabindex="0"><table class="{kind}">\n{named}{body}\n</table></div>'
 
 
 def _figure(figure: Any, said: str) -> str:

@@ -1,5 +1,5 @@
 """The pages of the site in a real browser (evfem[browser,docs]): nothing is wider than the window, and
-pictures grow on a click.
+pictures grow on a click, and nothing keeps anybody from a page.
 """
 
 import shutil
@@ -8,6 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from tools.accessible import barriers
+
+import evfem as ev
 
 pytestmark = [pytest.mark.browser, pytest.mark.filterwarnings("ignore::ImportWarning")]
 DOCS = Path(__file__).parents[2] / "docs"
@@ -41,6 +44,7 @@ def driver(tmp_path):
     for flag in (*FLAGS, f"--user-data-dir={tmp_path / 'profile'}"):
         options.add_argument(flag)
     driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+    driver.set_script_timeout(60.0)
     yield driver
     driver.quit()
 
@@ -87,3 +91,24 @@ def test_a_picture_grows_on_a_click_and_shrinks_on_another(site, driver):
     assert driver.execute_script(width, "dialog[open] img") > before
     driver.execute_script("document.querySelector('dialog[open]').click()")
     assert driver.execute_script("return document.querySelector('dialog[open]')") is None
+
+
+@pytest.mark.parametrize("width", [390, 1366])
+def test_nothing_on_the_pages_keeps_anybody_from_them(site, driver, width):
+    """Contrast, texts of pictures, headings, landmarks, what the keyboard reaches."""
+    driver.set_window_size(width, 900)
+    found = []
+    for page in PAGES:
+        driver.get((site / f"{page}.html").as_uri())
+        found += [(page, one) for one in barriers(driver)]
+    assert found == []
+
+
+@pytest.mark.parametrize("width", [390, 1366])
+def test_nothing_keeps_anybody_from_the_page_about_a_run(tmp_path, driver, width):
+    motion = [ev.Press(force=0.01, steps=2)]
+    scene = ev.Scene(ev.FingerPad(resolution="coarse"), ev.Display(), motion=motion)
+    ev.simulate(scene).report(tmp_path / "page.html")
+    driver.set_window_size(width, 900)
+    driver.get((tmp_path / "page.html").as_uri())
+    assert barriers(driver) == []

@@ -12,6 +12,7 @@ import warnings
 
 import numpy as np
 import pytest
+from tools.accessible import barriers
 
 from evfem.circuit.signalfile import read_signal
 
@@ -184,6 +185,7 @@ def test_the_model_is_run_to_its_end_and_shown(page):
     assert "estimate" in page.text("numbers")
     page.set("load", 0.05)
     assert "model" in page.text("numbers")
+    assert barriers(page.driver) == []
 
 
 def test_the_exact_voltage_is_found_for_this_display_only(page):
@@ -311,3 +313,18 @@ def test_a_phone_shows_everything_without_scrolling_sideways(page):
     for where in ("pick", "dial", "draw", "upload"):
         page.choose(where)
         assert page.js("return document.documentElement.scrollWidth") <= 360, where
+
+
+@pytest.mark.parametrize("size", [(390, 844), (1200, 1400)])
+def test_nothing_keeps_anybody_from_the_page(server, tmp_path, size):
+    """Contrast, names of controls, texts of pictures, headings; with a mistake too."""
+    page = Page(tmp_path, server.url, size)
+    try:
+        assert barriers(page.driver) == []
+        page.choose("draw")
+        page.click("#clear")
+        page.settled()
+        assert page.shown("error")
+        assert barriers(page.driver) == []
+    finally:
+        page.close()
