@@ -13,8 +13,12 @@ so its energy is a sum of products of geometric factors and integrals of the ref
           + \frac{X^2 + Y^2}{X d h} \varphi_\eta^2 \; d\xi\, d\eta ,
 
 by two points of Gauss along either coordinate. All matrices are one product of arrays, and the
-derivatives by X, h and Y at a fixed potential, which are virtual works, are read off. With complex
-permittivities the matrix is complex and symmetric, and the squares in forces are
+derivatives by X, h and Y at a fixed potential, which are virtual works, are read off. Of cells that lie
+a little beside these the potential is, with the factorised matrix A and its derivative on the way there,
+
+.. math:: \varphi - A^{-1}\, \delta\!A\, \varphi .
+
+With complex permittivities the matrix is complex and symmetric, and the squares in forces are
 :math:`|\varphi_\xi|^2`, :math:`\mathrm{Re}\,\varphi_\xi \bar\varphi_\eta`, :math:`|\varphi_\eta|^2`
 with the real parts of the permittivities (`evfem.field.columns`).
 """

@@ -11,7 +11,8 @@ gap in series. Nodal forces are derivatives of the discrete energy
 The tangent of a step is that of the column law, between rough faces scaled by the ratio of the forces
 (`tangent_factor`). Where iterations stagnate, among ridges or steep waves close to a thin insulator, it is
 that of the field by differences (`full_stiffness`): the field of a node decays within a few nodes, so every
-`APART`-th one is moved at once. In every accepted state C lies between its bounds (`certificate`).
+`APART`-th one is moved at once, with potentials to first order from one factorised matrix
+(`evfem.field.columncells`). In every accepted state C lies between its bounds (`certificate`).
 """
 
 from __future__ import annotations
