@@ -164,7 +164,7 @@ DAMAGES = {
     "text": (lambda p: replaced(p, {"time": np.array("now")}), "no plain array time"),
     "not finite": (lambda p: replaced(p, {"time": np.array(np.nan)}), "no usable time"),
     "nodes elsewhere": (lambda p: replaced(p, {"candidates": np.array([3, 9999])}), "no usable candidates"),
-    "nodes twice": (lambda p: replaced(p, {"candidates": np.array([3, 3])}), "no usable candidates"),
+    "nodes twice": (lambda p: replaced(p, {"candidates": np.array([3, 3, 5])}), "no usable candidates"),
     "status 7": (lambda p: replaced(p, {"status": np.full(25, 7)}), "no usable status"),
     "part 0": (lambda p: replaced(p, {"substep": np.array(0.0)}), "no usable substep"),
     "part 1.5": (lambda p: replaced(p, {"substep": np.array(1.5)}), "no usable substep"),

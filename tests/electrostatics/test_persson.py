@@ -101,6 +101,17 @@ def test_one_wave_has_its_own_wave_number_and_slope():
     assert found.slope[-1] == pytest.approx(0.001 * 2.0 * np.pi / 0.02 / np.sqrt(2.0), rel=1e-12)
 
 
+def test_a_wave_as_long_as_the_map_counts():
+    """And one of a quarter of it: wave numbers and slopes of a periodic map, in closed form."""
+    x, length = 1e-3 * np.arange(64), 0.064
+    h = 1e-3 * np.sin(2.0 * np.pi * x / length) + 2e-4 * np.cos(8.0 * np.pi * x / length)
+    waves = persson.waves_of_map(np.tile(h, (64, 1)), 1e-3, True)
+    q, rms = np.array([2.0, 8.0]) * np.pi / length, np.array([1e-3, 2e-4]) / np.sqrt(2.0)
+    some = np.append(True, np.diff(waves.slope) > 1e-9 * waves.slope[-1])  # rounding has rings too
+    assert waves.q[some] == pytest.approx(q, rel=1e-12)
+    assert waves.slope[some] == pytest.approx(np.sqrt(np.cumsum((q * rms) ** 2)), rel=1e-12)
+
+
 def test_the_work_of_flattening_is_the_energy_of_the_flattened_waves():
     """The integral of u dp over all loads is E*/4 sum q |h_q|^2: of a half-space that follows every wave."""
     h = heights()
