@@ -48,6 +48,16 @@ def test_a_boundary_outside_the_pad_that_passes_the_glass_is_told_with_its_place
     assert f"passed through the surface, by {depth.max():.3g} mm at ({place})" in said
 
 
+@pytest.mark.parametrize("depths", [(0.05, 0.2), (0.15, 0.2, 0.05), (0.18, 0.2, 0.19), (0.2, 0.1, 0.15)])
+def test_of_many_steps_the_deepest_is_told(depths):
+    motion = [ev.Press(indentation=depth, steps=1) for depth in depths]
+    result = ev.simulate(replace(scene_2d(0.5), motion=motion))
+    nodes = np.setdiff1d(result.mesh.outer_sides, result.mesh.node_sets["pad"])
+    glass = result.mesh.points[result.mesh.node_sets["pad"], 1].min()
+    deepest = max(glass - (result.mesh.points + one.displacement)[nodes, 1].min() for one in result.frames)
+    assert any(f"passed through the surface, by {deepest:.3g} mm" in said for said in result.warnings)
+
+
 def test_a_resumed_run_knows_what_passed_before(tmp_path):
     scene = replace(
         scene_2d(0.5), motion=[ev.Press(indentation=0.2, steps=1), ev.Press(indentation=0.01, steps=1)]
